@@ -8,6 +8,8 @@ from functools import cache
 import numpy as np
 from fit_tables import BAND
 from measuring import OURS
+from swept_response import SweptResponse
+from to_responses import calibrate_to_responses
 from virtual_rig import (
     AMPLITUDES,
     CONSTANTS,
@@ -30,9 +32,7 @@ from rigsight.identify import JointFit, characteristic_scales, fit_jointly
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.hysteresis import (
     SpectralRatio,
-    SweptResponse,
     break_frequency,
-    calibrate_to_responses,
     fitted_break_frequency,
     peak,
 )

@@ -39,6 +39,9 @@ def test_identify_says_nothing_if_quiet(axis_campaign: Path, tmp_path: Path, run
         (["--resolution", "0.01"], "too short for a resolution"),
         (["--resolution", "0"], "positive number"),
         (["--jobs", "0"], "--jobs"),
+        (["--effect", "bouc_wen"], "Did you mean 'bouc_wen_hysteresis'"),
+        (["--effect", "cubic_stiffness"], "name one that does: bouc_wen_hysteresis"),
+        (["--effect", "bouc_wen_hysteresis", "--effect", "iwan_hysteresis"], "name one of them"),
     ],
 )
 def test_options_of_identify_are_checked(

@@ -165,3 +165,15 @@ def test_iwan_hysteresis_has_a_loop_but_no_pair() -> None:
     # Beyond slip the loop is a parallelogram: four times the sliding force times the slid way, at most 4 F X.
     sliding = 0.98 * 2318.0 * 0.0045
     assert 0.0 < area < 4.0 * sliding * 0.05
+
+
+def test_an_exponent_at_its_bound_leaves_the_fitted_value_inside_the_interval() -> None:
+    # n cannot fall below 1, where it was fitted; sum and difference S, D grow with it by S log(S), D log(D).
+    total, difference = 50.0 * math.log(50.0), 30.0 * math.log(30.0)
+    slopes = np.array([0.5 * (total + difference), 0.5 * (total - difference), 1.0])
+    covariance = 0.01**2 * np.outer(slopes, slopes) + np.diag([0.25, 0.25, 0.0])
+    fit = fit_of(VALUES, ("beta", "gamma", "n"), covariance)
+    found = derived_quantities(fit, [], SCALES, np.random.default_rng(0)).pairs[0]
+    # Half of the draws end at the bound, where the sum varies by the root of 0.5; the others raise it.
+    assert found.lower == pytest.approx(50.0 - 1.645 * math.sqrt(0.5), abs=0.4)
+    assert found.upper == pytest.approx(50.0 + 1.96 * math.hypot(0.01 * total, math.sqrt(0.5)), abs=0.5)

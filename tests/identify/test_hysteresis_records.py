@@ -13,7 +13,7 @@ from rigsight.identify.hysteresis import Calibration, calibrate_to_records, deri
 from rigsight.identify.hysteresis.derived import record_amplitudes
 from rigsight.identify.hysteresis.parameters import free_parameters
 from rigsight.records import Record
-from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, parameter_vector, simulate
 
@@ -113,6 +113,24 @@ def test_an_exponent_that_is_no_whole_number_comes_back() -> None:
     saturation = found.derived.saturation
     assert saturation is not None
     assert saturation.value == pytest.approx(4000.0 ** (-1.0 / 1.5), rel=0.02)
+
+
+def test_sliders_that_a_search_takes_for_their_neighbors_come_back() -> None:
+    """Nearly all slip at every amplitude: the search alone ends at 58 times their reach, whatever its seed."""
+    truth = {
+        "gain": 1.0, "m": 2.0, "d": 6.0, "k": 3000.0, "x_off": 1e-4, "force_off": 0.0, "a": 0.2, "x_s": 1e-3, "q": -0.3,
+    }  # fmt: skip
+    structure, rng = compose(AXIS, [effect_named("iwan_hysteresis")]), np.random.default_rng(5)
+    t = 5e-3 * np.arange(1200)
+    records = []
+    for amplitude in (1.0, 3.0, 10.0):
+        record = Record(f"{amplitude} N", 5e-3, {"u": log_sweep(t, amplitude, 3.0, 90.0)}, {}, kind="sweep")
+        x = simulate(structure, truth, record)["x"]
+        records.append(record.with_signals(x=x + NOISE * rng.standard_normal(t.size)))
+    found = calibrate_to_records(structure, records, {"gain": 1.0}, rng, output_noise={"x": NOISE})
+    assert found.fit.weighted_rms == pytest.approx(1.0, abs=0.03)
+    for name, error in found.standard_errors.items():
+        assert abs(found.values[name] - truth[name]) < 4.0 * error, name
 
 
 def test_what_cannot_be_calibrated_is_explained() -> None:

@@ -9,8 +9,10 @@ from typing import Self
 from rigsight.api.estimator import CampaignEstimator, campaign_of
 from rigsight.api.identification_result import IdentificationResult
 from rigsight.campaign import Campaign
+from rigsight.effects import CATALOGUE, Effect
 from rigsight.records import Record
 from rigsight.rigs import Rig
+from rigsight.workflow.campaign.in_memory import effects_of
 from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.identify import checked_options, identify_campaign
 from rigsight.workflow.run.kernels import checked_jobs
@@ -35,13 +37,17 @@ class LinearIdentifier(CampaignEstimator):
         Show progress on stderr.
     rig
         Rig of the records if `fit` gets records instead of a campaign: the name of a built-in rig, or a rig of your own.
+    effects
+        Effects with which the rig is calibrated as well, by name or as declarations; at least one of them with memory.
+    seed
+        Seed of this calibration.
 
     Attributes
     ----------
     identification_
         The result: parameters of each record and of all together, with standard errors.
     model_
-        The linear simulation with the parameters of all records together.
+        The linear simulation with the parameters of all records together; with `effects`, the simulation with them.
 
     References
     ----------
@@ -65,12 +71,16 @@ class LinearIdentifier(CampaignEstimator):
         n_jobs: int | None = None,
         verbose: bool = False,
         rig: str | Rig | None = None,
+        effects: Sequence[str | Effect] = (),
+        seed: int = 0,
     ) -> None:
         self.method = method
         self.resolution = resolution
         self.n_jobs = n_jobs
         self.verbose = verbose
         self.rig = rig
+        self.effects = effects
+        self.seed = seed
 
     def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
         """Identify the estimation records of a campaign; its validation records are only scored.
@@ -87,14 +97,16 @@ class LinearIdentifier(CampaignEstimator):
         Raises
         ------
         InputError
-            If the campaign cannot be used, the method is unknown, a record is too short for the requested resolution, or no
-            record shows the motion.
+            If the campaign cannot be used, the method is unknown, a record is too short for the requested resolution, no record
+            shows the motion, or an effect is unknown or cannot be calibrated on the rig.
         """
         options = checked_options(self.method, self.resolution)
         jobs = checked_jobs(self.n_jobs)
-        read = campaign_of(campaign, rig=self.rig)
+        effects = effects_of(self.effects)
+        own = [effect for effect in effects if effect not in CATALOGUE]
+        read = campaign_of(campaign, own, rig=self.rig)
         with listening(quiet=not self.verbose) as listener:
-            found = identify_campaign(read, options, jobs, listener)
+            found = identify_campaign(read, options, jobs, listener, effects=effects, seed=self.seed)
         self.identification_ = IdentificationResult.of(found)
-        self.model_ = model_of(found.model)
+        self.model_ = model_of(found.model, (*own, *read.modelled))
         return self

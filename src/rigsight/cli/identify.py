@@ -8,7 +8,18 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Simulators
+from rigsight.cli.options import (
+    Campaign,
+    Debug,
+    Jobs,
+    Json,
+    OwnEffects,
+    Quiet,
+    ResultsFolder,
+    Seed,
+    Simulators,
+    effect_names,
+)
 from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.workflow.run.progress_display import listening
 
@@ -33,7 +44,18 @@ def identify(
             help="Frequency resolution: width of the local bands, or spacing of the averaged frequencies.",
         ),
     ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            show_default="the rig's own equations",
+            help="Calibrate the rig with this effect as well; one with memory, such as bouc_wen_hysteresis. May be repeated.",
+            autocompletion=effect_names,
+        ),
+    ] = None,
+    effects: OwnEffects = None,
     simulator: Simulators = None,
+    seed: Seed = 0,
     jobs: Jobs = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -43,15 +65,27 @@ def identify(
 
     Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR; all files or none. For rigs
     with several motions or from a rig file it also writes identification.html with the responses of every sensor to every input,
-    the poles, and which parameters the records determine.
+    the poles, and which parameters the records determine. With
+    --effect, model.json holds the rig with these effects.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.identify import run_identify
+        from rigsight.workflow.own.own_effects import named, own_effects
         from rigsight.workflow.own.own_simulators import own_simulators
 
         own_simulators(simulator or [])
+        # Effects of installed packages are checked only where some may be named.
+        own = own_effects(effects or [], listener=listener) if effect or effects else ()
         identification = run_identify(
-            campaign, out, method=method, resolution=resolution, n_jobs=jobs, listener=listener
+            campaign,
+            out,
+            method=method,
+            resolution=resolution,
+            effects=named(effect, own) if effect else (),
+            own_effects=own,
+            seed=seed,
+            n_jobs=jobs,
+            listener=listener,
         )
     if json:
         show_json(out / "identification.json")

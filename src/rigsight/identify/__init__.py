@@ -19,10 +19,7 @@ from rigsight.identify.hysteresis import Calibration as Calibration
 from rigsight.identify.hysteresis import DerivedQuantities as DerivedQuantities
 from rigsight.identify.hysteresis import LoopArea as LoopArea
 from rigsight.identify.hysteresis import SpectralRatio as SpectralRatio
-from rigsight.identify.hysteresis import SteadyResponse as SteadyResponse
-from rigsight.identify.hysteresis import SweptResponse as SweptResponse
 from rigsight.identify.hysteresis import calibrate_to_records as calibrate_to_records
-from rigsight.identify.hysteresis import calibrate_to_responses as calibrate_to_responses
 from rigsight.identify.hysteresis import derived_quantities as derived_quantities
 from rigsight.identify.hysteresis import loop_area as loop_area
 from rigsight.identify.information import answers_to_states as answers_to_states
@@ -76,13 +73,10 @@ __all__ = [
     "RecordDerivatives",
     "RecordResidual",
     "SpectralRatio",
-    "SteadyResponse",
-    "SweptResponse",
     "TransferFit",
     "TransferForm",
     "answers_to_states",
     "calibrate_to_records",
-    "calibrate_to_responses",
     "characteristic_scales",
     "creep_error_of_sine",
     "derivatives",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rigsight.frequency import FrequencyResponse
+from rigsight.identify.hysteresis.calibration import Calibration
 from rigsight.identify.identifiability import Identifiability
 from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
@@ -161,6 +162,57 @@ class JointIdentification:
     left_out: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class EffectScore:
+    """How well one record is followed in free run without and with effects.
+
+    Attributes
+    ----------
+    record, role
+        Name and role of the record.
+    without
+        NRMSE of the joint fit of the rig alone, by output.
+    nrmse
+        The same with the effects.
+    """
+
+    record: str
+    role: str
+    without: dict[str, float]
+    nrmse: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class HysteresisIdentification:
+    """The rig with effects of memory, calibrated to the records that the joint fit used.
+
+    Attributes
+    ----------
+    effects
+        Names of the effects, along the signal path.
+    calibration
+        Parameters of rig and effects, and what follows from them.
+    held
+        Values of parameters of effects that were not fitted, or that the fit left at their special value.
+    units
+        Unit of every parameter.
+    meanings
+        What each parameter is.
+    statement
+        How much closer the records are followed with the effects, in words.
+    scores
+        Of every record.
+    """
+
+    effects: tuple[str, ...]
+    calibration: Calibration
+    held: dict[str, float]
+    units: dict[str, str]
+    meanings: dict[str, str]
+    statement: str
+    scores: tuple[EffectScore, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Identification:
     """The result of ``rigsight identify``.
@@ -194,6 +246,8 @@ class Identification:
         Which parameters the records determine together; None for these built-in rigs.
     meanings
         What each parameter is, by name; empty for these built-in rigs.
+    hysteresis
+        The rig with effects of memory; None where none was asked for. `model` is this one then.
     """
 
     title: str
@@ -209,3 +263,4 @@ class Identification:
     views: tuple[LinearView, ...] = ()
     identifiability: Identifiability | None = None
     meanings: dict[str, str] = field(default_factory=dict)
+    hysteresis: HysteresisIdentification | None = None

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from rigsight.diagnose.result import Estimate
 from rigsight.identify.identification import Identification, RecordIdentification, RecordScore
+from rigsight.report.hysteresis import ERROR_HEADS, HEADING, error_rows, hysteresis_rows
 from rigsight.report.quantities import ERRORS_HOLD, estimate_text, gap_percent, written
 from rigsight.report.terminal import plain_text
 
@@ -54,6 +55,20 @@ class IdentificationSummary:
             for subject, words in linear_rows(found):
                 rows.add_row(text(subject, "bold"), text(words))
             yield Padding(rows, (0, 0, 0, 2), expand=False)
+        if found.hysteresis is not None:
+            yield text("")
+            yield text(HEADING, "bold")
+            yield text(found.hysteresis.statement)
+            rows = Table.grid(padding=(0, 2))
+            for subject, words in hysteresis_rows(found.hysteresis):
+                rows.add_row(text(subject, "bold"), text(words))
+            yield Padding(rows, (0, 0, 0, 2), expand=False)
+            errors = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+            for head in ERROR_HEADS:
+                errors.add_column(text(head))
+            for row in error_rows(found.hysteresis):
+                errors.add_row(*map(text, row))
+            yield Padding(errors, (0, 0, 0, 2), expand=False)
         if found.warnings:
             yield text("")
             yield text("Worth knowing", "bold yellow")

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.identify.identification import Identification
+from rigsight.identify.identification import HysteresisIdentification, Identification
 from rigsight.identify.linear_view import LinearView, Mode
 from rigsight.report.drawing.figures import PageFigure, page_figure
+from rigsight.report.hysteresis import derived_rows, error_rows
 from rigsight.report.quantities import ERRORS_HOLD, UNDETERMINED, Written, gap_percent, written
 from rigsight.report.render import environment
 
@@ -92,6 +93,7 @@ def render_identification(
                 }
                 for score in identification.joint.scores
             ],
+            hysteresis=None if identification.hysteresis is None else _hysteresis(identification.hysteresis),
             amplitudes=None
             if amplitudes is None
             else page_figure(
@@ -106,6 +108,20 @@ def render_identification(
             made=datetime.now(UTC),
         )
     )
+
+
+def _hysteresis(found: HysteresisIdentification) -> dict[str, Any]:
+    fit = found.calibration.fit
+    return {
+        "statement": found.statement,
+        "parameters": [
+            _row(name, fit.values[name], fit.standard_errors[name], found.units[name], found.meanings[name])
+            for name in fit.free
+        ],
+        "held": ", ".join(f"{name} = {value:.4g}" for name, value in found.held.items()),
+        "derived": list(derived_rows(found)),
+        "errors": list(error_rows(found)),
+    }
 
 
 def _views(identification: Identification, drawings: Sequence[Figure]) -> list[dict[str, Any]]:

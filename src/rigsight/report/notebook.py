@@ -11,6 +11,7 @@ from rigsight.discover import Discovery
 from rigsight.identify.identification import Identification
 from rigsight.report.comparison import comparison_view
 from rigsight.report.discovery import discovery_rows
+from rigsight.report.hysteresis import ERROR_HEADS, HEADING, error_rows, hysteresis_rows
 from rigsight.report.identification import estimate_cell, joint_rows, unit_in_brackets
 from rigsight.report.render import environment
 from rigsight.report.terminal import diagnosis_rows
@@ -88,7 +89,12 @@ def identification_html(identification: Identification) -> str:
         identification.joint.statement,
         "" if told is None else told.sentence,
     ]
-    return _html(f"Identified: {identification.title}", sentences, [alone, together], identification.warnings)
+    tables = [alone, together]
+    if (hysteresis := identification.hysteresis) is not None:
+        sentences.append(hysteresis.statement)
+        tables.append(NotebookTable((HEADING, ""), list(hysteresis_rows(hysteresis))))
+        tables.append(NotebookTable(ERROR_HEADS, list(error_rows(hysteresis))))
+    return _html(f"Identified: {identification.title}", sentences, tables, identification.warnings)
 
 
 def discovery_html(discovery: Discovery) -> str:

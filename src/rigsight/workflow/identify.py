@@ -12,6 +12,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
+from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import Identification, JointIdentification, RecordIdentification
@@ -25,6 +26,7 @@ from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.identification.any_rig import IDENTIFYING, has_transfer_forms, identify_any_rig
 from rigsight.workflow.identification.figures import amplitudes_figure, identification_figures, view_figure
+from rigsight.workflow.identification.hysteresis import structure_with_memory, with_hysteresis
 from rigsight.workflow.identification.joint import identify_jointly
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identification.warnings import (
@@ -49,10 +51,13 @@ def run_identify(
     *,
     method: str = "local_rational",
     resolution: float | None = None,
+    effects: Sequence[Effect] = (),
+    own_effects: Sequence[Effect] = (),
+    seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
 ) -> Identification:
-    """Identify the linear rig behind the estimation records of a campaign.
+    """Identify the linear rig behind the estimation records of a campaign, and the rig with effects of memory if some are named.
 
     Parameters
     ----------
@@ -64,6 +69,12 @@ def run_identify(
         Estimator of the frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
     resolution
         Width in frequency asked for [rad/s]; None takes what each record gives.
+    effects
+        Effects with which the rig is calibrated as well, one of them with memory.
+    own_effects
+        Effects beside those of the catalogue that the simulation in question may have already.
+    seed
+        Seed of the calibration.
     n_jobs
         Records identified at the same time; None for one per processor.
     listener
@@ -72,16 +83,22 @@ def run_identify(
     Raises
     ------
     InputError
-        If the campaign cannot be used, a record is too short for the resolution asked for, no record shows the motion, or the
-        results cannot be written; nothing is written then.
+        If the campaign cannot be used, the effects cannot be calibrated on its rig, a record is too short for the resolution
+        asked for, no record shows the motion, or the results cannot be written; nothing is written then.
     """
     options = checked_options(method, resolution)
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
-    identification = identify_campaign(read_campaign(campaign), options, jobs, listener)
+    identification = identify_campaign(
+        read_campaign(campaign, own_effects), options, jobs, listener, effects=effects, seed=seed
+    )
     if out is not None:
-        write_identification(identification, Path(out), f"rigsight identify {campaign} --out {out}")
+        asked = "".join(f" --effect {effect.name}" for effect in effects)
+        seeded = f" --seed {seed}" if effects and seed else ""
+        write_identification(
+            identification, Path(out), f"rigsight identify {campaign}{asked}{seeded} --out {out}"
+        )
     return identification
 
 
@@ -105,7 +122,13 @@ def checked_options(method: str, resolution: float | None) -> EstimationOptions:
 
 
 def identify_campaign(
-    campaign: Campaign, options: EstimationOptions, n_jobs: int = 1, listener: Listener = silent
+    campaign: Campaign,
+    options: EstimationOptions,
+    n_jobs: int = 1,
+    listener: Listener = silent,
+    *,
+    effects: Sequence[Effect] = (),
+    seed: int = 0,
 ) -> Identification:
     """Identify each estimation record, then all of them together, and score the validation records.
 
@@ -119,15 +142,30 @@ def identify_campaign(
         Records identified at the same time.
     listener
         Told of every finished step.
+    effects, seed
+        As in `run_identify`.
 
     Raises
     ------
     InputError
-        If a record is too short for the resolution asked for, or no record shows the motion.
+        If a record is too short for the resolution asked for, no record shows the motion, or the effects cannot be calibrated on
+        the rig.
     """
     tell(campaign.notes, listener)
-    if not has_transfer_forms(campaign):
-        return identify_any_rig(campaign, options, n_jobs, listener)
+    structure = structure_with_memory(campaign, effects) if effects else None
+    if has_transfer_forms(campaign):
+        identification = _by_transfer_functions(campaign, options, n_jobs, listener)
+    else:
+        identification = identify_any_rig(campaign, options, n_jobs, listener)
+    if structure is None:
+        return identification
+    return with_hysteresis(identification, campaign, structure, seed, n_jobs, listener)
+
+
+def _by_transfer_functions(
+    campaign: Campaign, options: EstimationOptions, n_jobs: int, listener: Listener
+) -> Identification:
+    """Identify a rig with transfer functions of its own."""
     has_stiffness = campaign.parameters.get("k") != 0.0
     prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)

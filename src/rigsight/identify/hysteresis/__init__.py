@@ -1,4 +1,4 @@
-"""Calibration of hysteresis to records or to families of frequency responses, and derived quantities."""
+"""Calibration of hysteresis to records, derived quantities, and features of frequency responses."""
 
 from rigsight.identify.hysteresis.calibration import Calibration as Calibration
 from rigsight.identify.hysteresis.calibration import Minimum as Minimum
@@ -11,11 +11,8 @@ from rigsight.identify.hysteresis.features import Peak as Peak
 from rigsight.identify.hysteresis.features import break_frequency as break_frequency
 from rigsight.identify.hysteresis.features import fitted_break_frequency as fitted_break_frequency
 from rigsight.identify.hysteresis.features import peak as peak
-from rigsight.identify.hysteresis.predicted_response import SteadyResponse as SteadyResponse
-from rigsight.identify.hysteresis.predicted_response import SweptResponse as SweptResponse
 from rigsight.identify.hysteresis.spectral_ratio import SpectralRatio as SpectralRatio
 from rigsight.identify.hysteresis.to_records import calibrate_to_records as calibrate_to_records
-from rigsight.identify.hysteresis.to_responses import calibrate_to_responses as calibrate_to_responses
 
 __all__ = [
     "Calibration",
@@ -29,7 +26,6 @@ __all__ = [
     "SweptResponse",
     "break_frequency",
     "calibrate_to_records",
-    "calibrate_to_responses",
     "derived_quantities",
     "fitted_break_frequency",
     "loop_area",

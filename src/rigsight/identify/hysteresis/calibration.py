@@ -36,14 +36,12 @@ class Calibration:
     Attributes
     ----------
     fit
-        Values, covariance and residuals. Fitted to frequency responses, the residuals are per response of shape
-        (n_frequencies, 2): natural logarithm of the magnitude and phase [rad], measured less simulated; there are no initial
-        states.
+        Values, covariance and residuals.
     derived
         Saturation, pair and loop areas, with intervals.
     minima
-        Where the refinements of the search's ends arrived, best first, before special values were released: several of like
-        cost say that the data allow several sets.
+        Where the refinements of the search's ends, and of the effects' own starts, arrived, best first, before special values
+        were released: several of like cost say that the data allow several sets.
     n_simulated
         Parameter sets that the search simulated.
     """

@@ -26,7 +26,6 @@ from rigsight.simulate.input_hold import hold_motion
 LEVEL = 0.95
 """Confidence level of the intervals."""
 _DRAWS = 400
-_REDRAWS = 20
 _CYCLES = 4
 _SAMPLES_PER_CYCLE = 512
 _SUBSTEPS = 2
@@ -137,7 +136,7 @@ def derived_quantities(
         LoopArea(
             a,
             _derived(
-                f"energy per cycle at {a:.3g}",
+                f"energy per cycle at {a:.3g} {structure.rig.units['x']}",
                 _energy_unit(structure),
                 loop_area(structure, draws, a),
                 determined,
@@ -153,8 +152,10 @@ def parameter_draws(
 ) -> NDArray[np.float64]:
     """Return the fitted parameters and draws of their covariance, shape (n_parameters, 1 + n_draws).
 
-    The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear, and those
-    outside the admissible range (an exponent below 1) are drawn again; undetermined parameters stay where they are.
+    The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear. From outside the
+    admissible range (an exponent below 1) they are moved to its nearest point by the metric of the fit, as the fit itself is: an
+    interval about a parameter at its bound would not hold the fitted value otherwise. Undetermined parameters stay where they
+    are.
     """
     structure = fit.structure
     center = np.array([fit.values[name] for name in structure.names])
@@ -170,17 +171,25 @@ def parameter_draws(
     size = _sizes(covariance)
     eigenvalues, vectors = symmetric_eigen(covariance / np.outer(size, size))
     root = size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
-    inside: list[NDArray[np.float64]] = []
-    for _ in range(_REDRAWS):
-        drawn = theta + rng.standard_normal((n_draws, theta.size)) @ root.T
-        admitted = np.all((drawn >= coordinates.lower) & (drawn <= coordinates.upper), axis=1)
-        inside += list(drawn[admitted])
-        if len(inside) >= n_draws:
-            break
-    else:
-        inside += list(np.clip(drawn, coordinates.lower, coordinates.upper))
-    draws[:, 1:] = np.array([coordinates.to_parameters(each) for each in inside[:n_draws]]).T
+    drawn = theta + rng.standard_normal((n_draws, theta.size)) @ root.T
+    inside = _moved_inside(drawn, covariance, coordinates.lower, coordinates.upper)
+    draws[:, 1:] = np.array([coordinates.to_parameters(each) for each in inside]).T
     return draws
+
+
+def _moved_inside(
+    drawn: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Move draws of shape (n_draws, n_free) to the bounds that they pass; the others follow by their correlation with it."""
+    moved = drawn.copy()
+    for i in range(lower.size):
+        past = np.clip(moved[:, i], lower[i], upper[i]) - moved[:, i]
+        if past.any() and covariance[i, i] > 0.0:
+            moved += past[:, None] * covariance[i] / covariance[i, i]
+    return np.clip(moved, lower, upper)
 
 
 def _sizes(covariance: NDArray[np.float64]) -> NDArray[np.float64]:

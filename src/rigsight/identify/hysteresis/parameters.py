@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
+import sympy as sp
+
+from rigsight.effects import symbols as canonical
+from rigsight.effects.effect import Effect, Start
 from rigsight.errors import InputError, check_option
+from rigsight.rigs import evaluated
 from rigsight.simulate import Structure, compose
+from rigsight.units import characteristic_value
 
 
-def free_parameters(
-    structure: Structure, outputs: Collection[str], *, with_rest: bool = True
-) -> tuple[str, ...]:
+def free_parameters(structure: Structure, outputs: Collection[str]) -> tuple[str, ...]:
     """Return what records of these outputs determine: no constants, nothing of an output that was not measured.
 
     Parameters
@@ -19,8 +23,6 @@ def free_parameters(
         Rig and effects.
     outputs
         Names of measured outputs.
-    with_rest
-        False where the response holds no mean, as a frequency response: the rest position then stays where it is.
     """
     rig = structure.rig
     motion = rig.motion
@@ -32,14 +34,11 @@ def free_parameters(
     }
     rest = {symbol.name for symbol in motion.rest.free_symbols}
     bias = {symbol.name for symbol in motion.bias.free_symbols}
-    if with_rest:
-        # With a spring a constant force is equivalent to a shifted rest position; a bench has no rest position.
-        moved |= rest or bias
+    # With a spring a constant force is equivalent to a shifted rest position; a bench has no rest position.
+    moved |= rest or bias
     for state, rate in rig.downstream.items():
         if state.name in outputs:
-            # What a shift of the mean does not move stands in the slopes.
-            slopes = [rate] if with_rest else [rate.diff(state), rate.diff(motion.displacement)]
-            moved |= {symbol.name for slope in slopes for symbol in slope.free_symbols}
+            moved |= {symbol.name for symbol in rate.free_symbols}
     of_rig = {p.name for p in rig.parameters}
     fixed = dict(structure.fixed)
     of_effects = {
@@ -106,3 +105,81 @@ def start_values(structure: Structure, start: Mapping[str, float]) -> dict[str, 
     if missing:
         raise InputError(f"Start values are missing for: {', '.join(missing)}.")
     return values
+
+
+def declared_starts(
+    structure: Structure, begin: Mapping[str, float], scales: Mapping[str, float]
+) -> list[dict[str, float]]:
+    """Return the sets from which the effects ask to be fitted, one effect at a time, where they depend on the rig alone.
+
+    Parameters
+    ----------
+    structure
+        Rig of one motion, and effects.
+    begin
+        Value of every parameter; the stiffness is that of the linear rig.
+    scales
+        Size of each base quantity.
+    """
+    own_sizes = {
+        structure.parameter_name(effect, p.name): p.starts[0] * characteristic_value(p.dimension, scales)
+        for effect in structure.effects
+        for p in effect.parameters
+        if p.fitted and p.starts and p.default is None
+    }
+    sizes = {
+        canonical.drive_size: scales["drive"],
+        canonical.input_size: scales["input"],
+        canonical.x_size: scales["x"],
+        canonical.v_size: scales["x"] / scales["time"],
+        canonical.time_size: scales["time"],
+    }
+    return [
+        {**begin, **own_sizes, **_moved(structure, effect, start, begin, sizes)}
+        for effect in structure.effects
+        for start in effect.starts
+        if start.parent is None
+    ]
+
+
+def neighbors(structure: Structure, values: Mapping[str, float]) -> list[dict[str, float]]:
+    """Return the sets from which the effects ask to be fitted again, because a fit may have stopped beside the best one.
+
+    Parameters
+    ----------
+    structure
+        Rig of one motion, and effects.
+    values
+        Value of every parameter, as fitted.
+    """
+    return [
+        {**values, **_moved(structure, effect, start, structure.values_of(effect, values), {})}
+        for effect in structure.effects
+        for start in effect.starts
+        if start.parent == effect.name
+    ]
+
+
+def _moved(
+    structure: Structure,
+    effect: Effect,
+    start: Start,
+    values: Mapping[str, float],
+    sizes: Mapping[sp.Symbol, float],
+) -> dict[str, float]:
+    """Return the parameters that a start of an effect moves, by their names in the structure."""
+    motion = structure.rig.motion
+    known = dict(sizes)
+    # At a rig whose stiffness is made of several parameters, the effect's own are moved alone.
+    for symbol, part in ((canonical.k, motion.stiffness), (canonical.m, motion.inertia)):
+        if sizes and part is not None:
+            known[symbol] = evaluated(part, values)
+    moved = {}
+    for name, formula in start.values.items():
+        own = {symbol: values[symbol.name] for symbol in formula.free_symbols if symbol not in known}
+        value = float(formula.subs({**known, **own}))
+        if name != str(canonical.k):
+            moved[structure.parameter_name(effect, name)] = value
+        elif isinstance(motion.stiffness, sp.Symbol):
+            moved[motion.stiffness.name] = value
+    return {name: value for name, value in moved.items() if name in structure.names}

@@ -12,11 +12,14 @@ from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.first_states import first_state
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calibration, Minimum, better
 from rigsight.identify.hysteresis.derived import derived_quantities, record_amplitudes
 from rigsight.identify.hysteresis.parameters import (
     checked_free,
+    declared_starts,
     free_parameters,
+    neighbors,
     special_structure,
     start_values,
 )
@@ -49,6 +52,7 @@ def calibrate_to_records(
     n_generations: int = 100,
     n_sets: int = 96,
     n_ends: int = 8,
+    n_jobs: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
     """Calibrate a structure with hysteresis to records, best at several amplitudes below and above saturation.
@@ -75,6 +79,8 @@ def calibrate_to_records(
         Factor around the start in which the rig's own parameters are searched.
     n_generations, n_sets, n_ends
         Size of the search and number of its ends that are refined, see `search`.
+    n_jobs
+        Records simulated at the same time; the result does not depend on it.
     progress
         Called with what has just been finished.
 
@@ -101,7 +107,8 @@ def calibrate_to_records(
     tell = progress or (lambda _: None)
 
     simple, simple_free = special_structure(structure, chosen)
-    look = GreyBoxFit(simple, records, scales, noise, _ROUGH_ACCURACY)
+    threads = IdleThreads(n_jobs)
+    look = GreyBoxFit(simple, records, scales, noise, _ROUGH_ACCURACY, threads=threads)
     searched = tuple(name for name in simple_free if name not in _shifts(structure))
     coordinates = Coordinates.of(simple, searched, begin, scales)
     box = SearchBox.around(coordinates, coordinates.from_values(begin), spread)
@@ -114,21 +121,27 @@ def calibrate_to_records(
         n_ends=n_ends,
         progress=lambda generation: tell(f"generation {generation}"),
     )
+
+    def refined(values: Mapping[str, float]) -> FitResult:
+        return look.fit(
+            values,
+            simple_free,
+            max_evaluations=_ROUGH_EVALUATIONS,
+            tolerance=_ROUGH_TOLERANCE,
+            finish=False,
+        )
+
     rough = []
     for theta in ends.usable:
         values = dict(zip(simple.names, map(float, coordinates.to_parameters(theta)), strict=True))
-        rough.append(
-            look.fit(
-                values,
-                simple_free,
-                max_evaluations=_ROUGH_EVALUATIONS,
-                tolerance=_ROUGH_TOLERANCE,
-                finish=False,
-            )
-        )
+        rough.append(refined(values))
         tell("refined an end of the search")
+    rough += map(refined, declared_starts(simple, {n: begin[n] for n in simple.names}, scales))
+    tell("refined the starts of the effects")
+    rough += map(refined, neighbors(simple, min(rough, key=lambda fit: fit.cost).values))
+    tell("refined the neighbors of the best")
     rough.sort(key=lambda fit: fit.cost)
-    fit = _refined(structure, chosen, simple, records, scales, noise, rough[0], rng)
+    fit = _refined(structure, chosen, simple, records, scales, noise, rough[0], rng, threads)
     tell("refined the best")
     minima = tuple(Minimum(f.values | dict(f.structure.fixed), f.cost / f.n_samples) for f in rough)
     amplitudes = record_amplitudes(structure, records, fit.values)
@@ -145,9 +158,10 @@ def _refined(
     noise: Mapping[str, float],
     rough: FitResult,
     rng: np.random.Generator,
+    threads: IdleThreads,
 ) -> FitResult:
     """Fit to full precision: first with the special values, then released from them, then from beyond if that paid."""
-    careful = GreyBoxFit(simple, records, scales, noise)
+    careful = GreyBoxFit(simple, records, scales, noise, threads=threads)
     settled = careful.fit(rough.values, rough.free, rough.initial_states)
     coordinates = Coordinates.of(simple, rough.free, rough.values, scales)
     for _ in range(_HOPS):
@@ -158,7 +172,7 @@ def _refined(
         settled = better(settled, careful.fit(values, rough.free, settled.initial_states))
     if simple is structure or not settled.residuals:
         return settled
-    whole = GreyBoxFit(structure, records, scales, noise)
+    whole = GreyBoxFit(structure, records, scales, noise, threads=threads)
     special = {name: value for name, value in simple.fixed if name in free}
     values = {**settled.values, **dict(simple.fixed)}
     best = whole.fit(values, free, settled.initial_states)
@@ -171,8 +185,9 @@ def _refined(
 def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean squared weighted residual of every set, shape (n_sets,)."""
     p = np.array([coordinates.to_parameters(theta) for theta in thetas]).T
-    total = np.zeros(thetas.shape[0])
-    for data in look.data.records:
+
+    def of_record(number: int) -> NDArray[np.float64]:
+        data = look.data.records[number]
         first = first_state(look.structure, data.record, {})
         states = np.repeat(first[:, None], thetas.shape[0], axis=1)
         outputs = simulate_sets(
@@ -181,8 +196,9 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: NDArray[np.float6
         with np.errstate(invalid="ignore", over="ignore"):
             # An offset is the refinement's business, not the search's.
             residual = (outputs[:, 0] - data.measured[:, :1]) * data.weights[0]
-            total += np.sum((residual - np.mean(residual, axis=0)) ** 2, axis=0)
-    return total / look.n_samples
+            return np.asarray(np.sum((residual - np.mean(residual, axis=0)) ** 2, axis=0))
+
+    return np.asarray(np.sum(look.data.of_each_record(of_record), axis=0) / look.n_samples)
 
 
 def _shifts(structure: Structure) -> set[str]:

@@ -14,6 +14,7 @@ from rigsight.identify.identification import (
 from rigsight.identify.transfer.conicity import ConicityEstimate
 from rigsight.identify.transfer.running_gear_parameters import LEVEL, PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.workflow.identification.hysteresis_json import hysteresis_json
 from rigsight.workflow.identification.linear_json import (
     finite,
     identifiability_json,
@@ -65,6 +66,11 @@ def identification_json(identification: Identification, figures: Mapping[str, st
         ],
         "records": [_record(record, units) for record in identification.records],
         **of_any_rig,
+        **(
+            {}
+            if identification.hysteresis is None
+            else {"hysteresis": hysteresis_json(identification.hysteresis)}
+        ),
         "figures": dict(figures),
     }
 

@@ -1,4 +1,4 @@
-"""Hysteresis parameters from a family of frequency responses, one per amplitude."""
+"""Which hysteresis parameters follow a family of frequency responses, one per amplitude?"""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
+from swept_response import SweptResponse
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
@@ -17,11 +18,9 @@ from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calib
 from rigsight.identify.hysteresis.derived import derived_quantities
 from rigsight.identify.hysteresis.parameters import (
     checked_free,
-    free_parameters,
     special_structure,
     start_values,
 )
-from rigsight.identify.hysteresis.predicted_response import MeasuredResponse
 from rigsight.identify.hysteresis.search import SearchBox, search
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.simulate import Structure
@@ -37,12 +36,12 @@ _NO_RESPONSE = 1e3
 
 def calibrate_to_responses(
     structure: Structure,
-    responses: Sequence[MeasuredResponse],
+    responses: Sequence[SweptResponse],
     constants: Mapping[str, float],
     rng: np.random.Generator,
     *,
+    free: Sequence[str],
     start: Mapping[str, float] | None = None,
-    free: Sequence[str] | None = None,
     with_phase: bool = True,
     spread: float = 10.0,
     n_generations: int = 100,
@@ -50,7 +49,7 @@ def calibrate_to_responses(
     n_ends: int = 6,
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
-    """Calibrate a structure with hysteresis to frequency responses, measured with sweeps or with steady sines.
+    """Calibrate a structure with hysteresis to frequency responses, measured with sweeps.
 
     Residuals are the logarithms of the magnitudes and the phases, over their standard errors where the responses have
     variances. Standard errors of the parameters follow from the residuals, colored along the frequency.
@@ -60,16 +59,16 @@ def calibrate_to_responses(
     structure
         Rig whose input moves a mass, and effects; a number written into its equations stays.
     responses
-        `SweptResponse` or `SteadyResponse`, one or more per amplitude.
+        One or more per amplitude.
     constants
         The rig's constants by name.
     rng
         Random numbers of search and intervals.
+    free
+        Parameters to move.
     start
         Values of parameters that are known or of a simpler fit; inertia, damping and stiffness are found from a PT2 of each
         response where missing.
-    free
-        Parameters to move; default is all that the responses can show.
     with_phase
         False leaves the phases unread, as where a delay of the bench is in them.
     spread
@@ -92,10 +91,7 @@ def calibrate_to_responses(
     tell = progress or (lambda _: None)
     linear, scales = _linear_start(structure, responses, constants, start or {})
     begin = start_values(structure, linear)
-    outputs = {response.measured.response for response in responses}
-    chosen = checked_free(
-        structure, free_parameters(structure, outputs, with_rest=False) if free is None else free
-    )
+    chosen = checked_free(structure, free)
     simple, simple_free = special_structure(structure, chosen)
     look = _Problem(Coordinates.of(simple, simple_free, begin, scales), responses, with_phase)
     box = SearchBox.around(look.coordinates, look.coordinates.from_values(begin), spread)
@@ -125,13 +121,13 @@ def calibrate_to_responses(
     return Calibration(fit, derived_quantities(fit, amplitudes, scales, rng), minima, ends.n_evaluations)
 
 
-def _of_motion(structure: Structure, response: MeasuredResponse) -> bool:
+def _of_motion(structure: Structure, response: SweptResponse) -> bool:
     return response.measured.response == structure.rig.outputs[0].name
 
 
 def _linear_start(
     structure: Structure,
-    responses: Sequence[MeasuredResponse],
+    responses: Sequence[SweptResponse],
     constants: Mapping[str, float],
     start: Mapping[str, float],
 ) -> tuple[dict[str, float], dict[str, float]]:
@@ -176,7 +172,7 @@ class _Problem:
     """Residuals of all responses as functions of the coordinates, many sets at a time."""
 
     def __init__(
-        self, coordinates: Coordinates, responses: Sequence[MeasuredResponse], with_phase: bool
+        self, coordinates: Coordinates, responses: Sequence[SweptResponse], with_phase: bool
     ) -> None:
         self.coordinates = coordinates
         self._responses = responses
@@ -284,7 +280,7 @@ def _released(
     simple: Structure,
     values: Mapping[str, float],
     scales: Mapping[str, float],
-    responses: Sequence[MeasuredResponse],
+    responses: Sequence[SweptResponse],
     with_phase: bool,
 ) -> FitResult:
     """Refine to full precision: first with the special values, then released from them, then from beyond if that paid."""
