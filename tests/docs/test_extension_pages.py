@@ -12,10 +12,10 @@ from rigsight.effects import Effect
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_table_of_commands_lists_every_command_once() -> None:
+def test_the_table_of_commands_lists_every_command() -> None:
     text = (DOCS / "commands.md").read_text(encoding="utf-8")
     listed = re.findall(r"^\| `rigsight (\w+)", text, re.MULTILINE)
-    assert sorted(listed) == sorted(COMMANDS)
+    assert set(listed) == set(COMMANDS)
 
 
 def test_the_page_on_own_effects_names_every_field_of_an_effect() -> None:
