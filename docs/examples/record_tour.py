@@ -18,12 +18,12 @@ STEPS = (
         "rigsight init stage --model axis",
     ),
     (
-        "The simulation has a mass of 2 kg, a damping of 15 N s/m and a stiffness of 800 N/m. That stands in the campaign now.",
+        "The given simulation has a mass of 2 kg, a damping of 15 N s/m and a stiffness of 800 N/m. Enter these values:",
         "sed -i 's/^# m =    /m = 2.0  /; s/^# d =    /d = 15.0  /; s/^# k =    /k = 800.0  /' stage/campaign.toml",
     ),
     ("What is missing in it?", "rigsight diagnose stage --out results"),
     (
-        "The report says that the drive holds its output between samples. It does, and the campaign did not say so. Once more:",
+        "The drive indeed holds its output between samples, and the campaign did not say so. Correct it and repeat:",
         "sed -i 's/^kind = /hold = \"zoh\"\\nkind = /' stage/campaign.toml; rigsight diagnose stage --out results",
     ),
     (
