@@ -199,6 +199,7 @@ def test_a_delay_of_half_a_sample_in_the_model_hides_no_wrong_hold():
     assert finding.sentence.startswith("With cubic_stiffness in the model: ")
     assert '"zoh"' in finding.mend
     assert "a delay in the rig" in finding.sentence
+    assert finding.serious
 
 
 def test_a_right_hold_stays_right_with_the_effect_in_the_model():

@@ -91,5 +91,10 @@ def with_best_model(quality: DataQuality, context: FitContext, model: Scored) ->
     timing = input_timing(context, effects, base) or timing
     named = " and ".join(effect.name for effect in effects)
     within = f"With {named} in the model: " if named else ""
-    found = [replace(f, sentence=f"{within}{f.sentence}") for f in timing.findings()]
+    # A hold that makes a named delay superfluous changes the verdict.
+    replaces_delay = effects != model.effects
+    found = [
+        replace(finding, sentence=f"{within}{finding.sentence}", serious=finding.serious or replaces_delay)
+        for finding in timing.findings()
+    ]
     return replace(quality, findings=(*found, *quality.findings))

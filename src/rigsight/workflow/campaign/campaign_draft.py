@@ -12,7 +12,14 @@ from rigsight.records import Role
 from rigsight.records.formats.csv_channels import open_measurement
 from rigsight.records.formats.known import BY_SUFFIX
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign.record_proposal import BLANK, Proposal, propose, quoted
+from rigsight.workflow.campaign.record_proposal import (
+    ASSUMED_HOLD,
+    BLANK,
+    KNOWN_HOLD,
+    Proposal,
+    propose,
+    quoted,
+)
 
 MEASURED_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", *BY_SUFFIX)
 _SCORED = re.compile(r"valid|verif|test|check|pruef|prüf|score", re.IGNORECASE)
@@ -108,7 +115,8 @@ def campaign_text(
     if rig.constants and (values is None or open_constants):
         lines += ["", "[rig.constants]"]
         for constant in rig.constants:
-            about = f"# {constant.description} [{constant.unit}]"
+            assumed = "" if constant.default is None else "assumed, check: "
+            about = f"# {assumed}{constant.description} [{constant.unit}]"
             lines.append(
                 f"{constant.name} = {BLANK if constant.default is None else f'{constant.default:g}'}  {about}"
             )
@@ -124,9 +132,8 @@ def campaign_text(
         for one in rig.parameters
     ]
     for proposal, (role, remark) in zip(proposals, _roles(proposals), strict=True):
-        lines += ["", proposal.toml(role, remark).rstrip("\n")]
-        if values is not None and rig.inputs:
-            lines.append('hold = "zoh"  # the controller holds each command until the next one')
+        held = ASSUMED_HOLD if values is None else KNOWN_HOLD
+        lines += ["", proposal.toml(role, remark, held).rstrip("\n")]
     if left_out:
         lines += ["", "# Not used:"]
         lines += [f"# {name}: {' '.join(_printable(reason).split())}" for name, reason in left_out]

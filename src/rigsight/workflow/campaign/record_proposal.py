@@ -28,6 +28,13 @@ _COARSE = 0.5
 """Sample time [s] from which a comment asks about the unit of time."""
 
 
+ASSUMED_HOLD = (
+    'hold = "foh"  # assumed; "zoh" if a controller holds the input between samples, "band_limited" for a filtered analog '
+    "signal: a wrong one looks like a delay of half a sample"
+)
+KNOWN_HOLD = 'hold = "zoh"  # the controller holds each command until the next one'
+
+
 @dataclass(frozen=True, eq=False)
 class Proposal:
     """A file as a record of a campaign.
@@ -53,14 +60,15 @@ class Proposal:
     lines: tuple[str, ...]
     n_blanks: int
 
-    def toml(self, role: Role, remark: str = "") -> str:
-        """Return the ``[[records]]`` entry, for a role that is explained by a remark."""
+    def toml(self, role: Role, remark: str = "", hold: str = ASSUMED_HOLD) -> str:
+        """Return the ``[[records]]`` entry, for a role that is explained by a remark, with the line on the hold of the input."""
         head = [
             "[[records]]",
             f"file = {quoted(self.file)}",
             f'role = "{role}"' + (f"  # {remark}" if remark else ""),
         ]
-        return "\n".join([*head, *self.lines]) + "\n"
+        held = [hold] if self.guess.rig.inputs else []
+        return "\n".join([*head, *held, *self.lines]) + "\n"
 
 
 def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None = None) -> Proposal:
