@@ -80,6 +80,12 @@ def test_faults_of_the_records_come_before_everything_but_the_verdict(
     assert not any("minor" in line for line in shown)
 
 
+def test_values_of_the_given_simulation_stand_behind_those_that_were_found(diagnosis: Diagnosis) -> None:
+    text = "\n".join(printed(replace(diagnosis, given={"k_c": 81.0})))
+    assert "N m/rad (given 81)" in text
+    assert text.count("(given") == 1
+
+
 def test_where_nothing_was_given_there_is_no_given_simulation(variant: Callable[[str], Diagnosis]) -> None:
     text = "\n".join(printed(variant("nothing given")))
     assert "identified 13 %, with effect 0.94 %, noise floor 0.9 %" in text

@@ -184,6 +184,7 @@ def _assembled(
         noise_floors=floors,
         traces=traces,
         units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
+        given=dict(campaign.given),
         model=Model.of(after.fit.structure, after.fit.values, campaign.records[0].hold).to_json(),
         notes=tuple(notes),
         windows=found.windowing.length,

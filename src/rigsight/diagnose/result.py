@@ -140,6 +140,8 @@ class Diagnosis:
         Per record, validation records first.
     units
         Unit of each signal.
+    given
+        Parameters of the given simulation, by name.
     model
         The diagnosed simulation, ready for ``model.json``.
     notes
@@ -210,6 +212,7 @@ class Diagnosis:
     likely: LikelyCauses = field(default_factory=LikelyCauses)
     error_of_choice: float | None = None
     trust: Trust | None = None
+    given: Mapping[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
@@ -224,6 +227,7 @@ class Diagnosis:
             "remainder": None if self.remainder is None else self.remainder.to_json(),
             "trust": None if self.trust is None else self.trust.to_json(),
             "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
+            "given": {name: _number(value) for name, value in self.given.items()},
             "likely_causes": {
                 "effects": [list(effects) for effects in self.likely.sets],
                 "outside": self.likely.outside,

@@ -102,6 +102,7 @@ def render_report(
             ranking_rows=sections.ranking_rows(diagnosis),
             outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
             parameters=sections.parameter_rows(diagnosis, known),
+            has_given=bool(diagnosis.given),
             trust=trust_view(diagnosis),
             errors_told=sections.errors_told(diagnosis),
             equations=equation_groups(diagnosis, known),

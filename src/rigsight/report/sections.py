@@ -20,6 +20,7 @@ from rigsight.report.wording import (
     TIMES,
     effect_label,
     effects_label,
+    given_text,
     is_given,
     named_candidate,
     percent,
@@ -36,7 +37,17 @@ _TWO_SIDED = 1.96
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One number of the diagnosed simulation; `interval` is its 95 % interval, empty where it was not fitted."""
+    """One parameter of the diagnosed simulation.
+
+    Attributes
+    ----------
+    name, description, number, unit, remark
+        What it is; the remark stands where the records do not determine it.
+    interval
+        Its 95 % interval, empty where it was not fitted.
+    given
+        Its value in the given simulation, empty where that has none.
+    """
 
     name: str
     description: str
@@ -44,6 +55,7 @@ class ParameterRow:
     unit: str
     remark: str
     interval: tuple[Written, ...] = ()
+    given: str = ""
 
 
 @dataclass(frozen=True)
@@ -174,7 +186,8 @@ def parameter_rows(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> list[
     candidate = named_candidate(diagnosis)
     if candidate is not None and diagnosis.verdict in ("effect", "parameters"):
         return [
-            _parameter_row(name, estimate, known.get(name)) for name, estimate in candidate.parameters.items()
+            replace(_parameter_row(name, estimate, known.get(name)), given=given_text(diagnosis, name))
+            for name, estimate in candidate.parameters.items()
         ]
     model, units = diagnosis.model, diagnosis.model.get("units", {})
     values = {**model.get("parameters", {}), **model.get("effect_parameters", {})}

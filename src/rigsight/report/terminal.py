@@ -21,6 +21,7 @@ from rigsight.report.wording import (
     basis_sentence,
     effects_label,
     fault_sentences,
+    given_text,
     missing_force_sentence,
     named_candidate,
     percent,
@@ -103,12 +104,17 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         own = diagnosis.model.get("effect_parameters", {}) if diagnosis.effects else named.parameters
         for subject, is_told in (("parameters", True), ("of the rig", False)):
             numbers = [
-                f"{name} = {estimate_text(estimate)}"
+                f"{name} = {estimate_text(estimate)}{_given(diagnosis, name)}"
                 for name, estimate in named.parameters.items()
                 if (name in own) == is_told
             ]
             if numbers:
                 yield subject, "; ".join(numbers)
+
+
+def _given(diagnosis: Diagnosis, name: str) -> str:
+    given = given_text(diagnosis, name)
+    return f" (given {given})" if given else ""
 
 
 def _candidate(candidate: Candidate) -> str:

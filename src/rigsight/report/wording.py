@@ -233,6 +233,11 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
     )
 
 
+def given_text(diagnosis: Diagnosis, name: str) -> str:
+    """Return the value that a parameter has in the given simulation; empty where it has none."""
+    return f"{diagnosis.given[name]:.4g}" if name in diagnosis.given else ""
+
+
 def fault_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return what is wrong with the records or the campaign, with the mend; it counts before any verdict."""
     if diagnosis.data_quality is None:
