@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, responses_of_inputs
 from rigsight.frequency.signal_pair import among
-from rigsight.identify.transfer.record_response import Method, record_response
+from rigsight.identify.transfer.record_response import Method, driven_band, record_response
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.metrics import rms
 from rigsight.records import Record
@@ -169,8 +169,11 @@ def _of_inputs(
 
 
 def _measured(record: Record, path: SignalPath, method: Method) -> FrequencyResponse:
-    """Return the response at the lines that stand out of their noise."""
+    """Return the response at the lines that the input drives and that stand out of their noise."""
     found = _response(record, path, method, _LEAST_CLEARNESS)
+    if path.is_commanded and method != "thesis":
+        # Beyond its band an input drives next to nothing: what stands out there is transient.
+        found = found.band(*driven_band(record, path.source))
     if found.variance is not None:
         is_clear = found.magnitude**2 > _LEAST_CLEARNESS * found.variance
         if np.mean(is_clear) < 0.5:
