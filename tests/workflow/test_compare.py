@@ -94,6 +94,18 @@ def test_the_command_writes_tables_a_page_and_figures(gear: Path, tmp_path: Path
     assert re.search(r"iwan_tables +[0-9.e-]+\*", result.output)
 
 
+def test_the_given_simulation_is_a_model_where_all_its_parameters_are_given(axis_campaign: Path) -> None:
+    given = (axis_campaign / "campaign.toml").read_text(encoding="utf-8")
+    assert "k = 800.0\n" in given
+    comparison = run_compare(axis_campaign, ["given"], n_jobs=1)
+    (competitor,) = comparison.competitors
+    assert competitor.model.values["k"] == 800.0
+    part = given.replace("k = 800.0\n", "")
+    (axis_campaign / "campaign.toml").write_text(part, encoding="utf-8")
+    with pytest.raises(InputError, match="has no value of k"):
+        run_compare(axis_campaign, ["given"], n_jobs=1)
+
+
 def test_the_method_of_the_thesis_is_an_option(gear: Path) -> None:
     comparison = run_compare(gear, ["identified", "nominal"], method="thesis", n_jobs=1)
     errors = {(s.model, s.column.signal, s.column.quantity): s for s in comparison.scores}

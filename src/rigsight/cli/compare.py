@@ -19,8 +19,8 @@ def compare(
         list[str],
         typer.Argument(
             metavar="MODEL...",
-            help="Each a model.json, a folder that contains one, or a published set such as hysteresis_r. NAME=MODEL gives it "
-            "a name in the results.",
+            help="Each a model.json, a folder that contains one, a published set such as hysteresis_r, or given for the "
+            "simulation that the campaign gives. NAME=MODEL gives it a name in the results.",
         ),
     ],
     out: ResultsFolder = Path("comparison"),

@@ -20,6 +20,7 @@ from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
 from rigsight.report import comparison_figures, render_comparison
+from rigsight.simulate import compose
 from rigsight.simulate.drift import can_drift
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
@@ -31,6 +32,8 @@ from rigsight.workflow.run.versions import versions
 
 COMPARISON_FILE, TABLE_FILE, PAGE_FILE = "comparison.json", "comparison.csv", "comparison.html"
 COMPARING = "Comparing"
+GIVEN = "given"
+"""Name of the given simulation of a campaign among models."""
 
 
 def run_compare(
@@ -51,7 +54,8 @@ def run_compare(
     campaign
         The toml file or its folder.
     models
-        Each a ``model.json``, the folder that contains one, or the name of a published set; ``NAME=MODEL`` gives it a name.
+        Each a ``model.json``, the folder that contains one, the name of a published set, or ``given`` for the
+        campaign's own simulation; ``NAME=MODEL`` gives it a name.
     out
         Folder for the results; None writes nothing.
     method
@@ -201,9 +205,33 @@ def named_competitors(models: Sequence[str | Path], campaign: Campaign) -> list[
     found: list[Competitor] = []
     for text in map(str, models):
         name, source = _name_and_source(text)
-        model = of_this_rig(text, named_model(source), campaign)
+        model = (
+            given_model(campaign)
+            if source == GIVEN and not Path(source).exists()
+            else of_this_rig(text, named_model(source), campaign)
+        )
         found.append(Competitor(_distinct(name, [c.name for c in found]), model, source))
     return found
+
+
+def given_model(campaign: Campaign) -> Model:
+    """Return the given simulation of a campaign as a model.
+
+    Raises
+    ------
+    InputError
+        If the campaign does not give all of its parameters.
+    """
+    structure = compose(campaign.rig, campaign.modelled)
+    defaults = {p.name: p.default for p in structure.parameters if p.default is not None}
+    values = {**defaults, **campaign.constants, **campaign.given}
+    missing = [name for name in structure.names if name not in values]
+    if missing:
+        raise InputError(
+            f"The given simulation of {campaign.called} has no value of {', '.join(missing)}, so it cannot be compared. Give it "
+            "under [rig.parameters]."
+        )
+    return Model(structure, {name: values[name] for name in structure.names}, campaign.records[0].hold)
 
 
 def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
