@@ -282,7 +282,7 @@ def _report_culprit(
     dialect = layout.dialect
     for text, number in zip(texts, rows, strict=True):
         cells = dialect.cells(text)
-        for position in found.values():
+        for signal, position in found.items():
             cell = cells[position]
             if dialect.number(cell) is not None:
                 continue
@@ -292,5 +292,7 @@ def _report_culprit(
             elif other.number(cell) is not None:
                 what = f"'{cell}' has a decimal sign other than '{dialect.decimal}'. Specify it: decimal = \"{other.decimal}\"."
             else:
-                what = f"'{cell}' is not a number. Correct the cell; time must be a number of seconds."
+                what = f"'{cell}' is not a number. Correct the cell."
+                if signal == "t":
+                    what += " Time is a number, not a date."
             raise InputError(f"{path.name}, line {number}, column '{layout.names[position]}': {what}")

@@ -254,4 +254,6 @@ def _mend(error: str) -> str:
         )
     if "Unescaped" in error and "\\" in error:
         return "Write paths with / instead of \\."
+    if "after a statement" in error:
+        return "Numbers have a decimal point, such as 310.0; texts are written in quotes, names of tables in [brackets]."
     return "Texts are written in quotes, names of tables in [brackets]."
