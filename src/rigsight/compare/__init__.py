@@ -4,9 +4,9 @@ from rigsight.compare.comparison import Comparison as Comparison
 from rigsight.compare.comparison import Competitor as Competitor
 from rigsight.compare.comparison import Failure as Failure
 from rigsight.compare.comparison import RecordComparison as RecordComparison
-from rigsight.compare.comparison import Yardstick as Yardstick
-from rigsight.compare.comparison import compare_on_record as compare_on_record
 from rigsight.compare.floor import Floor as Floor
+from rigsight.compare.on_one_record import Yardstick as Yardstick
+from rigsight.compare.on_one_record import compare_on_record as compare_on_record
 from rigsight.compare.response_error import ResponseError as ResponseError
 from rigsight.compare.response_error import SignalPath as SignalPath
 from rigsight.compare.response_error import response_error as response_error
