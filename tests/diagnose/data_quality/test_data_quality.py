@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model
-from rigsight.diagnose.data_quality.finding import DataQuality
+from rigsight.diagnose.data_quality.finding import DataQuality, Finding
 from rigsight.diagnose.data_quality.sensor_faults import sensor_faults
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
 from rigsight.diagnose.noise.detection import noise_floors
@@ -200,6 +200,14 @@ def test_a_delay_of_half_a_sample_in_the_model_hides_no_wrong_hold():
     assert '"zoh"' in finding.mend
     assert "a delay in the rig" in finding.sentence
     assert finding.serious
+
+
+def test_a_hold_that_seemed_wrong_without_the_effect_is_not_told_with_it():
+    context, reidentified = prepared(sweeps(effect=CUBIC))
+    quality = data_quality(context, (*context.estimation, *context.scoring), reidentified)
+    seemed = replace(quality, findings=(Finding("hold", "Another hold.", "Set it."), *quality.findings))
+    model = fit_candidate(context, (effect_named("cubic_stiffness"),), reidentified.fit)
+    assert with_best_model(seemed, context, model).findings == quality.findings
 
 
 def test_a_right_hold_stays_right_with_the_effect_in_the_model():

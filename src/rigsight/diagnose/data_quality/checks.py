@@ -81,12 +81,16 @@ def with_best_model(quality: DataQuality, context: FitContext, model: Scored) ->
     model
         The best model; nothing is asked where it has no effect.
     """
-    if not model.effects or any(finding.kind in ("hold", "time_shift") for finding in quality.findings):
+    if not model.effects or any(finding.kind == "time_shift" for finding in quality.findings):
         return quality
     effects, base = without_short_delays(context, model)
     timing = input_timing(context, effects, base, with_shift=False)
-    if timing is None or not timing.findings():
+    if timing is None:
         return quality
+    others = tuple(finding for finding in quality.findings if finding.kind != "hold")
+    if not timing.findings():
+        # What looked like a wrong hold without the effects was their work.
+        return quality if others == quality.findings else replace(quality, findings=others)
     # A delay may explain as much; it is worth its fit only now.
     timing = input_timing(context, effects, base) or timing
     named = " and ".join(effect.name for effect in effects)
@@ -97,4 +101,4 @@ def with_best_model(quality: DataQuality, context: FitContext, model: Scored) ->
         replace(finding, sentence=f"{within}{finding.sentence}", serious=finding.serious or replaces_delay)
         for finding in timing.findings()
     ]
-    return replace(quality, findings=(*found, *quality.findings))
+    return replace(quality, findings=(*found, *others))
