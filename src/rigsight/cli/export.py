@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
 def export(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that contains one.")
+        Path,
+        typer.Argument(
+            metavar="MODEL",
+            help="A model.json, the folder that contains one, or a published set such as hysteresis_r.",
+        ),
     ],
     to: Annotated[
         str,

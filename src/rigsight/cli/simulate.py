@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 
 def simulate(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that contains it.")
+        Path,
+        typer.Argument(
+            metavar="MODEL",
+            help="A model.json, the folder that contains it, or a published set such as hysteresis_r.",
+        ),
     ],
     record: Annotated[
         Path,

@@ -12,7 +12,7 @@ from rigsight.export import TARGETS, export_model
 from rigsight.rigs import Rig
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.model_file import read_model
+from rigsight.workflow.campaign.model_file import named_model
 from rigsight.workflow.run.results import check_target, write_together
 
 
@@ -81,7 +81,7 @@ def run_export(
         If the model cannot be read or expressed in the target, or the file cannot be written.
     """
     check_option("Target", target, (*TARGETS, *ROBOT_TARGETS))
-    read = read_model(model, own_effects, own_rigs)
+    read = named_model(model, own_effects, own_rigs)
     if target in ROBOT_TARGETS:
         if hold is not None or source_only or (step is not None and target != "isaac"):
             raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")

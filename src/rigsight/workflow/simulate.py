@@ -20,7 +20,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.given_simulation import checked_numbers
-from rigsight.workflow.campaign.model_file import MODEL_FILE, read_model
+from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.run.results import check_target, write_together
 
@@ -67,7 +67,7 @@ def run_simulate(
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
-    read = read_model(model, own_effects, own_rigs)
+    read = named_model(model, own_effects, own_rigs)
     rig = read.structure.rig
     columns = columns or {}
     known = [TIME, *(signal.name for signal in rig.inputs)]

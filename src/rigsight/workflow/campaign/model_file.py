@@ -97,13 +97,15 @@ def _model(
     return Model(structure, _values(path, structure, table), table.hold)
 
 
-def named_model(model: str | Path) -> Model:
+def named_model(model: str | Path, own_effects: Iterable[Effect] = (), own_rigs: Iterable[Rig] = ()) -> Model:
     """Read a model, or take a published set.
 
     Parameters
     ----------
     model
         A ``model.json``, the folder that contains one, or the name of a published set.
+    own_effects, own_rigs
+        As in `read_model`.
 
     Raises
     ------
@@ -111,7 +113,7 @@ def named_model(model: str | Path) -> Model:
         As `read_model`, or listing the published sets where it is none of these.
     """
     if Path(model).exists() or str(model).endswith(".json"):
-        return read_model(model)
+        return read_model(model, own_effects, own_rigs)
     sets = published_sets()
     if str(model) not in sets:
         raise InputError(
