@@ -110,10 +110,12 @@ def init(
         )
     for name, reason in draft.left_out:
         typer.echo(f"Not used: {name}: {reason}")
-    if draft.n_blanks:
-        typer.echo(f'Replace each "FILL IN" ({draft.n_blanks} times) in it. Then: rigsight diagnose {folder}')
-    else:
-        typer.echo(f"Check the comments in it. Then: rigsight diagnose {folder}")
+    _say_what_is_next(draft.n_blanks, folder)
+
+
+def _say_what_is_next(n_blanks: int, folder: Path) -> None:
+    mend = f'Replace each "FILL IN" ({n_blanks} times) in it.' if n_blanks else "Check the comments in it."
+    typer.echo(f"{mend} Then: rigsight diagnose {folder}")
 
 
 def _init_from_mjcf(
@@ -168,6 +170,11 @@ def _init_from_mjcf(
         typer.echo(
             f"A free run of {run.duration:.1f} s agrees with MuJoCo{beside}; largest relative difference {run.worst:.1g}."
         )
+    if as_it_is:
+        typer.echo(
+            "MuJoCo computes the bodies, so a diagnosis takes several times as long as with equations. Contacts, tendons and "
+            "equalities need it; a tree of joints does not."
+        )
     for note in draft.notes:
         typer.echo(note)
     for what in draft.left_out:
@@ -178,9 +185,8 @@ def _init_from_mjcf(
             "Then run the same command again."
         )
     else:
-        typer.echo(
-            f"Written: {written.campaign.path}. Check the comments in it. Then: rigsight diagnose {folder}"
-        )
+        typer.echo(f"Written: {written.campaign.path}")
+        _say_what_is_next(written.campaign.n_blanks, folder)
 
 
 def _gear(text: str) -> tuple[str, float]:
