@@ -69,10 +69,12 @@ def test_fit_returns_the_estimator_and_leaves_the_settings(campaign: rs.Campaign
     estimator = rs.LinearIdentifier(n_jobs=1)
     assert estimator.fit(campaign) is estimator
     assert estimator.get_params() == {
+        "effects": (),
         "method": "local_rational",
         "n_jobs": 1,
         "resolution": None,
         "rig": None,
+        "seed": 0,
         "verbose": False,
     }
 

@@ -78,7 +78,10 @@ def test_hold_and_step_are_passed_on(write_model: Callable[..., Path], tmp_path:
     ("arguments", "expected"),
     [
         (["--to", "matlap"], "Target is 'matlap'. Did you mean 'matlab'"),
-        (["--to", "c", "--out", "stage.txt"], "stage.txt has the wrong suffix for c: name a file that ends in .c"),
+        (
+            ["--to", "c", "--out", "stage.txt"],
+            "stage.txt has the wrong suffix for c: name a file that ends in .c",
+        ),
         (["--to", "c", "--out", "."], "it is a folder"),
         (["--to", "c", "--out", "1st.c"], "'1st' cannot be the name"),
         (["--to", "c", "--out", "model.json/stage.c"], "model.json is a file"),

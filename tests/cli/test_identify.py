@@ -21,7 +21,7 @@ def test_identify_leaves_all_results_and_shows_the_table(
     assert sorted(path.name for path in out.iterdir()) == sorted(
         [*figures, "identification.json", "model.json"]
     )
-    for part in ("amplitude [input]", "k [N/m]", "resonance [rad/s]", "One estimation record", "score"):
+    for part in ("amplitude [input]", "k [N/m]", "resonance [rad/s]", "Only one estimation record", "score"):
         assert part in stdout
     assert json.loads((out / "identification.json").read_text())["schema_version"] == 1
     code, _, stderr = run("simulate", out, axis_campaign / "score.csv", "-o", tmp_path / "predicted.csv")

@@ -198,7 +198,7 @@ def test_any_value_in_a_member_of_an_effect(data: st.DataObject, value: Any) -> 
 
 def test_a_member_that_is_none_and_a_symbol_that_is_no_word_are_told() -> None:
     effect = CATALOGUE[0]
-    assert "starts holds {'k': 1}; give a tuple of Start objects" in " ".join(
+    assert "starts contains {'k': 1}; give a tuple of Start objects" in " ".join(
         is_told(replace(effect, starts=({"k": 1},)))
     )
     odd = tuple(replace(p, name=f"{p.name}; import os") for p in effect.parameters)
