@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import rigsight.effects
-from rigsight.effects import CATALOGUE, Effect, GainTrend, effect_named
+from rigsight.effects import CATALOGUE, Effect, Energy, GainTrend, Place, effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS, RIGS
 from rigsight.simulate import compose, simulate
@@ -21,6 +21,7 @@ from rigsight.workflow.own.effect_checks import (
     PER_PERIOD,
     SMALL,
     bench_of,
+    energy_of_cycles,
     is_found_again,
     last_period,
     sine_record,
@@ -42,6 +43,17 @@ each_effect_of_one_motion = pytest.mark.parametrize(
 def test_a_check_is_passed(effect, check):
     """The checks that a user's own effect has to pass too; tests/identify/test_recovery.py holds the last."""
     assert check(effect) is None
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [e for e in CATALOGUE if e.place is Place.DYNAMICS and e.energy is not Energy.ACTIVE],
+    ids=lambda effect: effect.name,
+)
+def test_the_energy_of_most_cycles_is_judged(effect):
+    """The check of energy passes over motions that do not settle: it would pass if none did."""
+    n_cases = 2 * len(start_values(effect))
+    assert len(energy_of_cycles(effect)) >= 0.5 * n_cases
 
 
 @each_effect_of_one_motion

@@ -157,7 +157,7 @@ def test_the_code_of_another_processor_is_not_run(fresh_cache, monkeypatch):
     structure = compose(AXIS)
     own = kernel_cache.kernel_of(structure).path
     kernel_cache._kernels.clear()
-    monkeypatch.setattr(library_cache, "_processor", lambda: "another")
+    monkeypatch.setattr(library_cache, "processor", lambda: "another")
     assert not kernel_cache.compiled(compose(AXIS))
     assert kernel_cache.kernel_of(structure).path != own
 

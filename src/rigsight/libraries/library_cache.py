@@ -107,13 +107,13 @@ def kernel_options() -> tuple[str, ...]:
 
 
 def _path(text: str, compiler: Compiler) -> Path:
-    parts = (text, " ".join(compiler.command), compiler.identity, " ".join(kernel_options()), _processor())
+    parts = (text, " ".join(compiler.command), compiler.identity, " ".join(kernel_options()), processor())
     name = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
     return cache_folder() / f"{name}{library_suffix()}"
 
 
 @cache
-def _processor() -> str:
+def processor() -> str:
     """Return an identifier that distinguishes this processor from others that cannot run its code."""
     told = f"{platform.machine()} {platform.processor()}"
     with contextlib.suppress(OSError):

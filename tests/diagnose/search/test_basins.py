@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-import rigsight.diagnose.search.basins as basins
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.effects import Effect, effect_named
@@ -59,9 +58,8 @@ def test_a_fit_that_stopped_elsewhere_is_taken_to_the_lowest_basin(bench: FitCon
     assert found.fit.values["T_s"] == pytest.approx(TRUE["T_s"], rel=0.02)
 
 
-def test_a_fit_at_the_floor_is_left_alone(bench: FitContext, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fit_at_the_floor_is_left_alone(bench: FitContext) -> None:
     model = fitted(bench, STRIBECK, TRUE)
-    monkeypatch.setattr(basins, "_lowest", None)
     assert in_lowest_basins(bench, [model])[0] is model
 
 

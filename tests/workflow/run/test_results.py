@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -83,13 +84,15 @@ def test_an_interruption_while_folders_are_made_leaves_none(
 def test_a_signal_that_comes_when_all_is_in_place_leaves_the_new_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    put = results._put_in_place
+    signals_held = results.signals_held
 
-    def interrupted(*arguments: Any) -> None:
-        put(*arguments)
-        signal.raise_signal(signal.SIGINT)
+    @contextlib.contextmanager
+    def interrupted() -> Iterator[Sequence[int]]:
+        with signals_held() as held:
+            yield held
+            signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(results, "_put_in_place", interrupted)
+    monkeypatch.setattr(results, "signals_held", interrupted)
     with results.noting_folders() as written, pytest.raises(KeyboardInterrupt):
         write_together(tmp_path / "out", CONTENTS)
     assert {path.name: path.read_text("utf-8") for path in (tmp_path / "out").iterdir()} == CONTENTS
