@@ -137,7 +137,7 @@ def gap_budget(
         if is_given:
             steps = [
                 ("Given simulation", 0.0, gap.before, GIVEN),
-                ("Re-identified", gap.before, gap.reidentified, REIDENTIFIED),
+                ("Refitting its parameters", gap.before, gap.reidentified, REIDENTIFIED),
             ]
         if diagnosis.effects:
             steps.append((after_label, gap.reidentified, gap.after, WITH_EFFECT))

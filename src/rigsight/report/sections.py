@@ -94,7 +94,7 @@ def budget_figure(diagnosis: Diagnosis) -> PageFigure:
         for output, gap in diagnosis.gap.items()
     )
     meaning = (
-        " Re-identified: the same equations with refitted parameters."
+        " Refitting its parameters leads to the re-identified equations."
         if is_given(diagnosis)
         else " No parameters were given: the first bar is the rig's own equations with fitted parameters."
     )
