@@ -13,43 +13,7 @@ from rigsight.records.reference import instrument_of
 from rigsight.rigs import rig_file_text
 from rigsight.workflow.campaign.read_campaign import read_campaign
 
-HEAD = """
-title = "rear axle"
-[rig]
-model = "running_gear"
-[rig.constants]
-v = 1.0
-r_0 = 0.1
-b = 0.3
-k_tau = 0.27
-[rig.parameters]
-J_z = 0.56
-"""
-RECORDS = """
-[[records]]
-file = "sweep.csv"
-kind = "sweep"
-amplitude = 0.25
-[[records]]
-file = "step.csv"
-role = "validation"
-kind = "step"
-hold = "zoh"
-"""
-Lines = list[str]
-
-
-@pytest.fixture
-def campaign(tmp_path: Path, write_csv: Callable[..., Path]) -> Callable[..., Path]:
-    """Write a campaign of two records and return its folder."""
-
-    def write(text: str = HEAD + RECORDS, change: Callable[[Lines], None] | None = None) -> Path:
-        write_csv("sweep.csv", change=change)
-        write_csv("step.csv", change=lambda lines: lines.pop())
-        (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
-        return tmp_path
-
-    return write
+from .campaign_text import HEAD, RECORDS, Lines
 
 
 def test_a_campaign_is_read_whole(campaign: Callable[..., Path]) -> None:
@@ -95,19 +59,6 @@ def test_constants_with_a_default_may_be_left_out(tmp_path: Path, write_csv: Cal
     read = read_campaign(tmp_path)
     assert read.constants == {"gain": 1.0}
     assert 'no record has role = "validation"' in read.notes[0]
-
-
-def test_a_record_in_another_unit_is_asked_about(campaign: Callable[..., Path]) -> None:
-    folder = campaign(HEAD + RECORDS)
-    assert not any("another unit" in note for note in read_campaign(folder).notes)
-    sweep = folder / "sweep.csv"
-    header, *rows = sweep.read_text(encoding="utf-8").splitlines()
-    cells = [row.split(",") for row in rows]
-    place = header.split(",").index("psi")
-    larger = [",".join([*row[:place], repr(1e3 * float(row[place])), *row[place + 1 :]]) for row in cells]
-    (folder / "other.csv").write_text("\n".join([header, *larger]), encoding="utf-8")
-    found = read_campaign(campaign(HEAD + RECORDS + '[[records]]\nfile = "other.csv"\n')).notes
-    assert any("'psi' moves 1e+03 times as far per unit of 'u' in record 'other'" in note for note in found)
 
 
 def test_conicity_passes_instead_of_the_creep_factor(campaign: Callable[..., Path]) -> None:
@@ -257,15 +208,6 @@ def test_broken_campaigns_are_told_with_key_and_mend(
     assert "pydantic" not in message
 
 
-@pytest.mark.parametrize(("stated", "n_notes"), [(0.25, 0), (1.0, 0), (3.9, 0), (250.0, 1), (1e-3, 1)])
-def test_an_amplitude_that_cannot_be_is_asked_about(
-    stated: float, n_notes: int, campaign: Callable[..., Path]
-) -> None:
-    notes = read_campaign(campaign(HEAD + RECORDS.replace("0.25", f"{stated}"))).notes
-    assert len(notes) == n_notes
-    assert all(f"amplitude = {stated:g}" in note for note in notes)
-
-
 def test_a_gain_of_zero_is_refused(tmp_path: Path, write_csv: Callable[..., Path]) -> None:
     write_csv("run.csv", header="t,u,x,y")
     (tmp_path / "campaign.toml").write_text(
@@ -273,18 +215,6 @@ def test_a_gain_of_zero_is_refused(tmp_path: Path, write_csv: Callable[..., Path
     )
     with pytest.raises(InputError, match=r"rig.constants.gain: is 0"):
         read_campaign(tmp_path)
-
-
-def test_sample_times_a_thousand_apart_are_asked_about(campaign: Callable[..., Path]) -> None:
-    def change(lines: Lines) -> None:
-        for i, line in enumerate(lines[1:], 1):
-            t, _, rest = line.partition(",")
-            lines[i] = f"{1e3 * float(t):.9g},{rest}"
-
-    (note,) = read_campaign(campaign(change=change)).notes
-    assert "factor of 1e+03" in note
-    assert "'sweep' 10 s" in note
-    assert 'unit = "ms"' in note
 
 
 def test_errors_of_a_record_name_campaign_file_and_line(campaign: Callable[..., Path]) -> None:
@@ -384,12 +314,6 @@ def test_time_is_no_signal(campaign: Callable[..., Path]) -> None:
     folder = campaign(HEAD + RECORDS + '[records.columns]\nu = "t"\n')
     with pytest.raises(InputError, match=r"step\.csv: u and t are both read from column 't'"):
         read_campaign(folder)
-
-
-def test_a_fitted_record_that_is_to_validate_too_is_told(campaign: Callable[..., Path]) -> None:
-    folder = campaign(HEAD + RECORDS.replace('"step.csv"', '"sweep.csv"'))
-    (note,) = read_campaign(folder).notes
-    assert "the validation record 'sweep_2' has exactly the samples of 'sweep', which is fitted" in note
 
 
 def test_what_a_rig_does_not_know_is_told_with_line_and_column(campaign: Callable[..., Path]) -> None:
