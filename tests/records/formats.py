@@ -122,3 +122,15 @@ FORMATS: dict[str, tuple[str, Write]] = {
     "UFF": (".uff", write_uff),
 }
 """Name -> suffix and writer; delimited text is left out."""
+
+UNITS = {"u": "A", "psi": "rad", "y": "m"}
+
+
+def rows(n_samples: int = 120, dt: float = 0.01) -> dict[str, np.ndarray]:
+    t = dt * np.arange(n_samples)
+    return {
+        "t": t,
+        "u": np.sin(3 * t**2),
+        "psi": 0.1 * np.sin(3 * t**2 - 0.4),
+        "y": 0.01 * np.cos(2 * t),
+    }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,14 +11,15 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping, Record, read_record
-from rigsight.records.formats.channel import Channel, ChannelFile
 from rigsight.records.formats.channel_file import file_format, open_channels
-from rigsight.records.formats.known import BY_SUFFIX, HEAD, Format, recognized
+from rigsight.records.formats.known import BY_SUFFIX
 from rigsight.records.formats.known import FORMATS as KNOWN
 
 from .formats import (
     FORMATS,
+    UNITS,
     Write,
+    rows,
     write_hdf5,
     write_matlab,
     write_matlab_hdf5,
@@ -39,71 +39,11 @@ class Named:
 
 INPUTS = (Named("u", "A"),)
 OUTPUTS = (Named("psi", "rad"), Named("y", "m"))
-UNITS = {"u": "A", "psi": "rad", "y": "m"}
 formats = pytest.mark.parametrize(("suffix", "write"), FORMATS.values(), ids=FORMATS)
-
-
-def rows(n_samples: int = 120, dt: float = 0.01) -> dict[str, np.ndarray]:
-    t = dt * np.arange(n_samples)
-    return {
-        "t": t,
-        "u": np.sin(3 * t**2),
-        "psi": 0.1 * np.sin(3 * t**2 - 0.4),
-        "y": 0.01 * np.cos(2 * t),
-    }
-
-
-DOCUMENTED = (Path(__file__).parents[2] / "docs/records.md").read_text(encoding="utf-8")
 
 
 def read(path: Path, **options: object) -> Record:
     return read_record(path, INPUTS, OUTPUTS, **options)
-
-
-@pytest.mark.parametrize("known", KNOWN, ids=lambda known: known.key)
-def test_no_known_format_is_missed(known: Format) -> None:
-    """Each has a writer here, so that every test below is about it as well, and each suffix is documented."""
-    assert not known.suffixes or {suffix for suffix, _ in FORMATS.values()} & set(known.suffixes)
-    undocumented = [suffix for suffix in known.suffixes if f"`{suffix}`" not in DOCUMENTED]
-    assert undocumented == []
-    assert known.suffixes == tuple(suffix.lower() for suffix in known.suffixes)
-
-
-def test_the_writers_here_write_every_known_format_and_one_format_recognizes_each_file(
-    tmp_path: Path,
-) -> None:
-    found = []
-    for i, (suffix, write) in enumerate(FORMATS.values()):
-        path = tmp_path / f"run{i}{suffix}"
-        write(path, rows(), UNITS)
-        with path.open("rb") as file:
-            head = file.read(HEAD)
-        (one,) = (known for known in KNOWN if known.recognizes(head))
-        assert one is recognized(head)
-        found.append(one)
-    assert {known.key for known in found} == {known.key for known in KNOWN}
-
-
-def test_every_suffix_belongs_to_one_format() -> None:
-    suffixes = [suffix for known in KNOWN for suffix in known.suffixes]
-    assert len(suffixes) == len(set(suffixes))
-
-
-def test_names_are_made_distinct_and_printable_whatever_a_reader_gives(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def opened(_: Path) -> Iterator[ChannelFile]:
-        channels = [Channel(name, 3, lambda: np.arange(3.0)) for name in ("u", "u", "x\x1b", "u_2")]
-        channels.append(Channel("short\x1b", 3, lambda: np.arange(2.0)))
-        yield ChannelFile(tuple(channels))
-
-    write_tdms(tmp_path / "run.tdms", rows(), UNITS)
-    monkeypatch.setattr("rigsight.records.formats.read_tdms.open_tdms", opened)
-    with open_channels(tmp_path / "run.tdms") as file:
-        assert [channel.name for channel in file.channels] == ["u", "u_3", "x\ufffd", "u_2", "short\ufffd"]
-        assert file.format == "TDMS"
-        with pytest.raises(InputError, match="channel 'short\ufffd': 2 of 3 samples"):
-            file.channels[-1].load()
 
 
 @formats
