@@ -7,7 +7,8 @@ import pytest
 
 from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep, step
-from rigsight.identify.record_identification import EstimationOptions, identify_record, measured_amplitude
+from rigsight.identify.measured_amplitude import measured_amplitude
+from rigsight.identify.record_identification import EstimationOptions, identify_record
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate

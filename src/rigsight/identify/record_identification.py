@@ -11,6 +11,7 @@ import numpy as np
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.identification import PathIdentification, RecordIdentification
+from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.transfer.axis_parameters import axis_parameters, springless_parameters
 from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
 from rigsight.identify.transfer.driven_offsets import driven_offsets
@@ -26,7 +27,6 @@ from rigsight.identify.transfer.transfer_form import Order
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.identify.transfer.transfer_step import fit_step
 from rigsight.identify.undetermined import POORLY_KNOWN
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Hold, Record
 from rigsight.records.reference import instrument_of
 from rigsight.rigs import Rig, evaluated
@@ -107,21 +107,6 @@ def identify_record(
         resonance=_resonance(motion) if has_stiffness else None,
         warnings=tuple(warnings),
     )
-
-
-def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
-    """Return the amplitude of a record in the unit of a signal, and that signal.
-
-    That is the height of a step, or half the range of another input, of several inputs the first that moves; of a free motion
-    half the range of the first output that was recorded.
-    """
-    inputs = [signal.name for signal in rig.inputs]
-    outputs = [signal.name for signal in rig.outputs if signal.name in record]
-    moving = [name for name in inputs if not is_constant(record[name])]
-    name = (moving or outputs or inputs)[0]
-    # Not the deviation from mean or median: a sweep that begins slowly has both off zero.
-    spanned = float(np.ptp(record[name]))
-    return (spanned if moving and record.kind == "step" else 0.5 * spanned), name
 
 
 def _driven_forward(record: Record, gain: float) -> Record:

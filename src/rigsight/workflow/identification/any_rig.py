@@ -31,7 +31,8 @@ from rigsight.identify.identification import (
 )
 from rigsight.identify.information import Information, information
 from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses, near_rest
-from rigsight.identify.record_identification import EstimationOptions, measured_amplitude
+from rigsight.identify.measured_amplitude import measured_amplitude
+from rigsight.identify.record_identification import EstimationOptions
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record

@@ -14,7 +14,7 @@ from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
 from rigsight.identify.joint import JointFit
-from rigsight.identify.record_identification import measured_amplitude
+from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.metrics import nrmse
 from rigsight.records import Record

@@ -1,0 +1,35 @@
+"""The amplitude of a record that states none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigsight.records.plausibility import is_constant
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+
+
+def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
+    """Return the amplitude of a record in the unit of a signal, and that signal.
+
+    That is the height of a step, or half the range of another input, of several inputs the first that moves; of a free motion
+    half the range of the first output that was recorded.
+
+    Parameters
+    ----------
+    record
+        A record.
+    rig
+        The rig whose signals it holds.
+
+    Returns
+    -------
+    The amplitude [unit of the signal], and the name of the signal.
+    """
+    inputs = [signal.name for signal in rig.inputs]
+    outputs = [signal.name for signal in rig.outputs if signal.name in record]
+    moving = [name for name in inputs if not is_constant(record[name])]
+    name = (moving or outputs or inputs)[0]
+    # Not the deviation from mean or median: a sweep that begins slowly has both off zero.
+    spanned = float(np.ptp(record[name]))
+    return (spanned if moving and record.kind == "step" else 0.5 * spanned), name
