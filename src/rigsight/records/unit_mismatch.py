@@ -16,7 +16,8 @@ _SEGMENTS = 8
 _DRIVEN = 1e-2
 """Share of the largest power of an input from which a frequency counts as driven."""
 _LEAST_RATIO = 30.0
-"""Ratio of gains from which a unit is asked about: below degrees for radians (57), above what the amplitude changes in a rig."""
+"""Ratio of gains from which a unit is asked about: below degrees for radians (57). That no amplitude changes a gain so much is an
+assumption; on nine campaigns, and 24 drawn ones of development seeds, ratios reached 6."""
 
 
 def unit_mismatch(

@@ -228,8 +228,10 @@ def _statement(effects: Sequence[str], fit: FitResult, scores: Sequence[EffectSc
             parts.append(f"from {gap_percent(before)} to {gap_percent(after)} on {called}")
             worst = max(worst, after / before if before > 0.0 else 1.0)
     text = f"With {label} the error of {motion} (NRMSE) goes {', '.join(parts)}."
+    if worst > 1.0:
+        return f"{text} It did not fall: the calibration failed, or the records do not follow this rig. Check units and columns."
     if worst > _HARDLY:
-        return f"{text} That is hardly less: the rig lacks none of these effects. 'rigsight diagnose' says what it lacks."
+        return f"{text} The effects explain hardly any of the error; 'rigsight diagnose' says what the rig lacks."
     return text if fit.success else f"{text} {doubt}"
 
 
