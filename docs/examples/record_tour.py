@@ -23,8 +23,8 @@ STEPS = (
     ),
     ("What is missing in it?", "rigsight diagnose stage --out results"),
     (
-        "The drive indeed holds its output between samples, and the campaign did not say so. Correct it and repeat:",
-        "sed -i 's/^kind = /hold = \"zoh\"\\nkind = /' stage/campaign.toml; rigsight diagnose stage --out results",
+        "The drive indeed holds its output between samples; `init` had to assume something. Correct it and repeat:",
+        'sed -i \'s/^hold = "foh"/hold = "zoh"/\' stage/campaign.toml; rigsight diagnose stage --out results',
     ),
     (
         "How much better is the completed model than one without the effect, record by record?",

@@ -94,11 +94,20 @@ def with_best_model(quality: DataQuality, context: FitContext, model: Scored) ->
     # A delay may explain as much; it is worth its fit only now.
     timing = input_timing(context, effects, base) or timing
     named = " and ".join(effect.name for effect in effects)
-    within = f"With {named} in the model: " if named else ""
     # A hold that makes a named delay superfluous changes the verdict.
     replaces_delay = effects != model.effects
     found = [
-        replace(finding, sentence=f"{within}{finding.sentence}", serious=finding.serious or replaces_delay)
+        replace(
+            finding,
+            sentence=f"With {named} in the model: {_inside_a_sentence(finding.sentence)}"
+            if named
+            else finding.sentence,
+            serious=finding.serious or replaces_delay,
+        )
         for finding in timing.findings()
     ]
     return replace(quality, findings=(*found, *others))
+
+
+def _inside_a_sentence(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
