@@ -21,8 +21,12 @@ COUNTED_EFFECTS: tuple[str, ...] = (
 RELATED: frozenset[frozenset[str]] = frozenset({
     frozenset({"bouc_wen_hysteresis", "iwan_hysteresis"}), frozenset({"bouc_wen_hysteresis", "coulomb_friction"}),
     frozenset({"coulomb_friction", "stribeck_friction"}), frozenset({"cubic_stiffness", "gravity_pendulum"}),
+    frozenset({"coulomb_friction", "load_dependent_friction"}), frozenset({"coulomb_friction", "presliding_friction"}),
+    frozenset({"bouc_wen_hysteresis", "presliding_friction"}), frozenset({"iwan_hysteresis", "presliding_friction"}),
+    frozenset({"cubic_stiffness", "power_law_stiffness"}), frozenset({"input_saturation", "speed_limit"}),
+    frozenset({"input_delay", "time_shift"}),
 })  # fmt: skip
-"""Effects of which no pair is drawn, because one contains the other."""
+"""Effects that are not hidden together, because one contains the other, or their readings are the same."""
 COUNTED_RIGS: tuple[str, ...] = (
     "axis", "cart_pendulum", "drive_train", "element", "quarter_car", "running_gear", "servo", "two_link_arm",
 )  # fmt: skip

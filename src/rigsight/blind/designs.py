@@ -14,9 +14,10 @@ from rigsight.blind.laboratory.subjects import laboratory_cells
 from rigsight.blind.laboratory.trial import draw_laboratory_trial
 from rigsight.errors import check_option
 
-Design = Literal["small", "standard", "joints", "rigs", "laboratory", "handwritten"]
-"""Three on the running gear or an axis (`joints`: effects of servo and robot joints), one at all places of every counted rig,
-one with records as laboratories take them, one with plants whose equations are written by hand."""
+Design = Literal["small", "standard", "joints", "several", "rigs", "laboratory", "handwritten"]
+"""Four on the running gear or an axis (`joints`: effects of servo and robot joints; `several`: two and three effects at once),
+one at all places of every counted rig, one with records as laboratories take them, one with plants whose equations are written
+by hand."""
 
 
 def n_trials(design: Design) -> int:

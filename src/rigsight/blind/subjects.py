@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,10 +13,10 @@ from rigsight.blind.outside import OUTSIDE
 from rigsight.effects import CATALOGUE, Effect, Place, effect_named
 from rigsight.errors import check_option
 
-Kind = Literal["single", "pair", "none", "parameters", "outside"]
+Kind = Literal["single", "pair", "triple", "none", "parameters", "outside"]
 Tier = Literal["faint", "clear", "strong"]
 Noise = Literal["low", "high"]
-CatalogueDesign = Literal["small", "standard", "joints"]
+CatalogueDesign = Literal["small", "standard", "joints", "several"]
 """Lists of cells on the running gear or an axis; together they contain every counted effect that is distinguishable there."""
 
 OF_JOINTS = frozenset({
@@ -38,8 +39,10 @@ _COUNTS: dict[CatalogueDesign, dict[str, int]] = {
     "small": {"pair": 24, "none": 8, "parameters": 8, "outside": 3},
     "standard": {"pair": 40, "none": 16, "parameters": 16, "outside": 4},
     "joints": {"pair": 0, "none": 4, "parameters": 4, "outside": 1},
+    "several": {"pair": 24, "triple": 24},
 }
 """Trials of each kind besides three strengths at two noise levels of each single effect; outside: of each effect."""
+_N_EFFECTS: dict[Kind, int] = {"pair": 2, "triple": 3}
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Subject:
     Attributes
     ----------
     kind
-        A single effect of the catalogue, two of them, none, wrong parameters, or an effect from outside.
+        A single effect of the catalogue, two or three of them, none, wrong parameters, or an effect from outside.
     effects
         Names; empty where there is none.
     tier
@@ -76,9 +79,9 @@ def subject_of(design: CatalogueDesign, seed: int, trial: int) -> Subject:
     cycle, place = divmod(trial, len(cells))
     rng = np.random.default_rng([seed, cycle])
     cell = cells[int(rng.permutation(len(cells))[place])]
-    if cell.kind == "pair":
+    if cell.kind in _N_EFFECTS:
         own = np.random.default_rng([seed, cycle, place])
-        return Subject("pair", _pair(own), cell.tier, cell.noise)
+        return replace(cell, effects=_several(own, _N_EFFECTS[cell.kind], design))
     return cell
 
 
@@ -102,31 +105,40 @@ def _cells(design: CatalogueDesign) -> list[Subject]:
         for tier in tiers
         for noise in NOISES
     ]
-    # A pair consists of two clear effects: a faint effect next to another is no easier to find than a faint one alone.
-    cells += [Subject("pair", (), tiers[1 + i % 2], NOISES[i // 2 % 2]) for i in range(counts["pair"])]
-    cells += [Subject("none", (), None, NOISES[i % 2]) for i in range(counts["none"])]
-    cells += [Subject("parameters", (), None, NOISES[i % 2]) for i in range(counts["parameters"])]
+    # Several effects are clear ones: a faint effect next to another is no easier to find than a faint one alone.
+    cells += [
+        Subject(kind, (), tiers[1 + i % 2], NOISES[i // 2 % 2])
+        for kind in _N_EFFECTS
+        for i in range(counts.get(kind, 0))
+    ]
+    cells += [Subject("none", (), None, NOISES[i % 2]) for i in range(counts.get("none", 0))]
+    cells += [Subject("parameters", (), None, NOISES[i % 2]) for i in range(counts.get("parameters", 0))]
     cells += [
         Subject("outside", (effect.name,), tiers[i % 3], NOISES[(i + number) % 2])
         for number, effect in enumerate(OUTSIDE)
-        for i in range(counts["outside"])
+        for i in range(counts.get("outside", 0))
     ]
     return cells
 
 
-def _singles(design: str) -> tuple[Effect, ...]:
+def _singles(design: CatalogueDesign) -> tuple[Effect, ...]:
+    if design == "several":
+        return ()
     later = design == "joints"
-    return tuple(e for e in counted_effects() if e.name not in ELSEWHERE and (e.name in OF_JOINTS) == later)
+    return tuple(e for e in _offered() if (e.name in OF_JOINTS) == later)
 
 
-def _pair(rng: np.random.Generator) -> tuple[str, ...]:
-    """Draw two effects of which neither contains the other."""
-    effects = _singles("standard")
+def _offered() -> tuple[Effect, ...]:
+    return tuple(effect for effect in counted_effects() if effect.name not in ELSEWHERE)
+
+
+def _several(rng: np.random.Generator, count: int, design: CatalogueDesign) -> tuple[str, ...]:
+    """Draw effects of which none contains another."""
+    effects = _offered() if design == "several" else _singles("standard")
     while True:
-        first, second = rng.choice(len(effects), 2, replace=False)
-        pair = effects[int(first)], effects[int(second)]
-        if _tells_apart(*pair):
-            return tuple(sorted(effect.name for effect in pair))
+        drawn = [effects[int(i)] for i in rng.choice(len(effects), count, replace=False)]
+        if all(_tells_apart(*pair) for pair in itertools.combinations(drawn, 2)):
+            return tuple(sorted(effect.name for effect in drawn))
 
 
 def _tells_apart(first: Effect, second: Effect) -> bool:

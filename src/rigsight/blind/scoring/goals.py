@@ -13,6 +13,8 @@ from rigsight.blind.scoring.shares import mean, mean_interval, median, median_in
 from rigsight.blind.subjects import TIERS
 
 _LARGE_GAP = TIERS["clear"][0]
+_GAP_OF_SEVERAL = 2.0 * _LARGE_GAP
+"""Each of several effects shows only a part of the gap."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,12 @@ GOALS: dict[str, Goal] = {
     "singles_place_right": Goal(0.99),
     "controls_right": Goal(0.98),
     "outside_unknown_large_gap": Goal(0.90),
-    "pairs_right": Goal(0.85),
+    "pairs_right": Goal(0.90),
+    "triples_right": Goal(0.80),
     "log_score": Goal(0.25, at_most=True),
     "held_out_median": Goal(1.1, at_most=True),
 }
-"""For gaps of at least five times the noise floor; controls have none."""
+"""For gaps of at least five times the noise floor, ten for several effects; controls have none."""
 LABORATORY_GOALS: dict[str, Goal] = {
     "laboratory_right": Goal(0.90),
     "laboratory_wrong_name": Goal(0.02, at_most=True),
@@ -56,14 +59,17 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     taken, outcomes = [o for o in outcomes if o.condition], [o for o in outcomes if not o.condition]
     large = [o for o in outcomes if o.gap is None or o.gap >= _LARGE_GAP]
     singles = [o for o in large if o.kind == "single"]
-    pairs = [o for o in large if o.kind == "pair"]
+    several = [o for o in outcomes if o.gap is None or o.gap >= _GAP_OF_SEVERAL]
+    pairs = [o for o in several if o.kind == "pair"]
+    triples = [o for o in several if o.kind == "triple"]
     faint = [o for o in outcomes if o.kind == "single" and o.tier == "faint"]
     outside = [o for o in outcomes if o.kind == "outside"]
     controls = [o for o in outcomes if o.kind in ("none", "parameters")]
-    known = [*singles, *pairs, *controls]
+    effects = [*singles, *pairs, *triples]
+    known = [*effects, *controls]
     log_scores = [log_score(o.probability) for o in known]
     # A model that cannot be simulated on a withheld record has an infinite error.
-    errors = [math.inf if o.held_out is None else o.held_out for o in (*singles, *pairs) if o.withheld]
+    errors = [math.inf if o.held_out is None else o.held_out for o in effects if o.withheld]
     return {
         "singles_right": share_of(singles, lambda o: o.right),
         "singles_right_within_set": share_of(singles, lambda o: o.right_within_set),
@@ -71,11 +77,11 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
             [o for o in singles if o.place_right is not None], lambda o: bool(o.place_right)
         ),
         "singles_effect_right": share_of(singles, lambda o: o.effect_right),
-        "looked_at": share_of(
-            [o for o in (*singles, *pairs) if o.looked_at is not None], lambda o: bool(o.looked_at)
-        ),
+        "looked_at": share_of([o for o in effects if o.looked_at is not None], lambda o: bool(o.looked_at)),
         "pairs_right": share_of(pairs, lambda o: o.right),
         "pairs_right_within_set": share_of(pairs, lambda o: o.right_within_set),
+        "triples_right": share_of(triples, lambda o: o.right),
+        "triples_right_within_set": share_of(triples, lambda o: o.right_within_set),
         "controls_right": share_of(controls, lambda o: o.right),
         "outside_unknown": share_of(outside, lambda o: o.right),
         "outside_unknown_large_gap": share_of([o for o in large if o.kind == "outside"], lambda o: o.right),
@@ -119,7 +125,7 @@ def targets(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     if found["laboratory_right"]["total"]:
         others = any(
             found[name]["total"]
-            for name in ("singles_right", "pairs_right", "controls_right", "outside_unknown")
+            for name in ("singles_right", "pairs_right", "triples_right", "controls_right", "outside_unknown")
         )
         goals = {**GOALS, **LABORATORY_GOALS} if others else LABORATORY_GOALS
     for name, goal in goals.items():

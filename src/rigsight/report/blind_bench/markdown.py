@@ -32,8 +32,8 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         f"- Time of a diagnosis: {views.number(seconds['median'])} s (median), {views.number(seconds['quantile_95'])} s (95 % "
         f"quantile), {views.number(seconds['total'] / 3600.0)} h in all",
         "## Goals",
-        f"{views.verdict_text(content)} Goals apply to gaps of at least 5 noise floors; intervals are 95 % (Wilson for shares, "
-        f"normal for the mean, order statistics for the median).",
+        f"{views.verdict_text(content)} Goals apply to gaps of at least 5 noise floors, 10 for several effects; "
+        f"intervals are 95 % (Wilson for shares, normal for the mean, order statistics for the median).",
         _table(
             ["Figure", "Goal", "Found", "Trials", "95 % interval", "Reached"],
             [[r.figure, r.goal, r.found, r.trials, r.interval, r.reached] for r in views.goal_rows(content)],
