@@ -108,6 +108,9 @@ def grown(
         if best_pair is None or not VERDICT.exact < best_pair.error_over_noise <= allowed:
             break
         pairs += _more_general(context, best_pair, usable, effects, pairs, prepare)
+    best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
+    if best_pair is not None and best_pair.error_over_noise <= allowed:
+        pairs += _plainer(context, best_pair, usable, effects, pairs, prepare)
     pairs.sort(key=lambda pair: pair.error_over_noise)
     # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
     last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
@@ -238,6 +241,29 @@ def _more_general(
         return followed(context, wide, promising=wide.cost <= pair.fit.cost, finish=False)
 
     return list(context.threads.side_by_side(one, swaps))
+
+
+def _plainer(
+    context: FitContext,
+    pair: Scored,
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    known: Sequence[Scored],
+    prepare: Prepare | None,
+) -> list[Scored]:
+    """Return the pairs in which a simpler form replaces an effect, fitted beside the other effect.
+
+    Alone, a more general form may compensate for the missing effect; beside that effect the simpler one may suffice.
+    """
+    found: list[Scored] = []
+    for single in singles:
+        if single.effects[0] not in pair.effects:
+            continue
+        (replaced,) = (effect for effect in pair.effects if effect != single.effects[0])
+        simpler = [effect for effect in effects if effect.name in replaced.parents]
+        if simpler:
+            found += with_one_more(context, single, simpler, [*known, *found], singles, prepare)
+    return found
 
 
 def _alike(one: Scored, other: Scored) -> bool:
