@@ -2,9 +2,10 @@
 
     python experiments/coverage/run.py --seed 1 --draws 6
 
-Every effect of the catalogue is drawn on a rig of one mass (`axis`; `running_gear` where the effect needs one), and some on a
-drive train. The true model is fitted from perturbed numbers and from the true ones, and the better fit counts. Each draw is
-a line of ``draws_SEED.jsonl``; draws that stand there are not done again. ``--table`` prints the table alone.
+Every effect of the catalogue is drawn on a rig of one mass (`axis`; `running_gear` where the effect needs one, `element` where
+the motion is prescribed), and some on a drive train. The true model is fitted from perturbed parameters and from the true ones,
+and the better fit counts. Each draw is a line of ``draws_SEED.jsonl``; draws that stand there are not done again. ``--table``
+prints the table alone.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ SAME = 1e-3
 def subjects() -> list[tuple[Rig, Effect]]:
     """Return each rig with each effect."""
     found, kinds = [], set()
-    for name in ("axis", "running_gear"):
+    for name in ("axis", "running_gear", "element"):
         for effect in candidates_on(RIGS[name], CATALOGUE):
             if effect.name not in kinds:
                 kinds.add(effect.name)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from rigsight.simulate.prescribed_motion import _penalty, smooth_motion, smoothed_noise
+from rigsight.simulate.input_hold import hold_accelerated_motion
+from rigsight.simulate.prescribed_motion import _penalty, accelerated_motion, smooth_motion, smoothed_noise
 
 DT = 0.01
 
@@ -68,3 +69,30 @@ def test_noise_moves_a_spline_as_another_spline_of_that_smoothness_says() -> Non
     expected = spline(index), spline.derivative()(index) / dt
     for told, change in zip(smoothed_noise(motion, noise, dt), expected, strict=True):
         assert np.std((told - change)[inside]) < 0.05 * np.std(change[inside])
+
+
+@pytest.mark.parametrize("samples_per_cycle", [12, 17, 30])
+def test_an_acceleration_is_as_exact_as_the_velocity(samples_per_cycle: int) -> None:
+    omega = 2.0 * np.pi / (samples_per_cycle * DT)
+    t = DT * np.arange(600)
+    inside = slice(60, -60)
+    value, rate, acceleration = accelerated_motion(np.sin(omega * t), DT)
+    velocity_error = np.std(rate[inside] / omega - np.cos(omega * t)[inside])
+    error = np.std(acceleration[inside] / omega**2 + np.sin(omega * t)[inside])
+    assert error < 2.5 * velocity_error
+    held = hold_accelerated_motion(value, rate, acceleration, DT)
+    np.testing.assert_array_equal(held.at_samples(t.size)[2, :-1], acceleration[:-1])
+
+
+def test_a_motion_in_two_pieces_is_continuous_and_meets_its_samples() -> None:
+    rng = np.random.default_rng(2)
+    value, rate, acceleration = rng.standard_normal((3, 20))
+    held = hold_accelerated_motion(value, rate, acceleration, DT)
+    c0, c1, c2, c3 = held.coefficients[1:].T
+    h = held.interval
+    ends = c0 + h * (c1 + h * (c2 + h * c3)), c1 + h * (2.0 * c2 + 3.0 * h * c3), 2.0 * c2 + 6.0 * h * c3
+    np.testing.assert_allclose(ends[0][:-1], c0[1:], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(ends[1][:-1], c1[1:], rtol=1e-9, atol=1e-9)
+    for samples, starts, end in zip((value, rate, acceleration), (c0, c1, 2.0 * c2), ends, strict=True):
+        np.testing.assert_allclose(starts[::2], samples[:-1], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(end[1::2], samples[1:], rtol=1e-7, atol=1e-7)

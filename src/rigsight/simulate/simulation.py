@@ -12,8 +12,14 @@ from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.records.record import Record
 from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.composition import without_vanished_effects
-from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, together
-from rigsight.simulate.prescribed_motion import smooth_motion
+from rigsight.simulate.input_hold import (
+    HeldInput,
+    hold_accelerated_motion,
+    hold_input,
+    hold_motion,
+    together,
+)
+from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
 from rigsight.simulate.read_ahead import read_ahead
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
@@ -44,13 +50,16 @@ def record_input(structure: Structure, record: Record) -> HeldInput:
         # What only decays reads nothing, but pieces of time it needs all the same.
         return hold_input(np.zeros(record.n_samples), record.dt, "zoh")
     prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
+
+    def held(index: int, name: str) -> HeldInput:
+        if name not in prescribing:
+            return hold_input(record[name], record.dt, record.hold)
+        if index in structure.accelerating_inputs:
+            return hold_accelerated_motion(*accelerated_motion(record[name], record.dt), record.dt)
+        return hold_motion(*smooth_motion(record[name], record.dt), record.dt)
+
     return together(
-        [
-            hold_motion(*smooth_motion(record[name], record.dt), record.dt)
-            if name in prescribing
-            else hold_input(record[name], record.dt, record.hold)
-            for name in mechanism.inputs
-        ]
+        [held(index, name) for index, name in enumerate(mechanism.inputs)]
         + [_observed(record, sensor) for sensor in structure.observed]
     )
 

@@ -262,6 +262,17 @@ class Structure:
         ]
         return (*shown, *slopes)
 
+    @cached_property
+    def accelerating_inputs(self) -> frozenset[int]:
+        """Indices of the inputs whose second derivative stands in the equations, as of a prescribed motion of a mass."""
+        expressions = [
+            *(equation.rate for equation in self.remembering_equations),
+            *self.remembering_steps.values(),
+            *self.computed_outputs,
+        ]
+        read = {symbol for expression in expressions for symbol in expression.free_symbols}
+        return frozenset(index for index in range(self.n_inputs) if input_symbols(index)[2] in read)
+
     @property
     def states(self) -> tuple[sp.Symbol, ...]:
         """State symbols in order."""

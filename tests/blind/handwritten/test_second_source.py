@@ -163,9 +163,8 @@ def test_two_sources_of_each_effect_move_alike(name: str, effect: Effect) -> Non
     if name != PRESCRIBED:
         assert apart(shown, composed) < 1e-6
         return
-    # The composed element smooths the samples of its motion: rates are exact to 1e-6, accelerations to 1e-4.
-    tolerance = 1e-3 if effect.name == "inertia" else 2e-5
-    assert apart(shown, composed, slice(EDGE, -EDGE)) < tolerance
+    # The composed element smooths the samples of its motion: rates and accelerations are exact to 1e-6.
+    assert apart(shown, composed, slice(EDGE, -EDGE)) < 2e-5
 
 
 @pytest.mark.parametrize(("hold", "tolerance"), [("zoh", 1e-6), ("foh", 1e-6), ("band_limited", 1e-3)])
