@@ -55,7 +55,7 @@ def discover(
     progress: Callable[[str], None] | None = None,
     n_jobs: int = 1,
 ) -> Discovery:
-    """Discover the governing equations behind records.
+    """Discover the governing equations of a rig from records.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Projected:
-    """A regression with some columns projected out of everything.
+    """A regression with some columns projected out of the target and of all other columns.
 
     Attributes
     ----------

@@ -344,7 +344,7 @@ def _at_lines(s: _Spectra, flags: NDArray[np.bool_], omega: NDArray[np.float64])
 def _without(
     powers: NDArray[np.float64], parts: Sequence[NDArray[np.complex128]]
 ) -> list[NDArray[np.complex128]]:
-    """Project polynomials over each band, which can represent the transient, out of the equations of a record."""
+    """Remove the transient from the equations of a record, by projecting out polynomials over each band."""
     basis = np.linalg.qr(powers)[0]
     return [part - basis @ (np.swapaxes(basis, 1, 2) @ part) for part in parts]
 

@@ -47,7 +47,7 @@ def compose(
 
     Notes
     -----
-    A parameter name that occurs twice is qualified by its effect (``stribeck_friction.T_c`` beside Coulomb friction).
+    A parameter name that occurs twice is qualified by its effect (``stribeck_friction.T_c`` together with Coulomb friction).
     """
     chosen = tuple(sorted(effects, key=lambda e: (e.place.value, len(e.states), e.name)))
     return _compose(

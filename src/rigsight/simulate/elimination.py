@@ -19,7 +19,7 @@ from rigsight.effects.symbols import positive_part
 from rigsight.simulate.straight_line import StraightLine, straight_line
 
 _SHORT = 40
-"""Number of numbers, symbols and operations of a force up to which common parts with other forces are not searched."""
+"""Length of a force (its numbers, symbols and operations) up to which parts in common with other forces are not searched."""
 _KINKS = (sp.Abs, sp.sign, positive_part)
 
 

@@ -112,8 +112,8 @@ def _spline(samples: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
 def _penalty(samples: NDArray[np.float64]) -> float:
     """Return the weight of the squared curvature that generalized cross validation chooses.
 
-    On equally spaced samples a cosine transform makes the smoothing spline diagonal (but for its ends), so that each trial costs
-    one sum; scipy's own choice takes seconds per record. The eigenvalues are those of the cubic spline.
+    For equally spaced samples a cosine transform makes the smoothing spline diagonal (except at its ends), so that each trial
+    costs one sum; scipy's own choice takes seconds per record. The eigenvalues are those of the cubic spline.
     """
     stiffness = _stiffness(samples.size)
     power = dct(samples - _end_slopes(samples), norm="ortho") ** 2

@@ -20,8 +20,7 @@ from rigsight.records.record import Record
 Floats = NDArray[np.float64]
 
 _DECADES = (4.0, 1.0, -2.0, -5.0, -10.0)
-"""Intensities of the unknown force that remains beside a law, in the same units as for the whole force; the last is practically
-zero."""
+"""Intensities of the unknown force that a law leaves, in the same units as for the whole force; the last is practically zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class SensorRegression:
     columns
         One for each term, shape (n_rows, n_terms).
     fitted
-        Names of the parameters behind the columns of `projected`.
+        Names of the parameters of the columns of `projected`.
     logarithms
         Sum of the logarithms of the variances that the rows were divided by.
     decade

@@ -27,7 +27,7 @@ def carries_tangents(equations: KernelEquations) -> bool:
     same, but differences would need a long step, because reversals are located to a tolerance. Differences are used in these
     cases: for states with a limited range, because an exact derivative is valid only in a small neighborhood; for several joints
     that stick and slip, because the release of one changes the instant at which the next is released; for a force that jumps at a
-    position, such as that of a damper behind a play, because integrated derivatives do not contain that a changed motion reaches
+    position, such as that of a damper behind a play, because integrated derivatives do not account for a changed motion reaching
     the position sooner; for delayed sensors, whose readings are computed after the simulation.
     """
     structure = equations.structure
