@@ -22,7 +22,7 @@ from rigsight.simulate.model import Model
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the stages of a discovery hand on."""
+    """Results of the stages of a discovery, from which its result is assembled."""
 
     estimation: tuple[Record, ...]
     held_out: tuple[Record, ...]
@@ -43,7 +43,7 @@ def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, 
     output = rig.outputs[0].name
     structure = final.structure
     constants = {p.name for p in rig.constants}
-    # A number that is held is written only where it makes the equation shorter.
+    # The value of a held parameter is written only if it makes the equation shorter.
     held = {n: v for n, v in final.values.items() if n not in final.free and n not in constants}
     numbers = {name: value for name, value in held.items() if value in (0.0, 1.0)}
     text, latex = equations(structure, numbers)

@@ -23,12 +23,12 @@ _FIRST_EVALUATIONS = 12
 HOPELESS = 10.0
 """Factor over the best RMS so far at which a support is given up after the first evaluations."""
 _FAR = 2.0
-"""Factor over the best held-out error from which finding better initial states changes no choice."""
+"""Factor over the best held-out error from which better initial states would not change the selection."""
 _TOLERANCE = 1e-5
-"""Relative change of the cost at which a fit of the search stops, and a score: with ten thousand independent samples that is a
-hundredth of the difference of criteria that decides."""
+"""Relative change of the cost at which a fit of the search stops, and a score: with ten thousand independent samples this is a
+hundredth of the decisive difference of the criterion."""
 _FULL = 1e-7
-"""The same for what is shown."""
+"""The same for reported results."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +44,8 @@ class Trial:
     error_over_noise
         RMS of the first output's held-out free-run error in units of the noise floor.
     residuals
-        Held-out errors of the first output in units of the noise floor, all records one after the other; empty where a rough
-        score says enough.
+        Held-out errors of the first output in units of the noise floor, all records one after the other; empty if a rough
+        score was sufficient.
     """
 
     support: Support
@@ -61,21 +61,21 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A support and where its fit starts.
+    """A support and the start of its fit.
 
     Attributes
     ----------
     support
         Names of the effects.
     release
-        Parameters that are not to be held at their special values.
+        Parameters that are not held at their special values.
     start
-        Values to start from; None for those of the regression.
+        Start values; None for those of the regression.
     left_out
-        Rig parameters that stay where `start` has them.
+        Rig parameters that are held at their start values.
     to_beat
-        Where the same terms have been scored already: cost of that fit, infinite where its equation has other parameters. A
-        fit whose cost is no lower, or that is far behind, is not scored. None where they have not been scored.
+        Cost of the fit of the same terms, if they have been scored already; infinite if that equation has other parameters. A
+        new fit whose cost is not lower, or much higher than the best, is not scored. None if they have not been scored.
     """
 
     support: Support
@@ -86,13 +86,13 @@ class Attempt:
 
     @property
     def key(self) -> tuple[Support, Support, Support]:
-        """What a trial is kept by."""
+        """Key under which the trial is stored."""
         return self.support, self.release, self.left_out
 
 
 @dataclass(frozen=True, eq=False)
 class _Screening:
-    """The first evaluations of a fit, by which attempts that are far behind are dropped."""
+    """The result of the first evaluations of a fit; attempts with a much higher cost than the best are dropped here."""
 
     attempt: Attempt
     problem: GreyBoxFit
@@ -101,7 +101,7 @@ class _Screening:
 
 @dataclass(frozen=True, eq=False)
 class _RoughTrial:
-    """A fit with the first evaluations of its score; None where there is nothing to score."""
+    """A fit with the first evaluations of its score; None if the fit is not scored."""
 
     support: Support
     fit: FitResult
@@ -110,7 +110,7 @@ class _RoughTrial:
 
     @property
     def error_over_noise(self) -> float:
-        """The held-out error is no larger than this."""
+        """Upper limit of the held-out error."""
         return float("inf") if self.score is None else float(np.sqrt(self.score.cost / self.score.n_samples))
 
     def as_it_is(self) -> Trial:
@@ -119,12 +119,12 @@ class _RoughTrial:
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What every support is polished and scored with.
+    """Data and settings with which every support is polished and scored.
 
     Attributes
     ----------
     rig
-        The rig as far as its first output goes.
+        The rig, reduced to its first output.
     estimation, held_out
         Records to fit and records to score, of the first output alone.
     values
@@ -132,7 +132,7 @@ class Bench:
     scales, noise
         Size of each base quantity, noise floor of each output.
     held
-        Parameters of the rig that no fit moves.
+        Parameters of the rig that are not fitted.
     candidates
         The library, by name.
     projected
@@ -140,9 +140,9 @@ class Bench:
     own_terms
         Columns of the rig's own terms that compete (full form), by parameter.
     threads
-        Who fits supports side by side, and helps with the records of a fit.
+        Threads that fit supports, and the records of a fit, in parallel.
     trials
-        What has been polished.
+        The supports polished so far.
     """
 
     rig: Rig
@@ -160,12 +160,12 @@ class Bench:
 
     @property
     def starts(self) -> SupportStarts:
-        """Where the fit of a support may start."""
+        """Start values of the fit of a support."""
         return SupportStarts(self.rig, self.values, self.candidates, self.projected)
 
     @property
     def sparse(self) -> Projected:
-        """The regression with nothing projected out that competes."""
+        """The regression without the competing terms among the columns that are projected out."""
         if not self.own_terms:
             return self.projected
         kept = [
@@ -182,7 +182,7 @@ class Bench:
         return self.own_terms[name] if name in self.own_terms else self.candidates[name].column
 
     def structure(self, support: Support, release: frozenset[str] = frozenset()) -> Structure:
-        """Return the equations of a support; special values of its effects are written in unless released."""
+        """Return the equations of a support; special values of its effects are inserted unless released."""
         effects = [self.candidates[name].effect for name in sorted(support)]
         names = unique_names(self.rig, tuple(effects))
         fixed = {
@@ -194,7 +194,7 @@ class Bench:
         return compose(self.rig, effects, fixed)
 
     def free_parameters(self, structure: Structure, held: frozenset[str] = frozenset()) -> list[str]:
-        """Return what a fit of a structure moves."""
+        """Return the parameters that a fit of a structure varies."""
         fixed = dict(structure.fixed)
         names = {p.name for p in self.rig.parameters} - self.held - held
         for effect in structure.effects:
@@ -205,16 +205,16 @@ class Bench:
         return [name for name in structure.names if name in names]
 
     def trial(self, attempt: Attempt) -> Trial:
-        """Polish a support and score it; what has been done is not done again."""
+        """Polish a support and score it; an attempt that was made before is not repeated."""
         return self.trials_of([attempt])[0]
 
     def trials_of(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
-        """Polish supports side by side and score them; what has been done is not done again.
+        """Polish supports in parallel and score them; an attempt that was made before is not repeated.
 
         Parameters
         ----------
         attempts
-            Where each fit starts.
+            Supports with the start of each fit.
         progress
             Called with every support that is polished.
         """
@@ -224,9 +224,10 @@ class Bench:
         return [self.trials[attempt.key] for attempt in attempts]
 
     def shortened(self, supports: Sequence[Support], longer: Trial) -> list[Trial]:
-        """Polish supports once more from the values that a longer one ended at, and keep the better of both.
+        """Polish supports once more, starting from the fitted values of a longer one, and keep the better of both fits.
 
-        What the longer one moved off its special value is moved here too; a term that it lacks stays at its own.
+        Parameters that the longer one released from their special values are released here, too; those of terms that it lacks
+        keep them.
         """
         moved = {name for e in longer.fit.structure.effects for name in e.special_cases}
         moved -= longer.fit.structure.special_cases
@@ -252,10 +253,10 @@ class Bench:
         return self._finely_scored(self._roughly_scored(support, fit), _FULL)
 
     def _polished(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
-        """Fit and score; what is far behind is left as it is.
+        """Fit and score; attempts far behind the best are not refined further.
 
-        It is far behind what was done before or what all of these came to at the same stage, so that the order in which threads
-        do them changes nothing.
+        They are compared with all earlier trials, and with all of these attempts at the same stage, so that the result does not
+        depend on the order in which the threads finish.
         """
         screenings = self._screened(attempts)
         costs = [trial.fit.cost for trial in self.trials.values()] + [
@@ -294,7 +295,7 @@ class Bench:
         return list(self.threads.side_by_side(finished, rough))
 
     def _screened(self, attempts: Sequence[Attempt]) -> list[_Screening]:
-        """Return for each attempt the better one of the fits from its starts."""
+        """Return the best fit of each attempt over its start values."""
         structures = [self.structure(attempt.support, attempt.release) for attempt in attempts]
         problems = [
             GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
@@ -304,7 +305,7 @@ class Bench:
             [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
             for attempt, structure in zip(attempts, structures, strict=True)
         ]
-        # Second starts come last: next to the first one they would only wait for the same kernel to be compiled.
+        # Second starts come last: run together with the first one, they would only wait for the same kernel to be compiled.
         begun = [
             (number, own[rank])
             for rank in range(max(map(len, starts), default=0))
@@ -326,9 +327,10 @@ class Bench:
         return [_Screening(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
 
     def _own_starts(self, attempt: Attempt, structure: Structure) -> list[dict[str, float]]:
-        """Return the regression's values, and beside them those of the lowest cost that a contained support came to.
+        """Return the start values from the regression, and those from the best fit of a support contained in this one.
 
-        Columns of a smoothed motion can be far off: a support that starts from them may end above one with fewer terms.
+        Columns of a smoothed motion can be inaccurate: a fit that starts from them may end with a higher cost than one with
+        fewer terms.
         """
         starts = [self.starts.regressed(structure, attempt.support)]
         contained = [

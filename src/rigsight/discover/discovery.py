@@ -55,7 +55,7 @@ def discover(
     progress: Callable[[str], None] | None = None,
     n_jobs: int = 1,
 ) -> Discovery:
-    """Discover the governing equations behind records.
+    """Discover the governing equations of a rig from records.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def discover(
     Raises
     ------
     InputError
-        If there is no estimation record, one is too short, or none moves the rig, or the form is not one for this rig.
+        If there is no estimation record, one is too short, none moves the rig, or the form is not available for this rig.
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
@@ -148,11 +148,11 @@ def _linear_values(data: RegressionData, estimation: Sequence[Record]) -> dict[s
 
 
 def _held(data: RegressionData) -> frozenset[str]:
-    """Return what no fit moves while terms are chosen: what the motion knows nothing of, and one of two rests."""
+    """Return parameters held during selection: those without effect on the motion, and constant force or rest position."""
     motion = data.rig.motion
     held = {*data.rig.downstream_parameters, *data.held}
     if data.rig.is_driven:
-        # A linear spring cannot tell a constant force from a shifted rest position.
+        # With a linear spring, a constant force and a shifted rest position cannot be distinguished.
         rest, bias = motion.rest.free_symbols, motion.bias.free_symbols
         held |= {symbol.name for symbol in (bias if data.has_stiffness else rest)}
     if not data.has_stiffness:
@@ -167,7 +167,7 @@ def _offsets_found(
     scales: Mapping[str, float],
     held: frozenset[str],
 ) -> tuple[frozenset[str], Sequence[Record]]:
-    """Return parameters that offsets of the records' own make up for, and the records without the offsets of a first fit."""
+    """Return the parameters that the records' offsets can replace, and the records without the offsets of a first fit."""
     if not any(record.free_offsets for record in records):
         return frozenset(), records
     structure = compose(data.rig.motion_alone())
@@ -180,7 +180,7 @@ def _offsets_found(
 
 
 def _without_downstream(rig: Rig, record: Record) -> Record:
-    """Return a record without the outputs that the motion knows nothing of."""
+    """Return a record without the outputs that do not affect the motion."""
     keep = {rig.inputs[0].name, rig.outputs[0].name}
     return replace(record, signals={name: s for name, s in record.signals.items() if name in keep})
 
@@ -203,7 +203,7 @@ def _library(
 def _distinct(
     library: Sequence[Candidate], projected: Projected
 ) -> tuple[list[Candidate], dict[str, list[str]]]:
-    """Leave out terms that these records cannot tell from an earlier one; return the rest, and who stands for whom."""
+    """Leave out terms that these records do not distinguish from an earlier one; return the rest, and the terms each replaces."""
     if not library:
         return [], {}
     columns = np.column_stack([candidate.column for candidate in library])
@@ -220,7 +220,7 @@ def _distinct(
 
 
 def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], None]) -> Trial:
-    """Let the rig's own damper go in the full form, where the held-out records do not miss it."""
+    """In the full form, leave out the rig's own damper if the held-out error does not rise significantly without it."""
     chosen = selection.best
     damping = bench.rig.motion.damping.name
     if damping not in bench.own_terms:
@@ -240,10 +240,10 @@ def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], Non
 
 
 def _polished(data: RegressionData, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
-    """Fit the chosen structure once more, all outputs and all records that may be fitted, to full precision.
+    """Fit the chosen structure once more to full precision, with all outputs and all estimation records.
 
-    A special value (an exponent of 1) is released as well: where the fit leaves it clearly, the intervals of everything else
-    would be wrong with it. Returns the fit and, where the special value was kept, a note on how well it is known.
+    Special values (an exponent of 1) are released as well: if the fitted value clearly differs, the intervals of all other
+    coefficients would be wrong with it. Returns the fit and, if the special value was kept, a note on its uncertainty.
     """
     records = tuple(record for record in data.records if record.role == "estimation")
     rig = data.rig

@@ -21,16 +21,16 @@ _ZERO = 3.0
 _VAGUE = 0.05
 _FLOOR = 1.5
 _NOISY = 0.1
-"""Noise floor, relative to the motion, from which terms may well hide in it."""
+"""Noise floor, relative to the motion, from which it may mask terms."""
 _MOST_NAMED = 3
 _SAME_RATE = 1e-6
-"""Relative difference of sample times that come from columns of time."""
+"""Relative difference up to which sample times, computed from time columns, count as equal."""
 _NEAR = 1.5
 """Factor of the held-out error within which another equation is nearly as good."""
 
 
 def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, same: Sequence[str]) -> str:
-    """Return why a kept term is in doubt, empty where it is not.
+    """Return the reasons to doubt a kept term; empty if there are none.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, sam
     inclusion
         Its inclusion probability.
     same
-        Terms that the records cannot tell from it.
+        Terms that the records do not distinguish from it.
     """
     found = []
     for name, coefficient in own.items():
@@ -73,7 +73,7 @@ def warnings_of(
     floor: float,
     likeliest: str,
 ) -> tuple[str, ...]:
-    """Return what a user should know, one sentence each."""
+    """Return the warnings for the user, one sentence each."""
     found = [note for note in (how, held) if note]
     source = data.rig.inputs[0].name
     sizes = [float(np.std(record[source])) for record in estimation]
@@ -131,7 +131,7 @@ def warnings_of(
 
 
 def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Record]) -> list[str]:
-    """Return which held-out records drive the rig just as a fitted one does."""
+    """Return a warning about held-out records that have the same input as a fitted one."""
     twins = {
         record.name: fitted.name
         for record in held_out
@@ -149,7 +149,7 @@ def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Re
 
 
 def _one_amplitude(selection: Selection, chosen: Trial) -> str:
-    """Return what records of a single amplitude distinguish, and what they do not."""
+    """Return a warning that the records have a single amplitude, and the equations that they do not distinguish."""
     others = sorted(
         (
             t

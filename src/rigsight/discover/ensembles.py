@@ -22,7 +22,7 @@ from rigsight.identify import FitResult
 
 _ENSEMBLE_TERMS = 6
 _SAME_REST = 1e-5
-"""Shift of the rest position, in units of the motion, that changes no column."""
+"""Shift of the rest position, in units of the motion, below which the columns do not change."""
 
 
 def inclusion(
@@ -34,16 +34,17 @@ def inclusion(
     rows: Rows,
     rng: np.random.Generator,
 ) -> dict[str, float]:
-    """Return the inclusion probability of the terms that came near the equation, and of the rig's own in the full form.
+    """Return the inclusion probability of the most likely terms, and of the rig's own in the full form.
 
-    The columns are taken about the rest position of the polished equation: about any other, a cubic spring shows a square.
+    The columns are computed about the rest position of the polished equation: about any other, a cubic spring has a quadratic
+    part.
     """
     polished = [name for trial in selection.trials for name in sorted(trial.support)]
     proposed = [name for support in proposals(bench) for name in sorted(support)]
     shares = {n: bench.projected.explained(c.column[:, None])[1] for n, c in bench.candidates.items()}
     ranked = sorted(shares, key=lambda name: -shares[name])
     kept = set(final.structure.effect_names)
-    # An effect that contains a selected one as a special case explains everything that this does, and would only share its draws.
+    # An effect that contains a selected one as a special case explains the same, and would only split its share of the draws.
     offered_terms = [
         name
         for name in dict.fromkeys((*polished, *proposed, *ranked))
@@ -58,7 +59,7 @@ def inclusion(
     own_columns = own_terms(data.rig, data.has_stiffness, projected) if bench.own_terms else {}
     library = [bench.candidates[name] for name in names]
     if shift:
-        # The loop does not know where rest is.
+        # The columns of loops do not depend on the rest position.
         loops = [candidate for candidate in library if is_loop(candidate.effect)]
         effects = [candidate.effect for candidate in library if not is_loop(candidate.effect)]
         library = loops + candidates(
@@ -81,7 +82,7 @@ def inclusion(
 def regressed_force(
     bench: Bench, final: FitResult, motions: Sequence[Motion], rows: Rows, rng: np.random.Generator
 ) -> ForceEquation | None:
-    """Regress the equation of the hysteretic force that the polished model leaves as a residual of the measured motion."""
+    """Regress the equation of the hysteretic force, the residual of the polished model's other forces along the motion."""
     rig, values = bench.rig, {**dict(final.structure.fixed), **final.values}
     laws = [law for law in map(ForceLaw.of, final.structure.effects) if law is not None]
     if not laws or not rig.is_driven:
@@ -114,13 +115,13 @@ def regressed_force(
 
 
 def _ancestors(bench: Bench, name: str) -> set[str]:
-    """Return the effects that a term has as special or limiting cases, and theirs."""
+    """Return the effects that are special or limiting cases of a term, and recursively their special cases."""
     parents = [parent for parent in bench.candidates[name].effect.parents if parent in bench.candidates]
     return set(parents).union(*(_ancestors(bench, parent) for parent in parents))
 
 
 def _rest_shift(bench: Bench, final: FitResult) -> float:
-    """Return how far the polished rest position lies from the one that the motion was smoothed about."""
+    """Return the distance of the polished rest position from the one about which the motion was smoothed."""
     motion = bench.rig.motion
     if not bench.rig.is_driven:
         return 0.0

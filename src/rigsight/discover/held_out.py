@@ -15,7 +15,7 @@ _HELD_BACK = 0.3
 
 
 def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
-    """Return the records to fit, those to score, and in words how the latter were found.
+    """Return the records to fit, those to score, and a sentence on the choice of the latter (empty for validation records).
 
     Raises
     ------

@@ -23,7 +23,7 @@ from rigsight.rigs import Rig, evaluated
 _TAKEN = 0.5
 _SAME_COLUMN = 0.995
 _WORTH_TELLING = 0.02
-"""Share that a term must explain beside the others to be told."""
+"""Share that a term must explain in addition to the others to be reported."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class ShapeTerm:
     unit
         Of the coefficient.
     inclusion
-        How often sparse regression takes it when stretches of the records are drawn anew.
+        Share of resampled data sets in which sparse regression selects the term.
     """
 
     term: str
@@ -55,9 +55,9 @@ class MissingForce:
     Attributes
     ----------
     terms
-        The terms that sparse regression takes, the surest first; may be empty.
+        The terms that sparse regression selects, the most frequent first; may be empty.
     share
-        Share of the residual of the acceleration (or force, as power) that they explain, including noise.
+        Share of the mean square of the acceleration's (or force's) residual, including noise, that they explain.
     """
 
     terms: tuple[ShapeTerm, ...]
@@ -92,7 +92,7 @@ def missing_force(
     rng: np.random.Generator,
     has_stiffness: bool = True,
 ) -> MissingForce:
-    """Regression of the residual of the rig's own terms.
+    """Return the shape of the missing force, from a regression of the residual of the rig's own terms.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def missing_force(
 
 
 def _worth_telling(projected: Projected, columns: NDArray[np.float64], taken: Sequence[int]) -> list[int]:
-    """Leave out terms, one by one, that the others hardly miss."""
+    """Leave out terms, one by one, that explain hardly more than the others do."""
     kept = list(taken)
     while kept:
         share = projected.explained(columns[:, kept])[1]

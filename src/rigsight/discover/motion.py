@@ -1,7 +1,7 @@
 """Motion of the mass and the missing force: Kalman filter and Rauch-Tung-Striebel smoother with the known input.
 
 The linear equations of the rig are the model; the missing force is an additional state, an integrated random walk. Its intensity
-is estimated by maximum likelihood, so that the records decide how fast the force may change.
+is estimated by maximum likelihood, so that the records determine how fast the force may change.
 
 References
 ----------
@@ -24,7 +24,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _DECADES = (-4.0, -2.0, 0.0, 2.0, 4.0, 6.0)
-"""Intensities tried, in decades about that of a missing force as large as the spring's within one radian."""
+"""Intensities tried, in decades relative to that of a missing force that grows as large as the spring's within one radian."""
 _BETWEEN = (-1.0, 1.0)
 _LONGEST_TRIAL = 3000
 _SETTLING = 20
@@ -37,13 +37,13 @@ class Motion:
     Attributes
     ----------
     record
-        What was measured.
+        The measured record.
     x, v, acceleration
         Displacement, velocity and acceleration, shape (n_samples,) each.
     u
-        Input, shape (n_samples,); the displacement where the motion is prescribed.
+        Input, shape (n_samples,); the displacement if the motion is prescribed.
     measured
-        What was measured of the quantity that is regressed: displacement, or force where the motion is prescribed.
+        The measured quantity that is regressed, shape (n_samples,): displacement, or force if the motion is prescribed.
     """
 
     record: Record
@@ -61,7 +61,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Carrier:
-    """The linear equation that carries the estimate: ``m x'' = g u - k (x - rest) - d x' + missing force``."""
+    """The linear model of the smoother: ``m x'' = g u - k (x - rest) - d x' + missing force``."""
 
     inertia: float
     damping: float
@@ -71,7 +71,7 @@ class Carrier:
 
     @classmethod
     def of(cls, rig: Rig, values: Mapping[str, float]) -> Carrier:
-        """Evaluate a driven rig's equation with numbers."""
+        """Evaluate the coefficients of a driven rig's equation."""
 
         def number(expression: sp.Expr) -> float:
             return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
@@ -94,7 +94,7 @@ def motion_of(rig: Rig, record: Record, values: Mapping[str, float], noise: floa
     rig
         The rig.
     record
-        Holds the input and the first output.
+        Contains the input and the first output.
     values
         Constants and linear parameters by name.
     noise
@@ -131,7 +131,7 @@ class _Smoother:
         parts = expm(doubled * dt)
         noise = parts[4:, 4:].T @ parts[:4, 4:]
         self._noise = (noise + noise.T) / 2.0
-        # In units in which one sample time moves everything by about one: the Riccati equation is badly scaled in SI.
+        # Units in which every state changes by about one within a sample time: in SI the Riccati equation is badly scaled.
         self._units = np.array([1.0, 1.0 / dt, m / dt**2, m / dt**3])
 
     def likeliest(self, x: NDArray[np.float64], u: NDArray[np.float64]) -> float:

@@ -14,19 +14,19 @@ from rigsight.records.plausibility import is_constant
 from rigsight.rigs import Rig
 
 _WINDOW = 0.75
-"""Width of a test function in natural periods: long enough to average the noise, short enough to see the motion bend."""
+"""Width of a test function in natural periods: long enough to average the noise, short enough to resolve the motion."""
 _MOST_POINTS = 20_000
 
 
 def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> Rows:
-    """Return how signals become rows: windows of a rig whose angular frequency is ``1 / time``, or single points."""
+    """Return the form of the rows: windows for a rig whose angular frequency is ``1 / time``, or single points."""
     if pointwise:
         return Rows.pointwise(max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
     return Rows.weak(_WINDOW * 2.0 * np.pi * time, motions[0].dt)
 
 
 def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], rows: Rows) -> Projected:
-    """Return the regression of acceleration (or force, where the motion is prescribed) on the rig's own terms.
+    """Return the regression of acceleration (or force, if the motion is prescribed) on the rig's own terms.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], row
     motions
         Of all records.
     rows
-        How signals become rows.
+        The form of the rows.
     """
     order = 2 if rig.is_driven else 0
     rests = all(is_constant(motion.u) for motion in motions)
@@ -49,7 +49,7 @@ def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], row
             blocks.append(np.column_stack([velocity, displacement, one]))
             targets.append(rows.of(motion.measured))
             continue
-        # A constant drive is part of the constant term; its column stays, so that the others keep their places.
+        # A constant drive is part of the constant term; its column is kept as zeros, so that the others keep their positions.
         drive = np.zeros_like(one) if rests else rows.of(motion.u)
         own = (drive, -velocity, -displacement, one) if has_stiffness else (drive, -velocity, one)
         blocks.append(np.column_stack(own))

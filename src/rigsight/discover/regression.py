@@ -21,26 +21,25 @@ from numpy.typing import NDArray
 
 N_ENSEMBLE = 40
 N_BLOCKS = 40
-"""Contiguous stretches of rows that an ensemble draws from: neighboring rows share their noise."""
+"""Number of contiguous stretches of rows that an ensemble draws from; stretches because neighboring rows share their noise."""
 _CLEARLY = 1.1
-"""Factor by which a larger support must lower the residual: the columns, from a smoothed motion, are not more accurate than
-this."""
+"""Factor by which a larger support must lower the residual: columns from a smoothed motion are not more accurate than this."""
 _TINY = 1e-10
 _RIDGE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Projected:
-    """A regression with some columns projected out of everything.
+    """A regression with some columns projected out of the target and of all other columns.
 
     Attributes
     ----------
     base
-        Columns that are always there, shape (n_rows, n_base).
+        Columns that are always included, shape (n_rows, n_base).
     target
         Shape (n_rows,).
     independent
-        Number of independent rows: windows overlap.
+        Number of independent rows; less than n_rows, because windows overlap.
     """
 
     base: NDArray[np.float64]
@@ -54,15 +53,15 @@ class Projected:
 
     @cached_property
     def rest(self) -> NDArray[np.float64]:
-        """The target without what the base columns explain."""
+        """The target without the part that the base columns explain."""
         return self.rest_of(self.target)
 
     def rest_of(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return columns without what the base columns explain."""
+        """Return columns without the part that the base columns explain."""
         return np.asarray(columns - self._directions @ (self._directions.T @ columns))
 
     def explained(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Return coefficients of further columns and the share of the residual of the base that they explain."""
+        """Return coefficients of further columns and the share that they explain of the residual of the base."""
         left, added = self.rest, self.rest_of(columns)
         size = np.linalg.norm(added, axis=0)
         if np.any(size <= _TINY * np.linalg.norm(columns, axis=0)):
@@ -83,12 +82,12 @@ class Projected:
 def sparse_path(projected: Projected, columns: NDArray[np.float64]) -> list[tuple[int, ...]]:
     """Return supports of every size, smallest first: those that remain when pysindy's SSR drops term after term.
 
-    Beside them stand the supports of FROLS, which grows instead of shrinking; the two differ where columns are alike.
+    The supports of FROLS, which adds terms instead, are included; the two differ if columns are similar.
 
     Parameters
     ----------
     projected
-        What is regressed, and what never competes.
+        The target, and the columns that do not compete.
     columns
         Shape (n_rows, n_terms).
     """
@@ -101,9 +100,10 @@ def sparse_path(projected: Projected, columns: NDArray[np.float64]) -> list[tupl
 def inclusion_probabilities(
     projected: Projected, columns: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Return how often each term is taken when stretches of the rows are drawn anew, shape (n_terms,).
+    """Return the share of draws of random stretches of the rows in which each term is selected, shape (n_terms,).
 
-    In every draw the support is the smallest that leaves hardly more than the one of the lowest Bayesian information criterion.
+    The support of a draw is the smallest whose residual hardly exceeds that of the support with the lowest Bayesian information
+    criterion.
     """
     matrix, target = projected.rest_of(columns), projected.rest
     blocks = np.array_split(np.arange(target.size), min(N_BLOCKS, target.size))
@@ -130,7 +130,7 @@ def information_criterion(mean_square: float, n_terms: int, independent: float) 
 def alike(
     projected: Projected, columns: NDArray[np.float64], threshold: float
 ) -> list[tuple[int, int, float]]:
-    """Return pairs of terms whose columns differ by little once the rig's own terms are taken out, with their correlation."""
+    """Return pairs of terms whose columns are similar after the rig's own terms are projected out, with their correlation."""
     rest = projected.rest_of(columns)
     size = np.linalg.norm(rest, axis=0)
     size[size == 0.0] = 1.0
@@ -146,7 +146,7 @@ def alike(
 def _compressed(
     matrix: NDArray[np.float64], target: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return few rows with the same normal equations and the same sum of squares, columns of unit length."""
+    """Return a few rows with the same normal equations and the same sum of squares, with columns of unit length."""
     size = np.linalg.norm(matrix, axis=0)
     size[size == 0.0] = 1.0
     factor = np.asarray(np.linalg.qr(np.column_stack([matrix / size, target]), mode="r"))

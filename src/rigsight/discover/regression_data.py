@@ -1,4 +1,4 @@
-"""What is regressed: a campaign, the noise of its sensors, and its records in windows where the rig drifts."""
+"""Data of a discovery: a campaign, the noise of its sensors, and its records, cut into windows if the rig drifts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class RegressionData:
-    """What is regressed.
+    """A campaign, the noise floors of its sensors, and the records that are regressed.
 
     Attributes
     ----------
@@ -21,7 +21,7 @@ class RegressionData:
     noise
         Noise floor of each output.
     windows
-        What is regressed of its records, cut where the rig drifts; None for all of them as they are.
+        Sections of its records to be used, for a rig that drifts; None for the whole records.
     """
 
     campaign: Campaign
@@ -35,7 +35,7 @@ class RegressionData:
 
     @property
     def records(self) -> tuple[Record, ...]:
-        """Estimation and validation records, cut into windows where the rig drifts."""
+        """Estimation and validation records, cut into windows if the rig drifts."""
         return self.campaign.records if self.windows is None else self.windows
 
     @property
@@ -45,7 +45,7 @@ class RegressionData:
 
     @property
     def held(self) -> dict[str, float]:
-        """Parameters that keep a value: of those that a free motion tells up to a common factor one."""
+        """Parameters held at a value: one of those that a free motion determines only up to a common factor."""
         factor = self.campaign.open_factor
         return {} if factor is None else {factor.held: factor.value}
 

@@ -17,14 +17,14 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A number of the equation with its standard error and unit."""
+    """A coefficient of the equation with its standard error and unit."""
 
     value: float
     std: float
     unit: str
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data with a 95 % interval; what is not determined has none."""
+        """Return plain data with a 95 % interval; None if the value is not determined."""
         known = math.isfinite(self.std)
         interval = [self.value - 1.96 * self.std, self.value + 1.96 * self.std] if known else None
         return {
@@ -37,24 +37,24 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Term:
-    """A term that stands in the equation or was offered to it.
+    """A term of the equation, or one that was offered but not selected.
 
     Attributes
     ----------
     name
-        Name of the effect that the term is.
+        Name of the effect.
     summary
-        What it does, one sentence.
+        Its description in one sentence.
     kept
-        True if it stands in the equation.
+        True if it is part of the equation.
     inclusion
-        How often sparse regression takes it when stretches of the records are drawn anew.
+        Share of resampled data sets in which sparse regression selects the term.
     coefficients
-        Its parameters; empty where it is not kept.
+        Its parameters; empty if it is not kept.
     doubt
-        Why it is in doubt, empty where it is not.
+        Reasons to doubt the term; empty if there are none.
     where
-        Joint at which it acts; empty on a rig that has one.
+        Joint at which it acts; empty for a rig with one joint.
     """
 
     name: str
@@ -101,7 +101,7 @@ class Alternative:
     bic: float
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; a support that could not be simulated has no numbers."""
+        """Return plain data; the figures of a support that could not be simulated are None."""
         numbers = {"held_out": self.held_out, "aic": self.aic, "bic": self.bic}
         return {
             "terms": list(self.terms),
@@ -125,14 +125,14 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """Everything that a discovery found.
+    """The result of a discovery.
 
     Attributes
     ----------
     title, rig, method
-        What was discovered on, and how (``"full"`` or ``"discrepancy"``).
+        Title of the campaign, name of the rig, and method (``"full"`` or ``"discrepancy"``).
     form
-        ``"weak"`` or ``"pointwise"``.
+        ``"weak"`` or ``"pointwise"``; ``"linearized responses"`` for a rig of several joints.
     equations, latex
         The equations as plain text and as LaTeX, one per state.
     rig_parameters
@@ -142,27 +142,27 @@ class Discovery:
     alternatives
         All supports that were polished, best first.
     force_equation
-        Inclusion probability of each term in the equation of the hysteretic force; empty where there is none.
+        Inclusion probability of each term in the equation of the hysteretic force; empty if there is no such force.
     held_out
-        Names of the records that chose between supports.
+        Names of the records by which supports were selected.
     held_out_error
-        Free-run error there in units of the noise floor.
+        Free-run error on these records in units of the noise floor.
     held_out_nrmse, noise_floor
-        The same error, and the noise floor, relative to the spread of the measured output (dimensionless).
+        The same error, and the noise floor, relative to the standard deviation of the measured output (dimensionless).
     independent
-        Number of independent samples behind that error (dimensionless, not whole).
+        Number of independent samples of that error (dimensionless, not an integer).
     runs
-        Free runs of the model, for a picture.
+        Free runs of the model, for plots.
     output, unit
-        Name and unit of the output in those.
+        Name and unit of the first output.
     model
         Content of ``model.json``.
     warnings
-        What a user should know before using the equations, one sentence each.
+        Warnings before the equations are used, one sentence each.
     joints
-        Missing force per joint, the likeliest joint first; empty on a rig that has one.
+        Missing force per joint, with the joint of the equation first; empty for a rig with one joint.
     by_record
-        What was found on each record alone, or why nothing was; empty unless asked for.
+        Result for each record alone, or the reason why there is none; empty unless requested.
     """
 
     title: str

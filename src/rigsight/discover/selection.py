@@ -1,7 +1,8 @@
 """Selection of terms: every support is fitted by output error and judged by free-run simulation of held-out records.
 
-Regression proposes terms, this selects. A term must improve the fit to the held-out records by more than the penalty of the
-Bayesian information criterion for their independent samples; of two indistinguishable models the one with fewer terms is kept.
+Regression proposes terms; this module selects them. A term must improve the fit to the held-out records by more than the penalty
+of the Bayesian information criterion for their independent samples; of two indistinguishable models the one with fewer terms is
+kept.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ _LONGEST_SEED = 3
 _MOST_TERMS = 5
 _GROWTH = 3
 _WORTH = 0.02
-"""Share of the regression's residual power that a term must explain to be worth a polish, unless it is the first in line."""
+"""Share of the regression's residual power that a term must explain to be polished, unless it is the best candidate."""
 _ROUNDS = 4
-"""Rounds in which terms are added; those in which only terms go end by themselves."""
+"""Rounds in which terms are added; rounds in which terms are only removed end by themselves."""
 _RELEASED = 0.98
 """Factor by which a released special value (an exponent of 1) must lower the held-out error to be kept."""
 
@@ -36,7 +37,7 @@ _WHITE = 0.75
 
 
 def independent_samples(residuals: NDArray[np.float64]) -> float:
-    """Return how many independent samples stand behind colored residuals, shape (n_samples,)."""
+    """Return the number of independent samples that is equivalent to colored residuals of shape (n_samples,)."""
     n = residuals.size
     centered = residuals - np.mean(residuals)
     power = np.abs(np.fft.rfft(centered, 2 * n)) ** 2
@@ -66,7 +67,7 @@ def criterion(trial: Trial, independent: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What was chosen.
+    """The chosen support, and all that were tried.
 
     Attributes
     ----------
@@ -77,7 +78,7 @@ class Selection:
     criteria
         Information criterion of each.
     independent
-        Independent samples behind the held-out errors.
+        Number of independent samples of the held-out errors.
     """
 
     best: Trial
@@ -94,7 +95,7 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
     bench
         Library, records and scales.
     progress
-        Called with what has just been polished.
+        Called with the terms of each support that has been polished.
     """
 
     def tried(supports: Sequence[Support]) -> list[Trial]:
@@ -118,8 +119,7 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
             break
         pool += tried(list(as_long))
     if not any(at_floor(trial) for trial in pool):
-        # A complex term may replace a simple one in the regression, and its fit may get stuck where that of the simple one does
-        # not.
+        # The regression may prefer a complex term to a simple one, although only the fit of the complex one gets stuck.
         pool += tried(_special_cases(bench, [trial.support for trial in pool]))
     independent = independent_samples(min(pool, key=lambda t: t.error_over_noise).residuals)
 
@@ -150,7 +150,7 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
 
 
 def _better(held: Trial, released: Trial | None) -> Trial:
-    """Return the trial with the special values released where that is worth more parameters."""
+    """Return the trial with released special values if its lower error justifies the additional parameters."""
     return (
         held
         if released is None or released.error_over_noise >= _RELEASED * held.error_over_noise
@@ -159,15 +159,15 @@ def _better(held: Trial, released: Trial | None) -> Trial:
 
 
 def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float]) -> Trial:
-    """Return the trial with the fewest parameters of those that the held-out records cannot tell from the best."""
+    """Return the trial with the fewest parameters of those that the held-out records do not distinguish from the best."""
     lowest = min(cost(trial) for trial in trials)
     close = [trial for trial in trials if cost(trial) <= lowest + STRONG or cost(trial) == lowest]
-    # As many parameters: one state is less than the six of a spread of sliders.
+    # With equal numbers of parameters, fewer states are preferred: a loop with one state to a series of sliders with six.
     return min(close, key=lambda t: (t.n_free, len(t.fit.structure.states), cost(t)))
 
 
 def proposals(bench: Bench) -> list[Support]:
-    """Return the supports that the regression proposes, short ones first, each of which is worth a polish."""
+    """Return the supports that the regression proposes for polishing, short ones first."""
     names = list(bench.candidates)
     if not names:
         return []
@@ -196,13 +196,13 @@ def proposals(bench: Bench) -> list[Support]:
 
 
 def _simpler(bench: Bench, support: Support) -> list[Support]:
-    """Return the supports with a term less, or with a special case of a term in its place."""
+    """Return the supports with one term less, or with a special case in place of a term."""
     found = [support - {name} for name in sorted(support)]
     return found + _special_cases(bench, [support])
 
 
 def _special_cases(bench: Bench, supports: Sequence[Support]) -> list[Support]:
-    """Return the supports that have a special case of a term in its place, each once, without those that are given."""
+    """Return the supports with a special case in place of a term, each once, without the given ones."""
     found = {
         support - {name} | {parent}: None
         for support in supports

@@ -16,7 +16,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over
 
 _SMALL = 1e-3
-"""Share below which a resisting force, or one part of a spring beside the other, is not let start."""
+"""Smallest share at which a fit starts a resisting force, or one part of a spring relative to the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class SupportStarts:
     projected: Projected
 
     def regressed(self, structure: Structure, support: frozenset[str]) -> dict[str, float]:
-        """Return the values that the regression gives a support, in SI.
+        """Return the values of the regression for a support, in SI.
 
         Parameters
         ----------
@@ -65,10 +65,10 @@ class SupportStarts:
         return _within_bounds(structure, values)
 
     def extended(self, structure: Structure, support: frozenset[str], shorter: FitResult) -> dict[str, float]:
-        """Return the values that the fit of a support with fewer terms ended at, in SI.
+        """Return the fitted values of a support with fewer terms, in SI.
 
-        The coefficients of the terms it lacks are zero, so that the fit begins where the shorter one ended; what stands inside
-        these terms, and how a spring divides into parts with and without memory, is the regression's.
+        The coefficients of the terms that it lacks are zero, so that the fit begins where the shorter one ended. Nonlinear
+        parameters of these terms, and the division of a spring into parts with and without memory, come from the regression.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ def _within_bounds(structure: Structure, values: Mapping[str, float]) -> dict[st
 def _rig_values(
     rig: Rig, known: Mapping[str, float], base: NDArray[np.float64]
 ) -> tuple[dict[str, float], float]:
-    """Return the rig's parameters from the coefficients of its own terms, and the force per unit of the others'."""
+    """Return the rig's parameters from the coefficients of its own terms, and the force per unit of the other coefficients."""
     values = dict(known)
     motion = rig.motion
     if not rig.is_driven:

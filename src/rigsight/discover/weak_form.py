@@ -25,7 +25,7 @@ _LEAST_WIDTH = 11
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Test functions on one sample time.
+    """Test functions for one sample time, with which signals are turned into rows.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Rows:
         return self._against(motion.measured, 2)
 
     def independent_share(self, order: int) -> float:
-        """Return how many independent rows stand behind each row, at most 1: windows overlap."""
+        """Return the number of independent rows per row, less than 1 if windows overlap."""
         if self.weights is None:
             return 1.0
         own = self.weights[order]

@@ -1,7 +1,7 @@
 """Linear part, noise and nonlinear distortion of a periodic response.
 
-The best linear approximation of a nonlinear system depends on the power spectrum of the excitation, not on its phases. What
-changes between periods is noise; what changes only between realisations of the random phases is distortion.
+The best linear approximation of a nonlinear system depends on the power spectrum of the excitation, not on its phases.
+Differences between periods are noise; differences only between realisations of the random phases are distortion.
 
 References
 ----------
@@ -24,20 +24,20 @@ from rigsight.frequency.signal_pair import check_alike, hold_response, line_freq
 from rigsight.records.record import Hold, Record
 
 _EXCITED = 1e-6
-"""Power of a line of the source, relative to its strongest, above which the line was meant to be excited: 60 dB."""
+"""Power of a line of the source, relative to its strongest, above which the line counts as excited: -60 dB."""
 
 
 @dataclass(frozen=True, eq=False)
 class BestLinearApproximation:
-    """A best linear approximation and how far the system is from it.
+    """A best linear approximation and the deviation of the system from it.
 
     Attributes
     ----------
     response
         The approximation at the excited lines, with its total and its noise variance.
     distortion
-        Variance that nonlinear distortion gives the values of ONE realisation, in the square of the response's unit,
-        shape (n_frequencies,). Zero where noise hides it.
+        Variance of the values of ONE realisation due to nonlinear distortion, in the square of the response's unit,
+        shape (n_frequencies,). Zero where noise masks it.
     n_realisations, n_periods
         Number of realisations, and of periods of each.
     """
@@ -50,7 +50,7 @@ class BestLinearApproximation:
 
 @dataclass(frozen=True, eq=False)
 class DetectedDistortion:
-    """A response at the excited lines and what the response signal shows between them.
+    """A response at the excited lines and the levels of the response signal between them.
 
     Levels are mean squares of complex line amplitudes (a sine of amplitude 1 has level 1) in the square of the response
     signal's unit. The noise level is subtracted from the distortion levels, which may therefore scatter below zero.
@@ -58,8 +58,8 @@ class DetectedDistortion:
     Attributes
     ----------
     response
-        The response at the excited lines; its variance holds the distortion at the odd detection lines around, its noise
-        variance that of the periods.
+        The response at the excited lines. Its variance includes the distortion at the neighboring odd detection lines; its
+        noise variance is that of the periods.
     odd_omega, odd_level
         Detection lines at odd multiples of the fundamental and the level there, shape (n_odd,).
     even_omega, even_level
@@ -113,9 +113,9 @@ def robust_best_linear_approximation(
     n_per_period
         Samples in one period.
     skipped_periods
-        Periods at the beginning of each record that the transient needs to die out.
+        Periods left out at the beginning of each record, because they contain the transient.
     hold
-        How the source goes on between its samples (see `hold_response`).
+        Hold of the source between its samples (see `hold_response`).
     band
         Limits [rad/s]; None takes all excited lines.
 
@@ -127,8 +127,8 @@ def robust_best_linear_approximation(
     Notes
     -----
     The total variance comes from the scatter of the realisations, the noise variance from that of the periods; the
-    distortion is their difference, times the number of realisations. Variances from few repetitions scatter themselves: a
-    ratio of them has ``2 (M - 1)`` and ``2 M (P - 1)`` degrees of freedom.
+    distortion is their difference, times the number of realisations. Variances from few repetitions are uncertain: their
+    ratio has ``2 (M - 1)`` and ``2 M (P - 1)`` degrees of freedom, with M realisations of P periods.
     """
     check_alike(records, source, response)
     if len(records) < 2:
@@ -184,9 +184,9 @@ def fast_best_linear_approximation(
     n_per_period
         Samples in one period.
     skipped_periods
-        Periods at the beginning that the transient needs to die out.
+        Periods left out at the beginning, because they contain the transient.
     hold
-        How the source goes on between its samples (see `hold_response`).
+        Hold of the source between its samples (see `hold_response`).
     band
         Limits [rad/s]; None takes all from the first to the last excited line.
 
@@ -198,8 +198,8 @@ def fast_best_linear_approximation(
 
     Notes
     -----
-    What the source itself shows at a detection line, as an amplifier's distortion, is taken out with the response
-    interpolated from the excited lines around.
+    The source's own content at a detection line, such as an amplifier's distortion, is removed with the response
+    interpolated from the neighboring excited lines.
     """
     check_alike([record], source, response)
     periods = _periods(record, source, response, n_per_period, skipped_periods)
@@ -279,7 +279,7 @@ def _periods(record: Record, source: str, response: str, n_per_period: int, skip
 
 
 def _noise_variance(periods: _Periods, lines: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the variance that the noise of both signals gives their ratio, to first order."""
+    """Return the variance of the ratio of the signals due to the noise of both, to first order."""
     U, Y = periods.U[lines], periods.Y[lines]
     ratio = Y / U
     variance = (

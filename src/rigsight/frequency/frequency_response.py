@@ -1,4 +1,4 @@
-"""What a frequency response is: complex values over angular frequency, with their uncertainty and their origin."""
+"""A frequency response: complex values over angular frequency, with their uncertainty and their origin."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class FrequencyResponse:
     values
         Response over source, complex, in `unit`, shape (n_frequencies,).
     source, response
-        The signal that drives and the signal that answers.
+        Names of the driving signal and of the responding signal.
     unit
         Unit of the values, for example ``"rad/A"``.
     variance
@@ -39,12 +39,14 @@ class FrequencyResponse:
     method
         Name of the estimator.
     noise_shares, noise_lines
-        How neighbors share their errors, shape (n_frequencies, n_shares), None where values are independent or it is not known:
-        the error of value i is ``sum_j noise_shares[i, j] xi[noise_lines[i, j]]`` with independent circular xi of variance 1.
+        Correlation of the errors of neighboring values, shape (n_frequencies, n_shares), None if they are independent or it is
+        unknown: the error of value i is ``sum_j noise_shares[i, j] xi[noise_lines[i, j]]`` with independent circular xi of
+        variance 1.
     noise_freedom
-        Complex degrees of freedom from which each variance was estimated, infinite where it is known otherwise.
+        Complex degrees of freedom from which each variance was estimated, infinite if it is known in another way.
     shared_width
-        Width [rad/s] of the band that a value was read in where `noise_lines` does not say it: what lies closer shares data.
+        Width [rad/s] of the band from which a value was estimated, if `noise_lines` does not give it: values closer than this
+        share data.
 
     Raises
     ------
@@ -143,7 +145,7 @@ class FrequencyResponse:
         Raises
         ------
         InputError
-            If none is; `which` tells the reader what was asked for.
+            If none is true; `which` describes the request in the message.
         """
         if not kept.any():
             raise InputError(

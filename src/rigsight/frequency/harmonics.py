@@ -37,7 +37,7 @@ class HarmonicTrack:
     omega
         Instantaneous angular frequency of the sweep [rad/s], shape (n_points,).
     t
-        Time at which the sweep passes it [s], shape (n_points,).
+        Time at which the sweep has this frequency [s], shape (n_points,).
     harmonics
         Complex amplitudes of the multiples 1, 2, ... of the sweep's phase, in the unit of the response, shape (n_points,
         n_harmonics). The phase is relative to the same multiple of the source's, sine to sine.
@@ -73,14 +73,14 @@ def track_harmonics(
     Parameters
     ----------
     record
-        A sweep of rising frequency whose source has little noise, as a commanded current has.
+        A sweep of rising frequency whose source has little noise, such as a commanded current.
     source, response
         Names of the signals.
     n_harmonics
         Highest multiple, at least 2.
     periods
-        Length of the piece that one point is fitted to, in periods of the sweep, at least 2. Long pieces smear where the
-        response changes within them.
+        Length of the piece that one point is fitted to, in periods of the sweep, at least 2. A long piece smears a response
+        that changes within it.
 
     Raises
     ------
@@ -172,6 +172,6 @@ def _fit(phase: NDArray[np.float64], pieces: NDArray[np.float64], n_harmonics: i
     multiples = np.arange(1, n_harmonics + 1) * phase[:, None]
     steady = np.concatenate([np.sin(multiples), np.cos(multiples), np.ones((phase.size, 1))], axis=1)
     terms = np.concatenate([steady, position[:, None] * steady], axis=1)
-    # Sines over whole periods are nearly orthogonal, so the normal equations lose nothing.
+    # Sines over whole periods are nearly orthogonal, so the normal equations lose no accuracy.
     found = np.linalg.solve(terms.T @ terms, terms.T @ pieces)
     return np.asarray(found[:n_harmonics] + 1j * found[n_harmonics : 2 * n_harmonics])

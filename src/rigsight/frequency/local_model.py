@@ -1,4 +1,4 @@
-"""How one record without periods gives a frequency response: local polynomial and local rational models.
+"""Frequency response from one record without periods: local polynomial and local rational models.
 
 In a narrow band the response and the transient (from the difference between initial and final state of the record, which a window
 only smears) are both smooth functions of frequency, while the spectrum of the source is rough. Both are fitted there by least
@@ -38,7 +38,8 @@ _CHUNK = 4096
 _RANK = 1e-11
 """Relative singular value below which two terms of a local model are the same."""
 _ANSWERS = 10.0
-"""Power over variance (10 dB) of the source's answer to an instrument, over half of its power; chance brings one line in 500."""
+"""Power over variance (10 dB) required of the source's response to an instrument, at lines with half of the instrument's power;
+by chance one line in 500 reaches it."""
 
 
 def local_polynomial_response(
@@ -70,10 +71,10 @@ def local_polynomial_response(
         Width of the band around each line [rad/s]; None takes the narrowest that leaves six degrees of freedom. Wider
         bands lower the variance and raise the bias.
     transient
-        False for a record that begins and ends at rest: fewer unknowns, and a sweep's slow begin is better told.
+        False for a record that begins and ends at rest: fewer unknowns, and a better estimate at the slow beginning of a sweep.
     hold
-        How the source goes on between its samples; leave it for a source that was measured, give the record's for the
-        input that was commanded (see `hold_response`).
+        Hold of the source between its samples: the default for a measured source, the record's hold for a commanded input
+        (see `hold_response`).
     band
         Limits [rad/s]; None takes all that the source excites.
     wanted
@@ -85,8 +86,8 @@ def local_polynomial_response(
     Returns
     -------
     FrequencyResponse
-        At every line of the record's spectrum in the band; neighbors share data, so their errors are correlated over
-        `bandwidth`: `FrequencyResponse.noise_shares` tells how.
+        At every line of the record's spectrum in the band. Neighbors share data, so their errors are correlated over
+        `bandwidth` (see `FrequencyResponse.noise_shares`).
 
     Raises
     ------
@@ -97,8 +98,8 @@ def local_polynomial_response(
     Notes
     -----
     A sweep that begins with the record has, at its first frequencies, a spectrum as smooth as a transient's; the two cannot
-    be told apart there and the variance is large. Some seconds of rest before the sweep cure that. With rest after it as
-    well, ``transient=False`` is better still; without rest it is biased, and its variance does not tell.
+    be distinguished there and the variance is large. Some seconds of rest before the sweep avoid this. With rest after it as
+    well, ``transient=False`` is better still; without rest it is biased, and its variance does not show the bias.
     """
     return _local_response(
         record,
@@ -147,8 +148,8 @@ def local_rational_response(
     transient
         False for a record that begins and ends at rest.
     hold
-        How the source goes on between its samples; leave it for a source that was measured, give the record's for the
-        input that was commanded (see `hold_response`).
+        Hold of the source between its samples: the default for a measured source, the record's hold for a commanded input
+        (see `hold_response`).
     band
         Limits [rad/s]; None takes all that the source excites.
     wanted
@@ -170,10 +171,10 @@ def local_rational_response(
 
     Notes
     -----
-    The response stands on both sides of the equation, so noise biases the estimate where it is large; below some 30 dB of
-    signal to noise the variance is 10 to 30 % too small, and below 20 dB the local polynomial is the better one. What
-    `local_polynomial_response` says of the begin of a sweep holds here too; where begin and transient cannot be told apart,
-    the variance may be several times too small.
+    The response is on both sides of the equation, so large noise biases the estimate: below a signal-to-noise ratio of about
+    30 dB the variance is 10 to 30 % too small, and below 20 dB the local polynomial is better. The note in
+    `local_polynomial_response` on the beginning of a sweep applies here too; where the beginning and the transient cannot be
+    distinguished, the variance may be several times too small.
     """
     return _local_response(
         record,
@@ -193,7 +194,7 @@ def local_rational_response(
 
 @dataclass(frozen=True)
 class _LocalModel:
-    """Lines on each side of one, degree of the polynomials and of the denominator, and whether a transient is modelled."""
+    """Lines on each side of the center, degrees of polynomials and denominator, and whether a transient is modeled."""
 
     half: int
     order: int
@@ -228,7 +229,7 @@ def _local_response(
     narrowest = unknowns + SPARE
     if bandwidth is None:
         bandwidth = 2.0 * math.pi / span * narrowest
-    # One degree of freedom is what a variance needs at least.
+    # A variance needs at least one degree of freedom.
     check_resolution(bandwidth, span, unknowns + 1, f"{what}, for a {method} model of order {order},")
     half = max(round(bandwidth * span / (4.0 * math.pi)), (unknowns + 1) // 2)
     omega = line_frequencies(record.n_samples, record.dt)
@@ -279,21 +280,21 @@ def _local_response(
 
 
 class LocalFit:
-    """Least squares in many local bands at once; terms that say the same share a coefficient.
+    """Least squares in many local bands at once; linearly dependent terms share a coefficient.
 
     Parameters
     ----------
     terms
         Shape (n_bands, n_equations, n_terms).
     sides
-        What they add up to, shape (n_bands, n_equations).
+        Right-hand sides of the equations, shape (n_bands, n_equations).
     absorbed
-        Terms that were projected out of both before.
+        Number of terms that were projected out of both before.
 
     Attributes
     ----------
     left_over
-        Sum of squares of what no term explains, shape (n_bands,).
+        Sum of squares of the residual, shape (n_bands,).
     noise
         The same per degree of freedom, shape (n_bands,).
     freedom
@@ -323,11 +324,11 @@ class LocalFit:
         return np.asarray(self._theta[:, term] / self._scales[:, term])
 
     def noise_with(self, other: LocalFit) -> NDArray[np.complex128]:
-        """Return the covariance of what this fit and one in the same bands leave, per degree of freedom, shape (n_bands,)."""
+        """Return the residuals' covariance with another fit in the same bands, per degree of freedom, shape (n_bands,)."""
         return np.asarray(np.sum(self._residual * other._residual.conj(), axis=1) / self.freedom)
 
     def shares(self, term: int) -> NDArray[np.complex128]:
-        """Return what each equation has in the coefficient of one term, shape (n_bands, n_equations)."""
+        """Return the weight of each equation in the coefficient of one term, shape (n_bands, n_equations)."""
         rows = np.einsum("ls,lws->lw", self._right[:, :, term].conj() * self._inverse, self._left.conj())
         return np.asarray(rows / self._scales[:, term, None])
 
@@ -338,7 +339,7 @@ def _solve(
     lines: NDArray[np.intp],
     model: _LocalModel,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp]]:
-    """Return the values at some lines, and what the noise of which lines has in them."""
+    """Return the values at some lines, the shares of the noise in them, and the lines that this noise is from."""
     fit, picked = _fit(U, Y, lines, model)
     return fit.coefficient(0), fit.shares(0) * np.sqrt(fit.noise)[:, None], picked
 
@@ -350,14 +351,14 @@ def _solve_ratio(
     lines: NDArray[np.intp],
     model: _LocalModel,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64]]:
-    """Return what `_solve` returns, of the response to R over that of U, and the power of the latter over its variance.
+    """Return the results of `_solve` for the ratio of the responses of Y and U to R, and the power of U's over its variance.
 
-    The noise of one line in both counts as one, with the phase that it has in the response: what feedback brings into both
-    cancels as it does in the ratio.
+    The noise of a line in both signals is treated as one noise, with the phase that it has in Y: noise that feedback brings
+    into both cancels, as it does in the ratio.
     """
     (below, picked), (above, _) = (_fit(R, S, lines, model) for S in (U, Y))
     denominator = below.coefficient(0)
-    # Silent by chance, it is a value of no weight and no fault.
+    # A denominator that is zero by chance is no error: its value gets no weight.
     denominator = np.where(denominator == 0.0, np.finfo(np.float64).tiny, denominator)
     values = above.coefficient(0) / denominator
     of_Y, of_U = above.shares(0), values[:, None] * below.shares(0)

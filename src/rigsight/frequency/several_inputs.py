@@ -27,19 +27,19 @@ from rigsight.records.periods import repeated_period
 from rigsight.records.record import Hold, Record
 
 _OWN_SHARE = 1e-4
-"""Share of an input's power that no other input explains, from which its response is its own: 40 dB, as for silence."""
+"""Share of an input's power not explained by other inputs, from which its response can be separated: -40 dB, as for silence."""
 _MOSTLY = 0.5
 """Share of its frequencies at which an input must be distinguishable to get a response."""
 _SHORT = 0.5
-"""Duration over that of the longest record below which a record would blur what the longest resolves."""
+"""Duration over that of the longest record, below which a record would blur details that the longest one resolves."""
 _MOST_FREQUENCIES = 400
-"""As many as a plot can show; a resonance of a damping ratio of 1 % still holds several of them."""
+"""As many as a plot can show; a resonance with a damping ratio of 1 % still contains several of them."""
 _STANDS_OUT = 4.0
-"""Power over variance from which a value says something about a magnitude: half of it at most is error."""
+"""Power over variance from which a value determines a magnitude: at most half of it is error."""
 _NEIGHBORS, _MOST_OF_THEM = 9, 0.8
-"""One value stands out by chance in twenty bands; eight of nine neighbors do not."""
+"""By chance, one value exceeds the noise in twenty bands; eight of nine neighbors do not."""
 _FEWEST = 8
-"""Values below which there is no curve."""
+"""Fewest values of a curve."""
 _STILL = 1e-12
 _CHUNK = 128
 
@@ -51,9 +51,9 @@ class ResponsesOfInputs:
     Attributes
     ----------
     found
-        By (source, response); one that these records do not show is not there.
+        Responses by (source, response), without those that these records do not determine.
     problems
-        Why it is not, a sentence by (source, response).
+        The reason for each missing one, a sentence by (source, response).
     together
         Inputs that change together in these records, so that their responses cannot be separated.
     """
@@ -65,7 +65,7 @@ class ResponsesOfInputs:
 
 @dataclass(frozen=True, eq=False)
 class _Spectra:
-    """Lines of one record with equal noise in all records; inputs as they are between samples, zero where one does not move."""
+    """Spectra of one record, scaled to equal noise in all records; inputs include their hold, and are zero if constant."""
 
     record: Record
     omega: NDArray[np.float64]
@@ -80,7 +80,7 @@ class _Spectra:
         return float(self.omega[0])
 
     def width(self, order: int, poles: int, resolution: float | None) -> int:
-        """Return the lines of a local band: its unknowns and some more, or those that a resolution holds."""
+        """Return the number of lines of a local band: its unknowns and some more, or the resolution if that is wider."""
         unknowns = (order + 1) * (int(np.count_nonzero(self.moves)) + self.has_transient) + poles
         wished = 0 if resolution is None else round(resolution / self.line)
         return max(unknowns + SPARE, wished) | 1
@@ -101,8 +101,8 @@ def responses_of_inputs(
     Parameters
     ----------
     records
-        In each one or several inputs move; they may differ in length, sample time and in the signals they hold. Steps say nothing
-        here. Of inputs that repeat, whole periods are averaged, without the first.
+        One or several inputs move in each; they may differ in length, sample time and in the signals they contain. Steps are left
+        out. If the inputs are periodic, whole periods are averaged, without the first.
     sources, responses
         Names of the signals.
     order
@@ -112,7 +112,7 @@ def responses_of_inputs(
     resolution
         Width of a local band [rad/s]; None takes the narrowest of each record.
     smooth
-        Sources that were measured, and go on between their samples without content above Nyquist; others by the record's hold.
+        Measured sources, which have no content above the Nyquist frequency; all others have the record's hold.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def _spectra(record: Record, sources: Sequence[str], smooth: Sequence[str]) -> _
     mean, n_periods = _mean_period(record, sources)
     n = mean.n_samples
     omega = line_frequencies(n, mean.dt)
-    # The noise of a mean of periods is that much lower.
+    # Averaging over periods lowers the noise by the square root of their number.
     scale = math.sqrt(max(n_periods, 1) * mean.dt / n)
     inputs, excites = [], []
     for source in sources:
@@ -200,7 +200,7 @@ def _spectra(record: Record, sources: Sequence[str], smooth: Sequence[str]) -> _
 
 
 def _mean_period(record: Record, sources: Sequence[str]) -> tuple[Record, int]:
-    """Return the mean of all common periods but the first of the inputs that move, and of how many; or the record and 0."""
+    """Return the mean of all common periods of the moving inputs but the first, and their number; or the record and 0."""
     period = 1
     for source in sources:
         if _moves(record, source):
@@ -219,7 +219,7 @@ def _mean_period(record: Record, sources: Sequence[str]) -> tuple[Record, int]:
 
 
 def _long_enough(spectra: Sequence[_Spectra]) -> list[_Spectra]:
-    """Leave out records that would blur what others resolve, unless only they move an input."""
+    """Leave out records that would blur details that others resolve, unless an input moves only in them."""
     if not spectra:
         return []
     finest = min(s.line for s in spectra)
@@ -252,7 +252,7 @@ class _LocalModels:
         )
 
     def curve(self, index: int, sources: Sequence[str]) -> tuple[FrequencyResponse | None, tuple[str, ...]]:
-        """Return the response to one input, or the inputs that it moves together with; neither where it drowns in noise."""
+        """Return the response to one input, or the inputs that it moves together with; neither if it is below the noise."""
         column = int(np.flatnonzero(self._moving == index)[0])
         excites = np.any([_at_lines(s, s.excites[index], self._omega) for s in self._spectra], axis=0)
         apart = self._own[:, column] >= _OWN_SHARE
@@ -262,7 +262,7 @@ class _LocalModels:
             return None, tuple(sources[self._moving[i]] for i in alone or others)
         values, variance = self._values[:, column], self._variance[:, column]
         stands_out = excites & apart & (np.abs(values) ** 2 > _STANDS_OUT * variance)
-        # A value may stand out by chance; so do not its neighbors.
+        # One value may exceed the noise by chance, but not its neighbors as well.
         around = np.convolve(stands_out, np.ones(_NEIGHBORS), mode="same")
         present = np.convolve(np.ones(stands_out.size), np.ones(_NEIGHBORS), mode="same")
         kept = stands_out & (around >= _MOST_OF_THEM * present)
@@ -288,8 +288,8 @@ class _LocalModels:
     ) -> tuple[NDArray[np.complex128], *tuple[NDArray[np.float64], ...]]:
         """Return values and variances of all inputs, degrees of freedom, and the share of each input that others do not explain.
 
-        Shapes (n_frequencies, n_moving), the third (n_frequencies,); the shares are those that each other one, and that all
-        others leave, shapes (n_frequencies, n_moving, n_moving) and (n_frequencies, n_moving).
+        Shapes (n_frequencies, n_moving), the third (n_frequencies,). The shares are those that each single other input, and all
+        others together, do not explain, shapes (n_frequencies, n_moving, n_moving) and (n_frequencies, n_moving).
         """
         n_terms, n_inputs = self._order + 1, self._moving.size
         reach = max(0.5 * w * s.line for s, w in zip(self._spectra, self._widths, strict=True))
@@ -323,7 +323,7 @@ class _LocalModels:
 
 
 def _frequencies(spectra: Sequence[_Spectra]) -> NDArray[np.float64]:
-    """Return lines that any input excites, of the finest record that moves it, spread over the logarithm."""
+    """Return the lines that each input excites in its finest record; if too many, some at equal logarithmic distances."""
     lines = []
     for index in np.flatnonzero(np.any([s.moves for s in spectra], axis=0)):
         finest = min((s for s in spectra if s.moves[index]), key=lambda s: s.line)
@@ -336,7 +336,7 @@ def _frequencies(spectra: Sequence[_Spectra]) -> NDArray[np.float64]:
 
 
 def _at_lines(s: _Spectra, flags: NDArray[np.bool_], omega: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return what holds at the lines of a record next to some frequencies."""
+    """Return the flags at the lines of a record next to some frequencies; false above its last line."""
     nearest = np.clip(np.round(omega / s.line).astype(np.intp) - 1, 0, s.omega.size - 1)
     return np.asarray(flags[nearest] & (omega <= s.omega[-1]))
 
@@ -344,7 +344,7 @@ def _at_lines(s: _Spectra, flags: NDArray[np.bool_], omega: NDArray[np.float64])
 def _without(
     powers: NDArray[np.float64], parts: Sequence[NDArray[np.complex128]]
 ) -> list[NDArray[np.complex128]]:
-    """Take out of the equations of a record what its transient can explain: polynomials over each band."""
+    """Remove the transient from the equations of a record, by projecting out polynomials over each band."""
     basis = np.linalg.qr(powers)[0]
     return [part - basis @ (np.swapaxes(basis, 1, 2) @ part) for part in parts]
 

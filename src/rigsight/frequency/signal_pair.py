@@ -82,7 +82,7 @@ def among(omega: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np
 
 
 def hold_response(omega: NDArray[np.float64], dt: float, hold: Hold) -> NDArray[np.complex128]:
-    """Return how a hold changes the ratio of sampled signals, shape (n_frequencies,).
+    """Return the factor by which a hold changes the ratio of sampled signals, shape (n_frequencies,).
 
     Samples of the response divided by samples of a held source show ``G(j omega)`` times this factor, and images of
     ``G`` around multiples of the sampling frequency, which are small for a response that falls off below Nyquist.
@@ -94,8 +94,8 @@ def hold_response(omega: NDArray[np.float64], dt: float, hold: Hold) -> NDArray[
     dt
         Sample time [s].
     hold
-        How the source goes on between its samples: constant (``"zoh"``), on a straight line (``"foh"``), or without
-        content above the Nyquist frequency (``"band_limited"``: the factor is 1), as a measured motion does.
+        The source between its samples: constant (``"zoh"``), on a straight line (``"foh"``), or without content above the
+        Nyquist frequency (``"band_limited"``: the factor is 1), like a measured motion.
 
     References
     ----------
@@ -125,7 +125,7 @@ def excited(
     power
         Power density of the source, shape (n_frequencies,).
     band
-        Lower and upper limit wished for [rad/s]; None takes all that the source excites.
+        Requested lower and upper limit [rad/s]; None takes all that the source excites.
     what
         Names record and source in the message.
 
@@ -175,7 +175,7 @@ def check_resolution(resolution: float, duration: float, needed: float, what: st
     Parameters
     ----------
     resolution
-        Width wished for [rad/s].
+        Requested width [rad/s].
     duration
         Length of the record [s].
     needed
@@ -186,7 +186,8 @@ def check_resolution(resolution: float, duration: float, needed: float, what: st
     Raises
     ------
     InputError
-        Saying how long the record must be, or which resolution it has.
+        If it is too short, or the resolution is not a positive number. The message states the necessary length and the
+        possible resolution.
     """
     if not (math.isfinite(resolution) and resolution > 0.0):
         raise InputError(f"A resolution must be a positive number of rad/s, got {resolution!r}.")

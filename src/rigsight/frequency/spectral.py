@@ -1,4 +1,4 @@
-"""How averaged spectra give a frequency response: H1, H2 and Hv over overlapping segments.
+"""Frequency response from averaged spectra: H1, H2 and Hv over overlapping segments.
 
 References
 ----------
@@ -54,7 +54,7 @@ def averaged_response(
     source, response
         Names of the signals.
     resolution
-        Distance of the frequencies [rad/s]; its inverse is the length of a segment.
+        Distance of the frequencies [rad/s]; a segment has a length of 2 pi / resolution.
     estimator
         ``"H1"`` is unbiased for noise on the response, ``"H2"`` for noise on the source, ``"Hv"`` for the same relative
         noise on both; it is the geometric mean of the other two.
@@ -63,8 +63,8 @@ def averaged_response(
     overlap
         Share of a segment that the next one repeats, 0 to 0.9.
     hold
-        How the source goes on between its samples; leave it for a source that was measured, give the record's for the
-        input that was commanded (see `hold_response`).
+        Hold of the source between its samples: the default for a measured source, the record's hold for a commanded input
+        (see `hold_response`).
     band
         Limits [rad/s]; None takes all that the source excites.
 
@@ -80,9 +80,9 @@ def averaged_response(
 
     Notes
     -----
-    The variance counts what is not coherent: noise, nonlinear distortion, and the leakage of a source that is not
-    stationary. The bias by leakage, which widens and lowers a lightly damped peak, is not in it; `local_rational_response`
-    has none to speak of.
+    The variance includes everything that is not coherent: noise, nonlinear distortion, and the leakage of a source that is
+    not stationary. It does not include the bias due to leakage, which widens and lowers a lightly damped peak;
+    `local_rational_response` is nearly free of this bias.
     """
     several = [records] if isinstance(records, Record) else list(records)
     check_alike(several, source, response)
@@ -150,7 +150,7 @@ def _spectra(
 
 
 def _independent(window: NDArray[np.float64], step: int, n_segments: float) -> float:
-    """Return how many independent segments have the variance of the overlapping ones; Welch's formula."""
+    """Return the number of independent segments with the variance of the overlapping ones; Welch's formula."""
     power = float(window @ window)
     shared = 0.0
     for shift in range(step, window.size, step):

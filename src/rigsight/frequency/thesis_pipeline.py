@@ -35,7 +35,7 @@ def thesis_response(
     source, response
         Names of the signals.
     phase_drop
-        Phase that the response is believed to lose over the band [rad]: pi for a PT2, pi / 2 for a PT1.
+        Assumed phase loss of the response over the band [rad]: pi for a PT2, pi / 2 for a PT1.
     upper_cut, lower_cut
         Frequencies beyond which the spectra are cut [rad/s]; the thesis keeps ``u -> psi`` up to 80 and ``psi -> y`` up to
         30 rad/s.
@@ -48,8 +48,8 @@ def thesis_response(
     Notes
     -----
     The unwrapped phase is multiplied by ``phase_drop`` over the difference of the means of its first and last 15 points and
-    shifted to begin at zero. Whatever else turns the phase (a delay, a lag, a wrap that noise made) is hidden by that. The
-    magnitude is the plain ratio. There is no variance.
+    shifted to begin at zero. This hides any other phase change (a delay, a lag, a wrap due to noise). The magnitude is the
+    plain ratio. There is no variance.
     """
     omega = line_frequencies(record.n_samples, record.dt)
     spectra = {name: np.fft.rfft(record[name])[1 : omega.size + 1] for name in (source, response)}

@@ -11,27 +11,27 @@ from rigsight.identify.identification import RecordIdentification
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 
 _CHANCE = 1e-3
-"""Probability of a difference as large by chance, over all parameters, below which a parameter counts as changing."""
+"""Probability of an equal or larger difference by chance, over all parameters, below which a parameter counts as changing."""
 _SAME_AMPLITUDE = 0.01
 _SAME_INERTIA = 2.0
-"""Ratio of inertias that a nonlinear effect, seen by a linear form, does not make of one; an assumption."""
+"""Ratio of fitted inertias from which a nonlinear effect is not the likely cause; an assumption."""
 _INERTIAS = ("kg", "kg m^2")
 _MOVED = 1.15
-"""Ratio of resonance frequencies that no scatter of a peak explains."""
+"""Ratio of resonance frequencies that the scatter of a peak does not explain."""
 
 
 def amplitude_dependence(
     records: Sequence[RecordIdentification], units: Mapping[str, str], input_unit: str
 ) -> tuple[str, tuple[str, ...]]:
-    """Say in a sentence whether parameters change with the amplitude, and name those that do.
+    """Return a sentence on whether parameters change with the amplitude, and the names of those that do.
 
-    Records of one kind are compared where their amplitudes differ: a step and a sweep also differ in frequency content. Offsets
-    do not take part; they may differ from record to record without any nonlinearity.
+    Only records of one kind with different amplitudes are compared, because a step and a sweep also differ in frequency content.
+    Offsets are not compared; they may differ from record to record without any nonlinearity.
 
     Parameters
     ----------
     records
-        What each record shows.
+        Results of each record.
     units
         Unit by parameter.
     input_unit
@@ -87,7 +87,7 @@ def _no_single_inertia(
     units: Mapping[str, str],
     changing: Sequence[str],
 ) -> str:
-    """Say that records disagree about an inertia as only units and scales make them; amplitudes leave it alone."""
+    """Return a warning if an inertia differs so much that units or scales must be wrong; it does not depend on amplitude."""
     records = [record for _, group in compared for record in group]
     for name in changing:
         if units.get(name) not in _INERTIAS:
@@ -106,7 +106,7 @@ def _no_single_inertia(
 
 
 def _moving_resonance(compared: Sequence[tuple[float, Sequence[RecordIdentification]]]) -> str:
-    """Say that the resonance moves although intervals of parameters, wide where the form does not fit, do not tell."""
+    """Return a note if the resonance moves although the intervals, wide if the model does not fit, show no change."""
     found = [r.resonance for _, group in compared for r in group if r.resonance is not None]
     if len(found) < 2 or max(found) <= _MOVED * min(found):
         return ""
@@ -119,7 +119,7 @@ def _moving_resonance(compared: Sequence[tuple[float, Sequence[RecordIdentificat
 def _comparable(
     records: Sequence[RecordIdentification],
 ) -> list[tuple[float, list[RecordIdentification]]]:
-    """Return amplitudes in increasing order with their records, of the kind of records that has most amplitudes."""
+    """Return the amplitudes in increasing order with their records, for the kind of records with the most amplitudes."""
     best: list[tuple[float, list[RecordIdentification]]] = []
     for alike in dict.fromkeys(map(_driven_alike, records)):
         groups: list[tuple[float, list[RecordIdentification]]] = []
@@ -139,7 +139,7 @@ def _determined(found: PhysicalEstimates) -> list[str]:
 
 
 def _driven_alike(found: RecordIdentification) -> tuple[str, ...]:
-    """Return what two records must share to be compared: the kind, and the paths that they show."""
+    """Return the properties that two records must share to be compared: their kind and their signal paths."""
     return (found.record.kind, *(f"{path.source} -> {path.response}" for path in found.paths))
 
 
@@ -161,7 +161,7 @@ def _mean(estimates: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 
 def _chance(means: Sequence[tuple[float, float]]) -> float:
-    """Return the probability of a scatter as large if the value is the same everywhere."""
+    """Return the probability of an equal or larger scatter if the value is the same everywhere."""
     values, errors = np.array(means).T
     middle = _mean(means)[0]
     return float(chi2.sf(np.sum(((values - middle) / errors) ** 2), values.size - 1))

@@ -12,16 +12,16 @@ _LISTED = 5
 
 
 def closed_loop_notes(records: Sequence[Record], rig: Rig, used: str) -> list[str]:
-    """Return which records are taken as those of a closed loop, and what for; nothing where none holds a reference.
+    """Return notes on the records that are treated as closed-loop records; empty if none contains a reference.
 
     Parameters
     ----------
     records
-        Of a campaign.
+        Records of a campaign.
     rig
-        Their rig; a signal of its own that is called `reference` is none.
+        Their rig; if one of its own signals is named `reference`, there are no notes.
     used
-        What the reference is used for, a sentence or more.
+        The use of the reference, in one or more sentences.
     """
     own = [signal.name for signal in (*rig.inputs, *rig.outputs)]
     if not signals_beside(own):

@@ -7,7 +7,8 @@ from fractions import Fraction
 
 _LARGEST_POWER = 3
 ONE = 0.03
-"""Distance from one at which a factor of two numbers with the same unit is left out, and from a small fraction a power is one."""
+"""Relative distance up to which a factor between values of the same unit counts as one (and is left out), and a power as a small
+fraction."""
 
 
 def product_text(factors: Sequence[tuple[str, int]]) -> str:
@@ -24,23 +25,23 @@ def product_text(factors: Sequence[tuple[str, int]]) -> str:
 
 
 def sum_text(first: str, weight: float, second: str, same_unit: bool) -> str:
-    """Return ``first + weight second``; the weight is left out where it is one and both have one unit.
+    """Return ``first + weight second``; the weight is left out if it is one and both have the same unit.
 
     Parameters
     ----------
     first, second
         Names.
     weight
-        Of the second.
+        Weight of the second.
     same_unit
-        Whether both have one unit.
+        Whether both have the same unit.
     """
     factor = "" if same_unit and abs(abs(weight) - 1.0) < ONE else f"{abs(weight):.3g} "
     return f"{first} {'-' if weight < 0.0 else '+'} {factor}{second}"
 
 
 def small_fraction(ratio: float) -> Fraction | None:
-    """Return the fraction of small numbers that a ratio is, None where it is none; a step along it then decides."""
+    """Return the fraction of small integers to which a ratio is close, None if there is none; a step along it then decides."""
     nearest = Fraction(ratio).limit_denominator(_LARGEST_POWER)
     close = nearest != 0 and abs(float(nearest) - ratio) <= ONE * abs(ratio)
     return nearest if close and abs(nearest.numerator) <= _LARGEST_POWER else None
@@ -52,7 +53,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def percent(error: float) -> str:
-    """Return a relative error in percent, a large one as a multiple."""
+    """Return a relative error in percent, or as a multiple of the value if it is large."""
     return f"{100.0 * error:.2g} %" if error < 10.0 else f"{error:.2g} times its value"
 
 

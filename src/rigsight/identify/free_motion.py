@@ -20,20 +20,20 @@ from rigsight.rigs import Rig
 from rigsight.rigs.reading.dimensions import UnitError, dimension
 
 _DRAWS = 3
-"""Places at which the equations are compared: expressions that differ agree at a drawn one by no chance."""
+"""Number of random points at which the equations are compared; different expressions do not agree there by chance."""
 _SAME = 1e-9
-"""Relative difference of rates that is rounding."""
+"""Relative difference of rates that counts as rounding error."""
 _MASS = "[mass]"
 
 
 @dataclass(frozen=True)
 class OpenFactor:
-    """Parameters that records tell up to a common factor, and the one that is held.
+    """Parameters that records determine only up to a common factor, and the one that is held.
 
     Attributes
     ----------
     names
-        All of them, the one that is held among them.
+        All of them, including the one that is held.
     held
         Name of the one that is held.
     value
@@ -41,7 +41,7 @@ class OpenFactor:
     unit
         Its unit.
     is_given
-        Whether the value was given; else it is the default of the rig, or one.
+        Whether the value was given; otherwise it is the default of the rig, or one.
     """
 
     names: tuple[str, ...]
@@ -52,7 +52,7 @@ class OpenFactor:
 
     @property
     def sentence(self) -> str:
-        """What it means, for people."""
+        """The finding in words."""
         source = "as given" if self.is_given else "because no value was given"
         return (
             f"No input moves in the records that are fitted: they determine {listed(self.names)}, and every force of an effect, "
@@ -64,18 +64,18 @@ class OpenFactor:
 def open_factor(
     rig: Rig, records: Sequence[Record], constants: Mapping[str, float], given: Mapping[str, float]
 ) -> OpenFactor | None:
-    """Return which parameters records of a free motion tell up to a common factor, None where something tells the factor.
+    """Return the parameters that records of a free motion determine only up to a common factor, None if the factor is determined.
 
     Parameters
     ----------
     rig
         The rig.
     records
-        Those that are fitted.
+        The fitted records.
     constants
         The rig's constants by name.
     given
-        Parameters of which a value is known or supposed; one of them is held if it takes part.
+        Parameters with a known or assumed value; one of them is held if it is among the undetermined ones.
     """
     if not rig.is_driven or any(not is_constant(r[s.name]) for r in records for s in rig.inputs):
         return None
@@ -94,7 +94,7 @@ def open_factor(
 
 
 def _power_of_mass(parameter: Parameter) -> float:
-    """Return the power in which a parameter's unit holds the unit of mass."""
+    """Return the power of the unit of mass in a parameter's unit."""
     try:
         return float(dimension(parameter.unit).get(_MASS, 0))
     except UnitError:
@@ -108,7 +108,7 @@ def _moves_as_before(
     powers: Mapping[str, float],
     records: Sequence[Record],
 ) -> bool:
-    """Return True if rates and readings stay as they are when the parameters grow by a common factor."""
+    """Return True if rates and readings do not change when the parameters are multiplied by a common factor."""
     equations, rng = equations_of(rig), np.random.default_rng(0)
     drawn = {p.name: float(rng.uniform(0.2, 0.8)) for p in rig.parameters}
     grown = {name: value * 2.0 ** powers.get(name, 0.0) for name, value in drawn.items()}
@@ -124,7 +124,7 @@ def _moves_as_before(
 
 
 def _rest_makes_up(rig: Rig, records: Sequence[Record]) -> bool:
-    """Return True if a free rest position, or constant force, takes up what a constant input does: it is the same everywhere."""
+    """Return True if a free rest position or constant force can replace the constant input, equal in all records."""
     if not rig.has_one_motion:
         return False
     free = {parameter.name for parameter in rig.parameters}

@@ -25,16 +25,16 @@ def helpful_sensors(
     noise: Mapping[str, float],
     result: FitResult,
 ) -> tuple[str, ...]:
-    """Return a sentence for each sensor in no record that would leave fewer directions of the parameters free.
+    """Return a sentence for each unrecorded sensor with which fewer directions of the parameters would be undetermined.
 
     Parameters
     ----------
     structure
         The rig.
     records
-        What was fitted.
+        The fitted records.
     scales, noise
-        As the fit had them.
+        As in the fit.
     result
         The fit.
     """

@@ -1,4 +1,4 @@
-"""Which parameters do the records determine, and which only in combination with others? In words.
+"""Which parameters do the records determine, and which only in combination with others?
 
 Null directions of the information matrix are parameters that compensate each other. A combination is named if a finite step along
 it does not change the outputs, because derivatives at one point cannot distinguish a ratio from a difference.
@@ -32,29 +32,29 @@ from rigsight.identify.undetermined import (
 Floats = NDArray[np.float64]
 
 _NO_INFLUENCE = 100.0
-"""Standard error over the value, with all other parameters known, from which a parameter is said to do nothing."""
+"""Standard error over the value, with all other parameters known, above which a parameter is reported to have no influence."""
 _STEP = 1.5
-"""Factor of the step that tests a combination: far enough that a sum and a product part."""
+"""Factor of the step that tests a combination: large enough to distinguish a sum from a product."""
 _UNCHANGED = 0.005
-"""Change of the outputs along a combination, over that by one of its members alone, below which the outputs stay."""
+"""Change of the outputs along a combination, over that by one of its members alone, below which they count as unchanged."""
 
 
 @dataclass(frozen=True)
 class Combination:
-    """A combination of parameters that the records determine where they do not determine its members.
+    """A combination of parameters that the records determine although they do not determine its members.
 
     Attributes
     ----------
     text
-        As in ``J_m/k_t``.
+        The combination, as in ``J_m/k_t``.
     members
         Names of the parameters.
     value
-        Of the combination.
+        Value of the combination.
     std
         Its standard error.
     unit
-        Unit where it is that of the members, else empty.
+        Unit if it is that of the members, else empty.
     """
 
     text: str
@@ -66,23 +66,23 @@ class Combination:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What is identifiable from some records.
+    """Identifiability of parameters from some records.
 
     Attributes
     ----------
     relative_errors
-        Relative standard error by parameter, infinite where nothing is known; of one that may be zero relative to its size in the
-        records.
+        Relative standard error by parameter, infinite if nothing is known; relative to its size in the records for a parameter
+        that may be zero.
     determined
         Names of the parameters that the records determine.
     combinations
-        What they determine of the others.
+        Combinations of the others that the records determine.
     statements
-        What they do not determine, a sentence each.
+        Sentences on parameters that the records do not determine.
     free_directions
-        How many independent changes of parameters leave the outputs within the noise.
+        Number of independent changes of parameters that leave the outputs within the noise.
     remedies
-        What would determine more, a sentence each.
+        Sentences on measures with which more parameters would be determined.
     """
 
     relative_errors: dict[str, float]
@@ -94,7 +94,7 @@ class Identifiability:
 
     @property
     def sentence(self) -> str:
-        """All in one: what is determined, and what is not."""
+        """The findings in words: the parameters that are determined, and those that are not."""
         names = list(self.relative_errors)
         if not names:
             return "There was nothing to identify."
@@ -108,12 +108,12 @@ class Identifiability:
 
 
 def identifiability(found: Information) -> Identifiability:
-    """Return which parameters the records determine, and which combinations of the others.
+    """Return the parameters that the records determine, and the combinations of the others.
 
     Parameters
     ----------
     found
-        What the records say.
+        Information of the records on the parameters.
     """
     errors, search = relative_errors(found), _Search(found)
     statements = tuple(search.statements())
@@ -127,7 +127,7 @@ def identifiability(found: Information) -> Identifiability:
 
 
 def free_directions(found: Information) -> int:
-    """Return how many independent relative changes of parameters leave the outputs within the noise."""
+    """Return the number of independent relative changes of parameters that leave the outputs within the noise."""
     return int(undetermined(found.root).shape[1])
 
 
@@ -137,7 +137,7 @@ def relative_errors(found: Information) -> dict[str, float]:
     Parameters
     ----------
     found
-        What the records say.
+        Information of the records on the parameters.
     """
     errors = conditional_errors(found.root)
     # A parameter with almost no influence is held, so that its uncertainty does not affect the others.
@@ -148,18 +148,18 @@ def relative_errors(found: Information) -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Quantity:
-    """A parameter or a combination of some.
+    """A parameter or a combination of parameters.
 
     Attributes
     ----------
     text, members, unit
-        How it is written, and of what.
+        Its text, the parameters in it, and its unit.
     value, size
-        Its value, and what its relative changes are relative to.
+        Its value, and the reference of its relative changes.
     direction
         Relative change of the parameters when it alone grows by its size, shape (n,).
     power
-        In which power of it the parameter grows that is moved for it.
+        Power of the changed parameter in this quantity.
     """
 
     text: str
@@ -176,7 +176,7 @@ class _Quantity:
 
 
 class _Search:
-    """Combines parameters until the rest is determined or named."""
+    """Combines parameters until all are determined or reported as undetermined."""
 
     def __init__(self, found: Information) -> None:
         self._found = found
@@ -187,15 +187,15 @@ class _Search:
             )
         ]
         self._held: dict[str, _Quantity] = {}
-        """By the text of a quantity the one to which its ratio is determined."""
+        """Quantity to which the ratio is determined, by the text of the quantity."""
 
     def statements(self) -> Iterator[str]:
-        """Yield what is not determined, each time with one direction less that nothing is known of."""
+        """Yield sentences on undetermined parameters; each removes one undetermined direction."""
         while self._quantities and (free := undetermined(self._root())).shape[1]:
             yield self._alone() or self._pair() or self._group(free)
 
     def combinations(self) -> Iterator[Combination]:
-        """Yield the combinations that were made and are determined."""
+        """Yield the combinations that were formed and are determined."""
         if not self._quantities:
             return
         errors = marginal_errors(self._root())
@@ -213,7 +213,7 @@ class _Search:
         return self._found.root @ np.column_stack([q.direction for q in self._quantities])
 
     def _alone(self) -> str:
-        """Name a quantity that the records would not determine if all others were known, and leave it as it is."""
+        """Report a quantity that the records would not determine even if all others were known, and remove it."""
         errors = conditional_errors(self._root())
         index = int(np.argmax(errors))
         if errors[index] < POORLY_KNOWN:
@@ -227,7 +227,7 @@ class _Search:
         return f"{quantity.text} is not determined ({how})."
 
     def _pair(self) -> str:
-        """Put two quantities together that follow each other."""
+        """Combine two quantities that compensate each other."""
         root, best, pair = self._root(), 1.0 / POORLY_KNOWN, None
         for i, j in combinations(range(len(self._quantities)), 2):
             _, singular, right = np.linalg.svd(root[:, [i, j]], full_matrices=False)
@@ -244,10 +244,10 @@ class _Search:
     def _combined(
         self, first: _Quantity, second: _Quantity, along_first: float, along_second: float
     ) -> tuple[_Quantity, str]:
-        """Return what two quantities that follow each other determine together: a product of powers, or a sum."""
+        """Return the determined combination of two quantities that compensate each other: a product of powers, or a sum."""
         members = (*first.members, *second.members)
         name = f"{first.text} and {second.text}"
-        # A number that may be zero is no factor.
+        # A quantity that may be zero cannot be a factor.
         plain = all(quantity.size == quantity.value for quantity in (first, second))
         power = small_fraction(along_second / along_first) if plain and along_first else None
         change = self._change([first, second], [along_first, along_second], power is not None)
@@ -272,7 +272,7 @@ class _Search:
         return _Quantity(text, members, first.unit, value, size, first.direction * size / first.size), words
 
     def _group(self, free: Floats) -> str:
-        """Name quantities that change together without a trace, and hold one of them."""
+        """Report quantities that can change together without a change of the outputs, and hold one of them."""
         direction, taking_part = sparsest(free, np.linalg.norm(self._root(), axis=0))
         members = [self._quantities[i] for i in taking_part]
         along = [float(entry) for entry in direction[taking_part] / np.max(np.abs(direction))]
@@ -289,7 +289,7 @@ class _Search:
         return f"{listed([q.text for q in members])} cannot be separated: the others compensate for a change of one."
 
     def _factor(self, members: Sequence[_Quantity], powers: Sequence[Fraction]) -> str:
-        """Name quantities that may all be multiplied without a trace, and hold the first."""
+        """Report quantities with a common undetermined factor, and hold the first."""
         held = next(q for q, power in zip(members, powers, strict=True) if abs(power) == 1)
         self._quantities.remove(held)
         names = listed([q.text for q in members])
@@ -303,9 +303,9 @@ class _Search:
         return f"{names} only up to a common factor: their ratios are determined, and one must be known to determine the others."
 
     def _sums(self, members: Sequence[_Quantity], along: Sequence[float]) -> str:
-        """Put quantities together of which one stands in sums with each of the others."""
+        """Combine quantities of which one forms a sum with each of the others."""
         slopes = [q.size * entry for q, entry in zip(members, along, strict=True)]
-        # The one that is added to the most others reads best.
+        # The text is clearest if the shared one is added to most of the others.
         shared = max(range(len(members)), key=lambda i: sum(slope * slopes[i] < 0.0 for slope in slopes))
         held, made = members[shared], []
         for q, slope in zip(members, slopes, strict=True):
@@ -323,9 +323,9 @@ class _Search:
         return f"{listed([q.text for q in members])} only as {listed([q.text for q in made])}."
 
     def _change(self, quantities: Sequence[_Quantity], along: Sequence[float], as_powers: bool) -> float:
-        """Return how the outputs change along a direction, over what its first member alone would change.
+        """Return the change of the outputs along a direction, divided by that due to its first member alone.
 
-        Infinite where a bound stands in the way.
+        Infinite if the step would exceed a bound on either side.
         """
         for side in (1.0, -1.0):
             places = self._moved(quantities, [side * entry for entry in along], as_powers)
@@ -343,7 +343,7 @@ class _Search:
     def _moved(
         self, quantities: Sequence[_Quantity], along: Sequence[float], as_powers: bool
     ) -> tuple[Floats, Floats]:
-        """Return the parameters after a step of all, and after that of the first alone."""
+        """Return the parameters after a step of all quantities, and after a step of the first alone."""
         found, largest = self._found, max(abs(entry) for entry in along)
         moved, alone = found.values.copy(), found.values.copy()
         for number, (quantity, entry) in enumerate(zip(quantities, along, strict=True)):

@@ -25,15 +25,15 @@ class PathIdentification:
     source, response
         The signals.
     measured
-        Frequency response; None for a step, or where there is none.
+        Frequency response; None for a step, or if there is none.
     coherence
-        H1 with its coherence; None where it was not estimated.
+        H1 with its coherence; None if it was not estimated.
     fit
-        PT2 or PT1; None where it failed.
+        PT2 or PT1; None if it failed.
     physical
-        Physical parameters of the fit; None where it failed.
+        Physical parameters of the fit; None if it failed.
     problem
-        Why there is no fit, in words; empty where there is one.
+        Reason why there is no fit, in words; empty if there is one.
     """
 
     source: str
@@ -54,21 +54,21 @@ class RecordIdentification:
     record
         The record.
     amplitude
-        Amplitude of its input; as given, else measured. Of a free motion that of its output.
+        Amplitude of its input, as given or measured; for a free motion that of its output.
     paths
-        The motion first, then what it drives.
+        The path to the motion first, then the paths from the motion.
     offsets
-        Rest positions by (2.26) and (2.27); None where there are none.
+        Rest positions by (2.26) and (2.27); None if there are none.
     conicity
-        delta_0 with its statement; None where c_y is not known.
+        delta_0 with its statement; None if c_y is not known.
     resonance
-        Angular frequency at which the measured magnitude is largest [rad/s]; None where it has no peak.
+        Angular frequency at which the measured magnitude is largest [rad/s]; None if it has no peak.
     warnings
-        What the user must know, a sentence each.
+        Warnings for the user, a sentence each.
     own
-        Parameters of a fit of this record alone, over time; None where they follow from `paths`, or where it failed.
+        Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it failed.
     moved
-        The output that its amplitude is of, where nothing drives it.
+        The output to which the amplitude of a free motion refers.
     """
 
     record: Record
@@ -83,12 +83,12 @@ class RecordIdentification:
 
     @property
     def is_identified(self) -> bool:
-        """True if it gave parameters: of a rig with one motion its motion, of others a fit over time."""
+        """True if it gave parameters: from its motion for a rig with one motion, from a fit in the time domain for others."""
         return self.own is not None or (bool(self.paths) and not self.motion.problem)
 
     @property
     def source(self) -> str:
-        """The signal that its amplitude is of: an input, or the output that moves freely."""
+        """The signal to which its amplitude refers: an input, or the output of a free motion."""
         return self.paths[0].source if self.paths else self.moved
 
     @property
@@ -109,7 +109,7 @@ class RecordIdentification:
 
 @dataclass(frozen=True)
 class RecordScore:
-    """How well the joint model follows one record in free run.
+    """Free-run error of the joint model on one record.
 
     Attributes
     ----------
@@ -137,18 +137,18 @@ class JointIdentification:
     Attributes
     ----------
     fit
-        The joint fit, beside a fit of each record alone.
+        The joint fit, with a fit of each record alone.
     names
-        The parameters that were fitted.
+        The fitted parameters.
     pooled
-        Lateral parameters that the fit kept at the mean of the records' own: where no set serves all, a wrong yaw angle would
-        spoil them. None where they were fitted with the others, or not at all.
+        Lateral parameters that the fit held at the mean of the single records' estimates: if no set fits all records, a wrong yaw
+        angle would bias them. None if they were fitted with the others, or not at all.
     statement
-        Does one set serve all, and which record pulls? In words.
+        Whether one set fits all records, and which records differ, in words.
     conicity
-        delta_0 with its statement; None where c_y is not known.
+        delta_0 with its statement; None if c_y is not known.
     scores
-        Of every record.
+        Score of every record.
     left_out
         Estimation records that the fit did not use.
     """
@@ -164,7 +164,7 @@ class JointIdentification:
 
 @dataclass(frozen=True)
 class EffectScore:
-    """How well one record is followed in free run without and with effects.
+    """Free-run error on one record without and with effects.
 
     Attributes
     ----------
@@ -184,24 +184,24 @@ class EffectScore:
 
 @dataclass(frozen=True, eq=False)
 class HysteresisIdentification:
-    """The rig with effects of memory, calibrated to the records that the joint fit used.
+    """The rig with hysteresis effects, calibrated to the records of the joint fit.
 
     Attributes
     ----------
     effects
         Names of the effects, along the signal path.
     calibration
-        Parameters of rig and effects, and what follows from them.
+        Parameters of rig and effects, and quantities derived from them.
     held
-        Values of parameters of effects that were not fitted, or that the fit left at their special value.
+        Values of parameters of effects that were not fitted, or that the fit left at their special values.
     units
         Unit of every parameter.
     meanings
-        What each parameter is.
+        Meaning of each parameter.
     statement
-        How much closer the records are followed with the effects, in words.
+        Reduction of the error by the effects, in words.
     scores
-        Of every record.
+        Score of every record.
     """
 
     effects: tuple[str, ...]
@@ -220,17 +220,17 @@ class Identification:
     Attributes
     ----------
     title
-        Of the campaign.
+        Title of the campaign.
     rig
         Name of the rig.
     method
-        How frequency responses were estimated.
+        Method by which frequency responses were estimated.
     units
         Unit by parameter and signal.
     records
         Estimation records in the order of the campaign.
     amplitude_statement
-        Do the parameters change with the amplitude? One sentence.
+        Whether the parameters change with the amplitude, in one sentence.
     changing
         Names of those that do.
     joint
@@ -238,16 +238,16 @@ class Identification:
     model
         Content of ``model.json``.
     warnings
-        Every warning, with the record it is about.
+        All warnings, each with the name of its record.
     views
-        The rig close to its rest, for each set of constants that records have; empty for the built-in rigs of one motion, whose
-        transfer functions are fitted record by record.
+        The linearized rig, for each set of constants of the records; empty for the built-in rigs with one motion, whose transfer
+        functions are fitted record by record.
     identifiability
-        Which parameters the records determine together; None for these built-in rigs.
+        Parameters that the records determine together; None for these built-in rigs.
     meanings
-        What each parameter is, by name; empty for these built-in rigs.
+        Meaning of each parameter, by name; empty for these built-in rigs.
     hysteresis
-        The rig with effects of memory; None where none was asked for. `model` is this one then.
+        The rig with hysteresis effects; None if not requested. If there is one, it is the `model`.
     """
 
     title: str

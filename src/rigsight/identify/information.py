@@ -24,7 +24,7 @@ _FOLLOWED = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """How the outputs answer to relative changes of parameters, whatever the initial states do meanwhile.
+    """Response of the outputs to relative changes of parameters, with the initial states projected out.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Information:
     values
         Their values, shape (n,).
     sizes
-        What a relative change is relative to, shape (n,): the value, or the size in the records of one that may be zero.
+        Reference of the relative changes, shape (n,): the value, or the size in the records for a parameter that may be zero.
     lower, upper
         Their bounds, shape (n,).
     root
@@ -60,12 +60,12 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
     fit
         Structure, records and noise.
     result
-        Its result; residuals that are colored say less, as its standard errors know.
+        Its result; colored residuals reduce the information, in accordance with the standard errors.
     """
     parameters = [p for p in fit.structure.parameters if p.name in result.free]
     values = np.array([result.values[p.name] for p in parameters])
     scales = np.array([abs(characteristic_value(p.dimension, fit.scales)) for p in parameters])
-    # A number that may have either sign, an offset, is not known better for being large.
+    # The relative error of a parameter that may have either sign (an offset) would depend on its value.
     may_vanish = np.array([p.lower < 0.0 for p in parameters])
     sizes = np.where((np.abs(values) < scales) & may_vanish | (values == 0.0), scales, values)
     names = tuple(p.name for p in parameters)
@@ -85,7 +85,7 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
 
 
 def answers_to_states(fit: GreyBoxFit, result: FitResult) -> list[Floats]:
-    """Return how the weighted readings of each record answer to its initial states and free offsets, where a fit ended.
+    """Return the derivatives of each record's weighted readings by its initial states and free offsets, at the end of a fit.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def answers_to_states(fit: GreyBoxFit, result: FitResult) -> list[Floats]:
 
 
 class _Model:
-    """Outputs of a fitted model as functions of its parameters, without what initial states could follow."""
+    """Outputs of a fitted model as functions of its parameters, with the initial states projected out."""
 
     def __init__(self, fit: GreyBoxFit, result: FitResult, names: Sequence[str]) -> None:
         self._fit, self._result = fit, result
@@ -144,9 +144,9 @@ def place_of_fit(
 
 
 def central_sensitivities(problem: Problem, theta: Floats) -> list[tuple[Floats, Floats]]:
-    """Return residuals and derivatives per record; where they are differences, central ones.
+    """Return residuals and derivatives per record; if the derivatives are differences, central ones.
 
-    One-sided differences err by their step times the curvature: where nothing moves, that looks like information.
+    The error of one-sided differences is their step times the curvature, which looks like information where there is none.
     """
     forward = problem.sensitivities(theta)
     if carries_tangents(problem.data.structure):
@@ -163,12 +163,12 @@ def _triangle(rows: Floats) -> Floats:
 
 
 def _coloring(root: Floats, result: FitResult, names: Sequence[str], sizes: Floats) -> float:
-    """Return how much larger standard errors are than white residuals would make them, in the middle of the parameters."""
+    """Return the ratio of the standard errors to those for white residuals, as the median over the parameters."""
     left, singular, right = np.linalg.svd(root, full_matrices=False)
     del left
     known = singular > 1e-6 * singular[:1]
     white = np.sqrt(np.sum((right[known] / singular[known, None]) ** 2, axis=0))
     told = np.array([result.standard_errors[name] for name in names]) / np.abs(sizes)
-    # Only where a parameter takes no part in what is unseen do the two measure the same.
+    # The two are comparable only for parameters without a component in an undetermined direction.
     seen = np.all(np.abs(right[~known]) < 1e-3, axis=0) & np.isfinite(told) & (told > 0.0) & (white > 0.0)
     return max(float(np.median(told[seen] / white[seen])), 1.0) if np.any(seen) else 1.0

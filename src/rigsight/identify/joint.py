@@ -1,4 +1,4 @@
-"""Do sweeps and steps share one parameter set? One fit of all records beside fits of each kind alone."""
+"""Do sweeps and steps share one parameter set? One fit of all records, compared with fits of each kind alone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rigsight.simulate import Structure
 _NOISE_ROUNDS = 3
 _SETTLED = 0.02
 _DIFFERENT = 0.01
-"""Probability of such a difference by chance, below which two parameter sets count as different."""
+"""Probability of a difference by chance, below which two parameter sets count as different."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class RecordResidual:
 
 @dataclass(frozen=True)
 class KindFit:
-    """The fit of one kind of records, and how it does on all.
+    """The fit of one kind of records, and its errors on all records.
 
     Attributes
     ----------
@@ -54,9 +54,9 @@ class KindFit:
     fit
         Fit of the records of this kind alone.
     residuals
-        Of every record, also those that were not fitted (only their initial state is).
+        Errors on every record; for the records of other kinds only the initial states are fitted.
     shift
-        By parameter: this kind's value less the joint one's, in standard errors of this kind's; NaN where it is undetermined.
+        By parameter: this kind's value minus the joint one, in standard errors of this kind's; NaN if it is undetermined.
     """
 
     kind: str
@@ -80,7 +80,7 @@ class JointFit:
     kinds
         The fits of each kind alone.
     probability
-        Chance of parameter differences between the kinds as large as found, if one set serves all (chi-squared).
+        Probability of such differences between the kinds by chance, if one set fits all (chi-squared).
     statement
         The answer in words.
     """
@@ -119,16 +119,15 @@ def fit_jointly(
     constants
         The rig's constants by name.
     known
-        Parameters that keep their value.
+        Parameters that are held at their value.
     start
-        Start values, required for parameters of effects; those of the rig are found from the spectra where missing.
+        Start values, required for parameters of effects; missing ones of the rig are estimated from the spectra.
     output_noise
         Standard deviation of the residuals of each output. Default: estimated from the joint fit's own residuals, repeatedly.
     max_evaluations
         Limit of each fit.
     group_of
-        Name of the group that a record is compared in, where it is not its kind; one group alone is allowed then, and leaves
-        nothing to compare.
+        Name of the group in which a record is compared, instead of its kind; a single group is then allowed, without comparison.
 
     Raises
     ------
@@ -196,7 +195,7 @@ def _check_kinds(records: Sequence[Record], kinds: Sequence[str]) -> None:
 
 
 def _check_moves(structure: Structure, records: Sequence[Record]) -> None:
-    # What decays moves without an input; what does not move at all was left out by the reader.
+    # A free decay moves without an input; records without any motion were left out by the reader.
     for record, source in ((record, name) for record in records for name in structure.rig.moving_inputs):
         if np.ptp(record[source]) <= 1e-12 * np.max(np.abs(record[source])):
             raise InputError(
@@ -246,9 +245,9 @@ def _shift(alone: FitResult, joint: FitResult) -> dict[str, float]:
 
 
 def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
-    """Test that all kinds have one set: deviations from the weighted mean; records of different kinds are independent.
+    """Test whether all kinds have one set, by deviations from the weighted mean; records of different kinds are independent.
 
-    Parameters that one of the kinds leaves undetermined (alone or by a direction shared with others) do not take part.
+    Parameters that are undetermined for one of the kinds (alone or in combination with others) are not included.
     """
     free = kinds[0].fit.free
     usable = [

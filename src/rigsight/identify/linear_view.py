@@ -23,10 +23,10 @@ from rigsight.simulate.linearization import Linearization, linearize
 Floats = NDArray[np.float64]
 
 _STEP = 1e-4
-"""Relative change of a parameter for a difference: rounding and curvature both leave 1e-8 of it."""
+"""Relative change of a parameter for a difference: rounding and curvature both contribute an error of 1e-8."""
 _ROUNDING = 1e-9
 _IMAGES = 50
-"""Multiples of the sampling frequency that are looked at: of a response that falls as 1/f the rest is 1 % of what they add."""
+"""Number of multiples of the sampling frequency: for a response that falls as 1/f, the rest is 1 % of their contribution."""
 _POLES = {"local_rational": 2, "local_polynomial": 0}
 
 
@@ -37,9 +37,9 @@ class Mode:
     Attributes
     ----------
     pole
-        The one above the real axis [1/s].
+        The pole, of a pair that with positive imaginary part [1/s].
     natural_frequency, damping_ratio
-        Its size [rad/s], and its damping ratio; NaN where it lies at zero.
+        Its size [rad/s], and its damping ratio; NaN for a pole at zero.
     frequency_std, damping_std
         Their standard errors.
     """
@@ -53,24 +53,24 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class LinearView:
-    """A fitted rig close to its rest, for records with the same constants.
+    """A fitted rig linearized at equilibrium, for records with the same constants.
 
     Attributes
     ----------
     constants
-        Those that these records have of their own.
+        The records' own constants.
     records
         Names of the records.
     linearization
-        About the place where the rig rests under the mean inputs of these records.
+        About the equilibrium under the mean inputs of these records.
     modes
-        Its poles by their size, with what the records say of them.
+        Its poles by their size, with standard errors.
     measured
-        Frequency responses of these records together; None where no input moves.
+        Frequency responses of these records together; None if no input moves.
     model
-        By (source, response) the linearized response at the measured frequencies with its standard error, shape (n,) each.
+        The linearized response at the measured frequencies with its standard error, shape (n,) each, by (source, response).
     images
-        By (source, response) what a held input adds to the measured response, shape (n,); not there for a prescribed motion.
+        Contribution of a held input to the measured response, shape (n,), by (source, response); none for a prescribed motion.
     """
 
     constants: dict[str, float]
@@ -82,23 +82,23 @@ class LinearView:
     images: Mapping[tuple[str, str], NDArray[np.complex128]]
 
     def misfit(self, source: str, response: str) -> float:
-        """Return how far the model is from the measured response, in units of what noise explains; 1 where that is all.
+        """Return the difference between model and measured response relative to the noise; 1 if noise explains it.
 
-        By the median over frequencies: some values at the ends of a band are always wild.
+        This is the median over frequencies, because values at the ends of a band may be far off.
         """
         assert self.measured is not None
         curve, (values, std) = self.measured.found[source, response], self.model[source, response]
         assert curve.variance is not None
         expected = values + self.images.get((source, response), 0.0)
         relative = np.abs(curve.values - expected) ** 2 / (curve.variance + std**2)
-        # A squared complex error has an exponential law.
+        # A squared complex error has an exponential distribution.
         return float(np.sqrt(np.median(relative) / np.log(2.0)))
 
 
 def measured_responses(
     records: Sequence[Record], rig: Rig, method: Method, resolution: float | None
 ) -> ResponsesOfInputs | None:
-    """Return the frequency responses of all sensors to all inputs, None where no input moves.
+    """Return the frequency responses of all sensors to all inputs, None if no input moves.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def measured_responses(
     method
         A local method.
     resolution
-        Width of a local band [rad/s]; None takes what each record gives.
+        Width of a local band [rad/s]; None takes the narrowest for each record.
     """
     if all(is_constant(record[signal.name]) for record in records for signal in rig.inputs):
         return None
@@ -124,7 +124,7 @@ def measured_responses(
 
 
 def by_constants(records: Sequence[Record]) -> list[list[Record]]:
-    """Return records in groups that have the same constants of their own."""
+    """Return records in groups with the same own constants."""
     groups: dict[tuple[tuple[str, float], ...], list[Record]] = {}
     for record in records:
         groups.setdefault(tuple(sorted(record.constants.items())), []).append(record)
@@ -132,9 +132,9 @@ def by_constants(records: Sequence[Record]) -> list[list[Record]]:
 
 
 def near_rest(structure: Structure, values: Mapping[str, float], records: Sequence[Record]) -> Linearization:
-    """Return the linearization about the equilibrium under the mean inputs next to the mean of what sensors show.
+    """Return the linearization about the equilibrium under the mean inputs that is closest to the mean sensor readings.
 
-    Where records lie next to different ones it is that to which the rig comes back best: it stays at no other by itself.
+    If the records are close to different equilibria, the most stable one is used, because a rig stays only at a stable one.
 
     Parameters
     ----------
@@ -143,12 +143,12 @@ def near_rest(structure: Structure, values: Mapping[str, float], records: Sequen
     values
         Value of every parameter.
     records
-        Where the rig was.
+        The records.
 
     Raises
     ------
     SimulationError
-        If the equations have no slope there.
+        If the equations have no derivative there.
     """
     inputs = {
         signal.name: _mean([record[signal.name] for record in records]) for signal in structure.rig.inputs
@@ -170,7 +170,7 @@ def linear_view(
     measured: ResponsesOfInputs | None,
     known: Information,
 ) -> LinearView:
-    """Return a fitted rig close to where it rests in some records.
+    """Return a fitted rig, linearized at its equilibrium in some records.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def linear_view(
     Raises
     ------
     SimulationError
-        If the equations have no slope there.
+        If the equations have no derivative there.
     """
     constants = dict(records[0].constants)
     found = near_rest(structure, {**values, **constants}, records)
@@ -224,18 +224,18 @@ def linear_view(
 
 
 def _smooth(rig: Rig) -> set[str]:
-    """Return the inputs that go on between their samples without content above Nyquist: a prescribed motion was measured."""
+    """Return the inputs without content above the Nyquist frequency: prescribed motions, because they were measured."""
     return {str(coordinate.prescribed_by) for coordinate in rig.mechanism.prescribed}
 
 
 def images_of_held_input(
     linear: Linearization, omega: Floats, records: Sequence[Record]
 ) -> NDArray[np.complex128]:
-    """Return what a held input adds to measured responses from around the multiples of the sampling frequency.
+    """Return the contribution of a held input to measured responses from around the multiples of the sampling frequency.
 
-    The steps or lines of a hold have a spectrum there, and samples of a response that falls off slowly, such as a pressure's or a
-    speed's, show it at low frequencies (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, Prentice Hall 1997).
-    Zero where the records differ in sample time or hold, or the input has no content there.
+    The steps or lines of a hold have a spectrum there. In samples of a response that falls off slowly, such as that of a pressure
+    or a speed, it appears at low frequencies (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, Prentice Hall 1997).
+    Zero if the records differ in sample time or hold, or the input has no content there.
 
     Returns
     -------
@@ -254,7 +254,7 @@ def images_of_held_input(
 
 
 def _mean(samples: Sequence[Floats]) -> float:
-    """Return the mean of an input, zero where it is no more than rounding leaves of an excitation."""
+    """Return the mean of an input, zero if it is only rounding error of an excitation."""
     mean = float(np.mean([np.mean(own) for own in samples]))
     return mean if abs(mean) > _ROUNDING * max(float(np.max(np.abs(own))) for own in samples) else 0.0
 
@@ -269,7 +269,7 @@ class _Change:
 
 
 def _neighbors(known: Information, at: Callable[[Mapping[str, float]], Linearization]) -> Iterator[_Change]:
-    """Yield a change for each direction of which something is known; along the others nothing that was measured moves."""
+    """Yield a change for each determined direction; along the others the measured outputs do not change."""
     _, singular, right = np.linalg.svd(known.root, full_matrices=False)
     for size, direction in zip(singular, right, strict=True):
         if size * POORLY_KNOWN <= 1.0:

@@ -1,4 +1,4 @@
-"""The amplitude of a record that states none."""
+"""The amplitude of a record for which none is given."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from rigsight.rigs import Rig
 def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
     """Return the amplitude of a record in the unit of a signal, and that signal.
 
-    That is the height of a step, or half the range of another input, of several inputs the first that moves; of a free motion
-    half the range of the first output that was recorded.
+    This is the height of a step, or half the range of another input (the first that moves of several); for a free motion, half
+    the range of the first recorded output.
 
     Parameters
     ----------
     record
         A record.
     rig
-        The rig whose signals it holds.
+        The rig whose signals it contains.
 
     Returns
     -------
@@ -30,6 +30,6 @@ def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
     outputs = [signal.name for signal in rig.outputs if signal.name in record]
     moving = [name for name in inputs if not is_constant(record[name])]
     name = (moving or outputs or inputs)[0]
-    # Not the deviation from mean or median: a sweep that begins slowly has both off zero.
+    # Not the deviation from mean or median, which are not zero for a sweep that begins slowly.
     spanned = float(np.ptp(record[name]))
     return (spanned if moving and record.kind == "step" else 0.5 * spanned), name

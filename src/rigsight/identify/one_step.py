@@ -23,11 +23,11 @@ from rigsight.identify.information import central_sensitivities, place_of_fit
 Floats = NDArray[np.float64]
 
 _FOLLOWED = 1e-9
-"""Share of the strongest direction below which initial states move nothing."""
+"""Share of the strongest direction below which a combination of initial states has no influence."""
 
 
 class OneStep:
-    """Gauss-Newton steps from where a fit ended, each record's initial state and offsets free as in the fit.
+    """Gauss-Newton steps from the end of a fit, with each record's initial state and offsets free as in the fit.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class OneStep:
     Raises
     ------
     SimulationError
-        If the derivatives of the readings leave the range of numbers.
+        If the derivatives of the readings overflow.
     """
 
     def __init__(self, fit: GreyBoxFit, result: FitResult) -> None:
@@ -61,7 +61,7 @@ class OneStep:
         self._inverse = np.where(np.isfinite(inverse), inverse, 0.0)
 
     def gradients(self, changes: Sequence[Floats]) -> Floats:
-        """Return the projections of changes of the records on the derivatives of the fit, of which `covariance` makes steps.
+        """Return the projections of changes of the records on the derivatives of the fit, as needed by `covariance`.
 
         Parameters
         ----------
@@ -77,8 +77,8 @@ class OneStep:
     def covariance(self, gradients: Floats) -> Floats:
         """Return the mean product of the steps that changes of the records would cause, as a covariance.
 
-        Steps are taken about the estimate and not about their mean: a mean other than zero is a bias of the estimate, and an
-        error bar that left it out would not reach the truth.
+        Steps are taken about the estimate and not about their mean: a mean other than zero is a bias of the estimate, which the
+        standard error must include.
 
         Parameters
         ----------
@@ -87,14 +87,14 @@ class OneStep:
 
         Returns
         -------
-        Shape (n_free, n_free), in units of the parameters, infinite where the records do not determine one.
+        Shape (n_free, n_free), in units of the parameters, infinite for a parameter that the records do not determine.
         """
         filling = gradients @ gradients.T / gradients.shape[1]
         found = sandwich_covariance(self._bread, filling, self._error)
         return propagated_covariance(found, self._chain)
 
     def left(self, changes: Sequence[Floats]) -> list[Floats]:
-        """Return such changes after the step, in units of the noise, shape as given; 0 where not measured."""
+        """Return the changes that remain after the step, in units of the noise, shape as given; 0 for unmeasured outputs."""
         stacked = self._stacked(changes)
         steps = self._inverse @ self._gradients(stacked)
         found = []
@@ -126,7 +126,7 @@ class OneStep:
 
 
 def _basis(columns: Floats) -> Floats:
-    """Return an orthonormal basis of what columns span, shape (n, rank)."""
+    """Return an orthonormal basis of the span of the columns, shape (n, rank)."""
     size = np.linalg.norm(columns, axis=0)
     left, singular, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
     return np.asarray(left[:, singular > _FOLLOWED * np.max(singular, initial=0.0)])

@@ -1,4 +1,4 @@
-"""Results of a single estimation record: transfer functions, physical parameters, offsets, and what it does not determine."""
+"""Results of a single estimation record: transfer functions, physical parameters, offsets, and undetermined parameters."""
 
 from __future__ import annotations
 
@@ -32,31 +32,31 @@ from rigsight.records.reference import instrument_of
 from rigsight.rigs import Rig, evaluated
 
 _SURE = 0.1
-"""Relative standard error of a line from which it is no evidence of a peak."""
+"""Relative standard error above which a line is no evidence of a peak."""
 _PEAK = 1.1
 """Height over the lowest lines from which a largest magnitude counts as a resonance."""
 _LOWEST = 10
 MISFIT = 3.0
-"""Residuals in units of the noise from which the order of a model is too low."""
+"""Residuals in units of the noise above which the order of a model is too low."""
 _LONGEST_DELAY = 0.5 * math.pi
-"""Phase by which a dead time may turn the largest magnitude [rad]."""
+"""Largest phase shift by a dead time at the largest magnitude [rad]."""
 _TURNED = -0.5
-"""Correlation of fitted and measured values below which the sign of one signal is turned."""
+"""Correlation of fitted and measured values below which the sign of one signal is reversed."""
 _WELL_BELOW = 0.5
-"""Share of the break frequency up to which a response follows its source: there a late drive turns the phase little."""
+"""Share of the break frequency up to which a response follows its source, so that a delay changes the phase little."""
 _SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))
 
 
 @dataclass(frozen=True)
 class EstimationOptions:
-    """How records are to be read.
+    """Settings of the identification of records.
 
     Attributes
     ----------
     method
         Estimator of the frequency responses.
     resolution
-        Width asked for [rad/s]; None takes what each record gives.
+        Requested width [rad/s]; None takes the default of each record.
     """
 
     method: Method = "local_rational"
@@ -66,25 +66,26 @@ class EstimationOptions:
 def identify_record(
     record: Record, rig: Rig, constants: Mapping[str, float], has_stiffness: bool, options: EstimationOptions
 ) -> RecordIdentification:
-    """Identify what one record shows.
+    """Identify the rig from one record.
 
     Parameters
     ----------
     record
         An estimation record.
     rig
-        Its rig. The parameters of an element follow from its motion over time, so only its dynamic stiffness is found here.
+        Its rig. The parameters of an element follow from its motion in the time domain; only its dynamic stiffness is estimated
+        here.
     constants
         The rig's constants by name.
     has_stiffness
-        False for an axis without a spring: it is identified from its velocity.
+        False for an axis without a spring, which is identified from its velocity.
     options
-        How to read it.
+        Settings.
 
     Raises
     ------
     InputError
-        If the record is too short for the resolution asked for. Whatever else a record cannot tell is told in the result.
+        If the record is too short for the requested resolution. All other problems are reported in the result.
     """
     amplitude = record.amplitude if record.amplitude is not None else measured_amplitude(record, rig)[0]
     if not rig.is_driven:
@@ -110,7 +111,7 @@ def identify_record(
 
 
 def _driven_forward(record: Record, gain: float) -> Record:
-    """Turn the input of an axis whose drive counts backward: transfer functions stand for positive gains."""
+    """Reverse the input of an axis with a negative drive gain, because transfer functions need positive gains."""
     return record if gain > 0.0 else record.with_signals(u=-record["u"])
 
 
@@ -168,7 +169,7 @@ def _lateral(
     if motion.measured is not None:
         # Where psi is below its noise, the noise would act as a source.
         band = (float(motion.measured.omega[0]), float(motion.measured.omega[-1]))
-    # psi is measured: it is smooth between its samples, whatever the current does.
+    # psi is measured, so it has no content above the Nyquist frequency, whatever the hold of the current.
     smooth: Hold = "band_limited"
     try:
         if record.kind == "step":
@@ -204,7 +205,7 @@ def _fit(
     response: FrequencyResponse, order: Order, seen: RecordResponse, options: EstimationOptions
 ) -> TransferFit:
     """Fit with standard errors that count independent values, not lines."""
-    # The thesis reads magnitudes only (section 4.4): its phases are rescaled.
+    # The thesis fits magnitudes only (section 4.4), because its phases are rescaled.
     by_magnitude = options.method == "thesis"
     fit = fit_frequency_response(response, order, magnitude_only=by_magnitude)
     factor = 1.0 if response.noise_shares is not None else seen.lines_per_value
@@ -221,10 +222,10 @@ def _fit(
 
 
 def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> TransferFit:
-    """Fit a form whose order is too low: every line may have the same relative error.
+    """Fit a form whose order is too low, with the same relative error assumed for every line.
 
-    With the variances of the noise alone, the few lines that happen to be most certain would decide, wherever they lie. A PT2 is
-    fitted to the magnitude, as in the thesis (section 4.4): what shifts the phase besides would be paid for with the peak.
+    With the variances of the noise alone, the few most certain lines would dominate, wherever they are. A PT2 is fitted to the
+    magnitude, as in the thesis (section 4.4), because other phase shifts would distort the peak.
     """
     assert response.variance is not None
     for share in _SHARES:
@@ -245,7 +246,7 @@ def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> Tr
 
 
 def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float]:
-    """Return the values of a fit, with a negative gain where the phases say that the response moves against the source."""
+    """Return the values of a fit, with a negative gain if the phases show that the response is opposite to the source."""
     slow = response.omega < _WELL_BELOW * fit.values["omega_b"]
     fitted, measured = fit.at(response.omega[slow]), response.values[slow]
     agreement = float(np.vdot(fitted, measured).real)
@@ -262,7 +263,7 @@ def _step_fit(record: Record, source: str, response: str, order: Order, has_stif
 
 
 def _from_rest(record: Record, motion: TransferFit | None) -> Record:
-    """Let psi begin where the fitted motion rests: the noise of one sample would count as a step of the source."""
+    """Set the first sample of psi to the rest position of the fit; its noise would count as a step of the source."""
     record = replace(record, hold="foh")
     if motion is None:
         return record
@@ -286,20 +287,20 @@ def _velocity(response: FrequencyResponse) -> FrequencyResponse:
 def _judged(
     path: PathIdentification, fit: TransferFit, physical: Callable[[TransferFit], PhysicalEstimates]
 ) -> PathIdentification:
-    """Keep a fit that can be used; of one that cannot, only the reason."""
+    """Return the path with the fit if it can be used, otherwise with the reason why not."""
     of_velocity = fit.response != path.response
     if not fit.success and not of_velocity:
         return replace(path, problem=fit.message)
     gain = fit.values["gain"]
     if not of_velocity and not fit.standard_errors["gain"] < POORLY_KNOWN * abs(gain):
-        # Its sign would wrongly be attributed to a sensor.
+        # A wrong sign would be attributed to a sensor.
         return replace(path, problem=_undetermined(["the gain"]))
-    # The break frequency of a velocity is often too low to be seen; mass and damping show in the slope all the same.
+    # The break frequency of a velocity is often below the band; mass and damping are then determined by the slope.
     found = physical(fit)
     errors = found.standard_errors
     poor = [name for name in found.names if not errors[name] < POORLY_KNOWN * abs(found.values[name])]
     if len(poor) > 1 or (poor and fit.form.order == "pt1"):
-        # A damping near zero alone is a result; the others are positive by nature.
+        # A damping near zero is a valid result; the other parameters must be positive.
         return replace(path, problem=_undetermined(poor))
     return replace(path, fit=fit, physical=found)
 
@@ -371,7 +372,7 @@ def _conicity(lateral: list[PathIdentification], constants: Mapping[str, float])
 
 
 def _resonance(motion: PathIdentification) -> float | None:
-    """Return where the measured magnitude is largest, if that is a peak."""
+    """Return the frequency at which the measured magnitude is largest, if that is a peak."""
     measured = motion.measured
     if measured is None:
         return None

@@ -18,12 +18,13 @@ from rigsight.simulate import Structure
 Floats = NDArray[np.float64]
 
 _CHANCE = 1e-3
-"""Probability of means as far apart by chance below which they are said to differ: with ten outputs one campaign in a hundred."""
+"""Probability by chance below which means count as different; with ten outputs this is wrong in one campaign in a hundred."""
 _WORTH_TELLING = 0.1
-"""Share of the residual, as power, above which differing means are the main error of a model."""
+"""Share of the residual's power above which differing means are reported as a main error of a model."""
 _LEAST_TOLD = 1e-6
 _NOTHING = 1e-6
-"""Share of what records say of a parameter that is rounding: squares of derivatives that are known to a thousandth of this."""
+"""Share of the information on a parameter that counts as rounding error: information contains squares of derivatives, which are
+accurate to a thousandth."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,9 @@ class DifferingMeans:
     means
         Record -> mean of measured minus simulated.
     share
-        Share of the residual, as power, that the means explain.
+        Share of the residual's power that the means explain.
     probability
-        Chance of means as far apart if the offset is the same everywhere.
+        Probability of such differences by chance if the offset is the same everywhere.
     """
 
     output: str
@@ -48,12 +49,12 @@ class DifferingMeans:
     probability: float
 
     def sentence(self, unit: str) -> str:
-        """Return what was found, in words.
+        """Return the finding in words.
 
         Parameters
         ----------
         unit
-            Of the output.
+            Unit of the output.
         """
         lowest, highest = (choose(self.means, key=self.means.__getitem__) for choose in (min, max))
         chance = f"{self.probability:.1g}" if self.probability > _LEAST_TOLD else f"below {_LEAST_TOLD:g}"
@@ -73,16 +74,16 @@ OFFSETS_MEND = (
 def differing_means(
     names: Sequence[str], records: Sequence[Record], residuals: Sequence[Floats], outputs: Sequence[str]
 ) -> list[DifferingMeans]:
-    """Return the outputs of which a model leaves other means in each record than chance makes.
+    """Return the outputs whose mean residuals differ between records more than by chance.
 
-    The variance of a mean comes from the lowest lines of the residual's own spectrum, so that slow disturbances count.
+    The variance of a mean comes from the lowest lines of the residual's own spectrum, so that slow disturbances are included.
 
     Parameters
     ----------
     names
-        What each record is called; those of one name are stretches of one record.
+        Name of each record; those with the same name are stretches of one record.
     records
-        What was fitted or scored.
+        The fitted or scored records.
     residuals
         Measured minus simulated per record, shape (n_samples, n_outputs).
     outputs
@@ -121,18 +122,18 @@ def _differing(output: str, residuals: Mapping[str, Floats]) -> DifferingMeans:
 
 
 def _variance_of_mean(left: Floats) -> float:
-    """Return the variance of the mean of a colored residual: its power per line close to zero frequency over its length."""
+    """Return the variance of the mean of a colored residual: its power per line near zero frequency, over its length."""
     lines = np.abs(np.fft.rfft(left - np.mean(left))[1 : SMOOTHED + 1]) ** 2
     return float(np.mean(lines)) / left.size**2
 
 
 def without_offsets(records: Sequence[Record], fit: FitResult) -> list[Record]:
-    """Return records from which the offsets that a fit found in each of them are taken away.
+    """Return records minus the offsets that a fit found in each of them.
 
     Parameters
     ----------
     records
-        What was fitted.
+        The fitted records.
     fit
         The result.
     """
@@ -152,20 +153,20 @@ def swallowed_by_offsets(
     values: Mapping[str, float],
     free: Sequence[str],
 ) -> tuple[str, ...]:
-    """Return the parameters of which records say nothing once the offsets of their sensors are free: a rest, a sensor's own zero.
+    """Return the parameters that free sensor offsets make undetermined: a rest position, or the zero of a sensor.
 
     Parameters
     ----------
     structure
         Rig and effects.
     records
-        What is fitted.
+        The records to fit.
     scales, noise
-        As of `GreyBoxFit`.
+        As for `GreyBoxFit`.
     values
         Value of every parameter.
     free
-        Those that are in question.
+        Names of the parameters to check.
     """
     if not any(record.free_offsets for record in records):
         return ()

@@ -1,4 +1,4 @@
-"""The equations of a rig without effects in numbers: rates, readings and forces as functions of arrays."""
+"""The equations of a rig without effects as numerical functions: rates, readings and forces for arrays."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from rigsight.simulate.structure import TIME, input_symbols
 Floats = NDArray[np.float64]
 
 _KEPT = 32
-"""Rigs whose functions are kept: to write them down takes a tenth of a second, and every fit asks for them."""
+"""Number of rigs whose functions are cached: generating them takes a tenth of a second, and every fit needs them."""
 FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
-"""What numpy calls otherwise than effects and rigs do."""
+"""Functions in the equations of effects and rigs that numpy does not have under these names."""
 _known: OrderedDict[int, tuple[Rig, RigEquations]] = OrderedDict()
 
 
 def equations_of(rig: Rig) -> RigEquations:
-    """Return the equations of a rig as functions; those of the same rig are the same object."""
+    """Return the equations of a rig as functions; repeated calls return the same object."""
     found = _known.get(id(rig))
     if found is None:
         found = _known[id(rig)] = (rig, RigEquations(rig))
@@ -45,7 +45,7 @@ class RigEquations:
     """The equations of a rig without effects.
 
     All functions take the states ``z`` of shape (n_states, n_samples), the inputs ``u`` of shape (3 n_inputs, n_samples) (each
-    with its first and second derivative by time) and the parameter vector ``p`` of `structure`, shape (n_parameters,).
+    with its first and second time derivative) and the parameter vector ``p`` of `structure`, shape (n_parameters,).
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class RigEquations:
     Attributes
     ----------
     structure
-        The rig with a sensor for each of its states behind its own, so that one simulation shows them all.
+        The rig with an additional sensor for each of its states, so that one simulation returns all of them.
     n_coordinates
         Degrees of freedom; coordinates come first among the states, then their rates, then the rig's own states.
     """
@@ -74,18 +74,18 @@ class RigEquations:
 
     @property
     def n_states(self) -> int:
-        """Coordinates, rates and own states."""
+        """Number of coordinates, rates and own states."""
         return len(self.structure.states)
 
     def parameters(self, values: Mapping[str, float], record: Record) -> Floats:
-        """Return the parameter vector of values by name with the record's own constants; a missing one has its default."""
+        """Return the parameter vector from values by name, with the record's own constants and defaults for missing values."""
         return parameter_vector(self.structure, record_values(self.structure, values, record))
 
     def shows_all_states(self, measured: set[str]) -> bool:
-        """Return True if these sensors alone give all coordinates and own states, whatever the parameters are."""
+        """Return True if these sensors alone give all coordinates and own states, independent of the parameters."""
         coordinates = [c.symbol for c in self.rig.mechanism.free]
         own = [state.symbol for state in self.rig.mechanism.states]
-        # Rates follow from the slopes of readings, and those of own states depend on the parameters.
+        # Rates of coordinates follow from the slopes of readings; those of own states depend on the parameters.
         return self._show(measured, coordinates) and self._show(measured, [*coordinates, *own])
 
     def _show(self, measured: set[str], wanted: Sequence[sp.Symbol]) -> bool:
@@ -99,7 +99,7 @@ class RigEquations:
 
     @cached_property
     def of_own_states(self) -> frozenset[str]:
-        """Sensors that read a state besides the motion: its rate depends on the parameters."""
+        """Sensors that read a state other than the motion, whose rate depends on the parameters."""
         own = {state.symbol for state in self.rig.mechanism.states}
         return frozenset(s.name for s in self.rig.mechanism.sensors if s.reads.free_symbols & own)
 
@@ -125,17 +125,17 @@ class RigEquations:
         return np.moveaxis(self._evaluated(self._mass, z, u, p).reshape(n, n, z.shape[1]), 2, 0)
 
     def rates(self, z: Floats, u: Floats, p: Floats) -> Floats:
-        """Return the derivatives of the states by time, shape (n_states, n_samples)."""
+        """Return the time derivatives of the states, shape (n_states, n_samples)."""
         n = self.n_coordinates
         own = self._evaluated(self._own_rates, z, u, p)
         return np.concatenate([z[n : 2 * n], self.accelerations(z, u, p), own])
 
     def readings(self, z: Floats, u: Floats, p: Floats) -> Floats:
-        """Return what the rig's sensors show, shape (n_sensors, n_samples)."""
+        """Return the readings of the rig's sensors, shape (n_sensors, n_samples)."""
         return self._evaluated(self._readings, z, u, p)
 
     def reading_slopes(self, z: Floats, u: Floats, p: Floats) -> Floats:
-        """Return the derivatives of what the sensors show by time, shape (n_sensors, n_samples)."""
+        """Return the time derivatives of the readings, shape (n_sensors, n_samples)."""
         n_sensors = len(self.sensor_names)
         by_state = self._evaluated(self._by_state, z, u, p).reshape(n_sensors, self.n_states, z.shape[1])
         by_input = self._evaluated(self._by_input, z, u, p).reshape(n_sensors, u.shape[0], z.shape[1])
@@ -143,7 +143,7 @@ class RigEquations:
         return np.asarray(own + np.einsum("ijk,jk->ik", by_input, _input_rates(u)))
 
     def readings_by_state(self, z: Floats, u: Floats, p: Floats) -> Floats:
-        """Return the derivatives of what the sensors show by the states, shape (n_sensors, n_states, n_samples)."""
+        """Return the derivatives of the readings by the states, shape (n_sensors, n_states, n_samples)."""
         return self._evaluated(self._by_state, z, u, p).reshape(
             len(self.sensor_names), self.n_states, z.shape[1]
         )
@@ -151,14 +151,14 @@ class RigEquations:
     def at_places(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
         """Return motion and forces of joints and drives, shape (n_samples,) each.
 
-        ``motion@J`` (from rest), ``rate@J``, ``spring@J``, ``damper@J``, ``own@J`` (what else resists) of a joint, ``signal@D``
-        and ``force@D`` of a drive.
+        ``motion@J`` (from rest), ``rate@J``, ``spring@J``, ``damper@J``, ``own@J`` (other resisting forces) of a joint,
+        ``signal@D`` and ``force@D`` of a drive.
         """
         rows = self._evaluated(self._of_places[1], z, u, p)
         return dict(zip(self._of_places[0], rows, strict=True))
 
     def slopes_along(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
-        """Return how the motion of each joint, and what each drive acts along, changes with the degrees of freedom.
+        """Return the derivatives of the motion of each joint and of each drive by the degrees of freedom.
 
         Shape (n_coordinates, n_samples) each.
         """
@@ -171,7 +171,7 @@ class RigEquations:
     def changes_of_equations(
         self, z: Floats, u: Floats, p: Floats, accelerations: Floats
     ) -> tuple[Floats, Floats]:
-        """Return how large each equation's parts are, and how each parameter changes it.
+        """Return the size of the largest part of each equation, and the derivatives of the equations by the parameters.
 
         The equations are those of motion (as forces), of the own states (as rates) and of the sensors.
 
@@ -196,13 +196,13 @@ class RigEquations:
 
     @cached_property
     def arguments(self) -> list[sp.Symbol]:
-        """Symbols of states, inputs with their derivatives, time and parameters, in the order in which functions take them."""
+        """Symbols of states, inputs with their derivatives, time and parameters, in the order of the functions' arguments."""
         inputs = [s for i in range(len(self.rig.inputs)) for s in input_symbols(i)]
         return [*self.structure.states, *inputs, TIME, *self.structure.parameter_symbols]
 
     @cached_property
     def momenta_and_forces(self) -> tuple[list[sp.Expr], list[sp.Expr]]:
-        """``d/dt momentum = force`` of each coordinate, and of each own state the state itself and its rate."""
+        """Momentum and force (``d/dt momentum = force``) of each coordinate; for each own state, the state and its rate."""
         mechanism = self.rig.mechanism
         momenta, of_bodies = mechanism.momenta_and_forces
         applied = []
@@ -227,7 +227,7 @@ class RigEquations:
 
     @property
     def mass_entries(self) -> list[sp.Expr]:
-        """The mass matrix row by row; of a large one the symbols of `Structure.steps`."""
+        """The mass matrix row by row; for a large rig the symbols of `Structure.steps`."""
         tree, elimination = self.structure.tree, self.structure.elimination
         if elimination is not None:
             return elimination.entries
@@ -235,7 +235,7 @@ class RigEquations:
 
     @property
     def forces(self) -> list[sp.Expr]:
-        """The generalized forces; of a large rig the symbols of `Structure.steps`."""
+        """The generalized forces; for a large rig the symbols of `Structure.steps`."""
         tree, elimination = self.structure.tree, self.structure.elimination
         if elimination is not None:
             return list(elimination.loads)
@@ -253,13 +253,13 @@ class RigEquations:
         Parameters
         ----------
         expressions
-            Of arguments, further symbols, and symbols of `Structure.steps`.
+            Expressions in arguments, further symbols, and symbols of `Structure.steps`.
         by
-            The symbols by which derivatives are taken.
+            The symbols with respect to which derivatives are taken.
         further
-            Arguments behind `arguments`.
+            Arguments after `arguments`.
         beside
-            Expressions whose values come before the derivatives.
+            Expressions whose values are returned before the derivatives.
         """
         elimination = self.structure.elimination
         if elimination is None:
@@ -343,7 +343,7 @@ class RigEquations:
             sums = [sp.Add(*own) for own in parts[:n]]
         sums += [sp.Add(*own) for own in others]
         slopes = self.slopes(sums, self.structure.parameter_symbols, accelerations)
-        # One part of them may be lacking: an equation of motion without any force.
+        # An equation of motion may have no force at all.
         parts = [own or [sp.S.Zero] for own in parts]
         ends = list(np.cumsum([len(own) for own in parts]))
         together = self._function([part for own in parts for part in own], *accelerations)
@@ -362,13 +362,13 @@ def _of_joint(joint: Joint, rig: Rig) -> dict[str, sp.Expr]:
 
 
 def _resisting(joint: Joint, rig: Rig) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """Return what resists the motion of a joint: spring, damper, and its own force."""
+    """Return the forces that resist the motion of a joint: spring, damper, and its own force."""
     spring = joint.stiffness * (joint.motion - joint.rest)
     return spring, joint.damping * rig.mechanism.rate(joint.motion), joint.force
 
 
 def rows_of(values: Any, n_samples: int) -> Floats:
-    """Return what a function of arrays gives, shape (n_rows, n_samples); a part of it may be constant."""
+    """Return the results of a function of arrays, shape (n_rows, n_samples); some of them may be constant."""
     found = np.empty((len(values), n_samples))
     for row, value in zip(found, values, strict=True):
         row[:] = value
@@ -376,7 +376,7 @@ def rows_of(values: Any, n_samples: int) -> Floats:
 
 
 def _input_rates(u: Floats) -> Floats:
-    """Return the derivatives of inputs by time; that of the second derivative is unknown."""
+    """Return the time derivatives of inputs and their derivatives; zero for the third derivative, which is unknown."""
     rates = np.zeros_like(u)
     rates[0::3], rates[1::3] = u[1::3], u[2::3]
     return rates

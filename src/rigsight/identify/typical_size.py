@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 _MOST = 98.0
 _STILL = 1e-12
-"""Range of a signal relative to its size that is rounding."""
+"""Range of a signal relative to its size that counts as rounding error."""
 
 
 def typical_size(signals: Sequence[NDArray[np.float64]]) -> float:
-    """Return what all but the rarest deviations from the middle stay below; never zero.
+    """Return the 98th percentile of the deviations from the median; never zero.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def typical_size(signals: Sequence[NDArray[np.float64]]) -> float:
 
 
 def size_about_zero(signals: Sequence[NDArray[np.float64]]) -> float:
-    """Return what all but the rarest values stay below; zero for a signal that is.
+    """Return the 98th percentile of the magnitudes; zero for a signal that is zero.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def size_about_zero(signals: Sequence[NDArray[np.float64]]) -> float:
 
 
 def size_of_signal(signals: Sequence[NDArray[np.float64]]) -> float:
-    """Return the typical size of deviations from the middle, of what is constant its distance from zero; zero if it is zero.
+    """Return the typical size of deviations from the median, or the magnitude of a constant signal (which may be zero).
 
     Parameters
     ----------

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 POORLY_KNOWN = 0.5
-"""Relative standard error from which a parameter is not determined: its 95 % interval holds zero, or twice the value."""
+"""Relative standard error from which a parameter is not determined: its 95 % interval reaches zero, or twice the value."""
 TAKES_PART = 0.05
-"""Share of the largest change, or influence, from which a parameter takes part in a direction."""
+"""Share of the largest change, or influence, from which a parameter is a member of a direction."""
 ROUNDING = 1e-9
-"""Entry of a unit direction below which it is rounding."""
+"""Entry of a unit direction below which it is rounding error."""
 
 
 def marginal_errors(root: Floats) -> Floats:
@@ -32,7 +32,7 @@ def conditional_errors(root: Floats) -> Floats:
 
 
 def undetermined(root: Floats) -> Floats:
-    """Return an orthonormal basis of the directions of which less is known than of a poorly known parameter."""
+    """Return an orthonormal basis of the directions with a larger standard error than a poorly known parameter."""
     _, singular, right = np.linalg.svd(root, full_matrices=True)
     sizes = np.zeros(root.shape[1])
     sizes[: singular.size] = singular
@@ -40,9 +40,9 @@ def undetermined(root: Floats) -> Floats:
 
 
 def sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the direction with the fewest members among those of a reduced row echelon form, and the indices of these.
+    """Return the direction with the fewest members among those of a reduced row echelon form, and the members' indices.
 
-    A member changes much itself, or changes the outputs much: a small number takes a little of a large one with it.
+    A member has a large relative change itself, or a large influence on the outputs.
     """
     rows = (free * influence[:, None]).T
     for place in range(rows.shape[0]):

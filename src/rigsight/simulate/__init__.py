@@ -1,4 +1,4 @@
-"""Rig and effects -> compiled kernel -> outputs for a record's input."""
+"""Simulation: rig and effects -> compiled kernel -> outputs for a record's input."""
 
 from rigsight.libraries import cache_folder as cache_folder
 from rigsight.simulate.compiled.kernel import FittedRecord as FittedRecord

@@ -20,7 +20,7 @@ class Binder:
     rig
         The rig.
     symbols
-        Symbol of each parameter of the structure by its name there.
+        Symbol of each parameter of the structure, by its name in the structure.
     unique
         Name of each effect's parameter in the structure, by (effect, own name).
     fixed
@@ -53,7 +53,7 @@ class Binder:
         return expression.xreplace({s: self._own[s] for s in expression.free_symbols if s in self._own})
 
     def effect(self, effect: Effect, expression: sp.Expr, signals: Mapping[str, sp.Expr]) -> sp.Expr:
-        """Bind an expression of an effect; `signals` are what canonical symbols stand for, by name."""
+        """Bind an expression of an effect; `signals` are the expressions of the canonical symbols, by name."""
         states = {state.symbol for state in effect.states}
         replacement: dict[sp.Symbol, sp.Expr] = {canonical.t: TIME}
         for symbol in expression.free_symbols:
@@ -68,5 +68,5 @@ class Binder:
 
 
 def state_symbol(effect: Effect, symbol: sp.Symbol) -> sp.Symbol:
-    """Return the symbol of an effect's state within a structure; two effects may both call theirs z."""
+    """Return the symbol of an effect's state within a structure; two effects may use the same own name, such as z."""
     return sp.Symbol(f"{effect.name}.{symbol.name}", real=True)

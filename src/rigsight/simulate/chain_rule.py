@@ -1,6 +1,6 @@
 """Derivatives of long expressions from the derivatives of their parts.
 
-A derivative of a whole expression repeats its factors, and takes sympy longer than everything else. Those of the parts are short,
+The derivative of a whole expression repeats its factors, and takes most of sympy's time. The derivatives of the parts are short,
 and the chain rule combines them: A. Griewank and A. Walther, Evaluating Derivatives (2008), 3.1.
 """
 
@@ -15,14 +15,14 @@ from rigsight.simulate.straight_line import StraightLine, in_order, of_parts
 
 
 def slopes_of(line: StraightLine, by: Sequence[sp.Symbol]) -> StraightLine:
-    """Return the derivatives of expressions in parts, expression by expression, by each of some arguments.
+    """Return the derivatives of each expression, evaluated in parts, with respect to each of some arguments.
 
     Parameters
     ----------
     line
         The expressions.
     by
-        The arguments; the jump of a sign has no slope.
+        The arguments; the derivative of a sign is taken as zero.
     """
     own = {key: _own_slopes(expression, {*line.parts, *by}) for key, expression in line.parts.items()}
     shown = [_own_slopes(result, {*line.parts, *by}) for result in line.results]

@@ -1,4 +1,4 @@
-"""Composition of a rig and a tuple of effects to a structure."""
+"""Composition of a rig and a tuple of effects into a structure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def compose(
     offsets: Iterable[str] = (),
     observed: Iterable[str] = (),
 ) -> Structure:
-    """Put effects into a rig's equations.
+    """Insert effects into a rig's equations.
 
     Parameters
     ----------
@@ -35,10 +35,10 @@ def compose(
     fixed
         Values of effect parameters to write into the equations as numbers (an exponent of 1 saves a power).
     offsets
-        Names of sensors whose readings are shifted: each by a state behind all others that never changes.
+        Names of sensors whose readings are shifted, each by a constant state; these states come last.
     observed
-        Sensors of an observer, which pull the motion towards their measured readings. These are inputs behind those of the rig,
-        and its bandwidths are parameters behind all others, zero if they are not given.
+        Sensors of an observer, which corrects the motion towards their measured readings. The readings are inputs after those of
+        the rig; the bandwidths are parameters after all others, zero if they are not given.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def compose(
 
     Notes
     -----
-    A parameter name that occurs twice is qualified by its effect (``stribeck_friction.T_c`` beside Coulomb friction).
+    A parameter name that occurs twice is qualified by its effect (``stribeck_friction.T_c`` together with Coulomb friction).
     """
     chosen = tuple(sorted(effects, key=lambda e: (e.place.value, len(e.states), e.name)))
     return _compose(
@@ -65,14 +65,14 @@ def _in_order(rig: Rig, sensors: Iterable[str]) -> tuple[str, ...]:
 
 
 def structure_of_fit(structure: Structure, records: Iterable[Record]) -> Structure:
-    """Return the structure that is simulated while one is fitted to records; the same one for records without wishes.
+    """Return the structure that is simulated in a fit to records; the same one if no record has free offsets or an observer.
 
     Parameters
     ----------
     structure
         Rig and effects.
     records
-        Their free offsets and observers are added, see `compose`; those of sensors that the rig does not have are passed over.
+        Their free offsets and observers are added, see `compose`; those of sensors that the rig does not have are ignored.
     """
     offsets, observed = set[str](), set[str]()
     for record in records:
@@ -84,7 +84,7 @@ def structure_of_fit(structure: Structure, records: Iterable[Record]) -> Structu
 
 
 class _Key:
-    """Let declarations, which hold dictionaries and so cannot be hashed, be keys of a cache by identity."""
+    """A cache key by identity, because declarations contain dictionaries and cannot be hashed."""
 
     def __init__(self, value: Rig | tuple[Effect, ...]) -> None:
         self.value = value
@@ -191,7 +191,7 @@ def without_vanished_effects(
     structure
         The structure without them; the same object if none has vanished.
     values
-        Value of each of its parameters, by the names they have in it.
+        Value of each of its parameters, by its name in that structure.
     """
     known = {**dict(structure.fixed), **values}
 

@@ -1,4 +1,4 @@
-"""Does a restoring force bring the rig back to rest, or does it drift?"""
+"""Does a restoring force return the rig to a rest position, or does the rig drift?"""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from rigsight.simulate.structure import TIME, input_symbols
 
 _DRAWS = 3
 _SINGULAR = 1e-9
-"""Smallest singular value of the scaled stiffness, relative to its largest, that is rounding."""
+"""Singular value of the scaled stiffness, relative to the largest, below which it counts as zero."""
 
 
 def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
-    """Return True if a rig can rest at different places under the same force, and a sensor shows it.
+    """Return True if a rig can rest at different positions under the same force, and a sensor shows the difference.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
     still = {*motion.velocities, TIME, *(s for i in range(len(rig.inputs)) for s in input_symbols(i)[1:])}
     shown = list(structure.outputs)
     if structure.elimination is not None:
-        # Forces without what the rates bring about are short; the slopes of the others are not.
+        # Without velocities and input rates the forces are short; otherwise their slopes would be too long.
         zero = dict.fromkeys(still, sp.S.Zero)
         rates, shown = ([e.xreplace(zero) for e in own] for own in (rates, shown))
     slopes = sp.Matrix([*rates, *shown]).jacobian(states)

@@ -1,4 +1,4 @@
-"""Accelerations whose formulas are too long: numerical elimination in named steps.
+"""Accelerations whose formulas would be too long: numerical elimination in named steps.
 
 ``mass @ accelerations = loads`` is solved by ``mass = L D L'``, with ones on the diagonal of L. This needs no square root,
 because parameters tried during a fit may give an indefinite mass matrix.
@@ -19,12 +19,12 @@ from rigsight.effects.symbols import positive_part
 from rigsight.simulate.straight_line import StraightLine, straight_line
 
 _SHORT = 40
-"""Numbers, symbols and operations of a force that are not worth a search for what it shares with others."""
+"""Length of a force (its numbers, symbols and operations) up to which parts in common with other forces are not searched."""
 _KINKS = (sp.Abs, sp.sign, positive_part)
 
 
 def acceleration_symbols(count: int) -> tuple[sp.Symbol, ...]:
-    """Return the symbols of accelerations that are found by elimination."""
+    """Return the symbols of accelerations that are computed by elimination."""
     return tuple(_symbol("acceleration", i) for i in range(count))
 
 
@@ -45,7 +45,7 @@ class Elimination:
 
     @classmethod
     def of(cls, mass: sp.ImmutableMatrix) -> Elimination:
-        """Return the elimination of a mass matrix, which leaves out what is zero in it."""
+        """Return the elimination of a mass matrix, without its zero entries."""
         entries = [(i, j) for i in range(mass.rows) for j in range(i + 1) if mass[i, j] != 0]
         return cls({(i, j): _symbol("mass", i, j) for i, j in entries}, mass.rows)
 
@@ -60,44 +60,44 @@ class Elimination:
         return acceleration_symbols(self.size)
 
     def solution(self, name: str) -> tuple[sp.Symbol, ...]:
-        """Return the symbols of a solution that is called by a name."""
+        """Return the symbols of the solution with a given name."""
         return tuple(_symbol(name, i) for i in range(self.size))
 
     @property
     def entries(self) -> list[sp.Expr]:
-        """The mass matrix row by row, of symbols and zeros."""
+        """The mass matrix row by row, as symbols and zeros."""
         places = [(max(i, j), min(i, j)) for i in range(self.size) for j in range(self.size)]
         return [self.mass.get(place, sp.S.Zero) for place in places]
 
     @property
     def left(self) -> list[sp.Expr]:
-        """What of each load is left once masses are moved: zero in motion."""
+        """The load minus mass times acceleration of each row, which is zero in motion."""
         return [load - sp.Add(*(mass * a for mass, a in self.moved(i))) for i, load in enumerate(self.loads)]
 
     def moved(self, index: int) -> tuple[tuple[sp.Symbol, sp.Symbol], ...]:
-        """Return the masses in a row of the matrix, each with the acceleration that it is multiplied by."""
+        """Return the nonzero masses in a row of the matrix, each with the acceleration by which it is multiplied."""
         row = ((self.mass.get((max(index, j), min(index, j))), a) for j, a in enumerate(self.accelerations))
         return tuple((mass, a) for mass, a in row if mass is not None)
 
     @cached_property
     def steps(self) -> dict[sp.Symbol, sp.Expr]:
-        """Symbol -> what it is of masses, loads and symbols in front of it; the accelerations come last."""
+        """Symbol -> its expression in masses, loads and earlier symbols; the accelerations come last."""
         solved = self.solved(self.loads, "acceleration")
         return {**self._factors[1], **solved}
 
     def begun(self, steps: Mapping[sp.Symbol, sp.Expr]) -> dict[sp.Symbol, sp.Expr]:
-        """Return those of all steps to the accelerations that lead to masses and loads."""
+        """Return the first steps to the accelerations: those up to masses and loads."""
         return {symbol: step for symbol, step in steps.items() if symbol not in self.steps}
 
     def solved(self, loads: Sequence[sp.Expr], name: str) -> dict[sp.Symbol, sp.Expr]:
-        """Return the steps that solve the system for other loads, once the matrix is eliminated.
+        """Return the steps that solve the system for other loads, with the existing factors of the matrix.
 
         Parameters
         ----------
         loads
             The right side.
         name
-            What the solution is called, see `solution`.
+            Name of the solution, see `solution`.
         """
         (factors, _), n = self._factors, self.size
         found: dict[sp.Symbol, sp.Expr] = {}
@@ -136,21 +136,21 @@ class Elimination:
 def steps_to_accelerations(
     elimination: Elimination, masses: Sequence[sp.Expr], loads: Sequence[Sequence[sp.Expr]]
 ) -> dict[sp.Symbol, sp.Expr]:
-    """Return all steps to the accelerations, from what stands in the equations of motion.
+    """Return all steps to the accelerations, from the expressions in the equations of motion.
 
     Parameters
     ----------
     elimination
-        How the accelerations are found.
+        The elimination that gives the accelerations.
     masses
-        What is not zero of the mass matrix, as `Elimination.mass` has it.
+        Nonzero entries of the mass matrix, in the order of `Elimination.mass`.
     loads
         The parts of each generalized force.
 
     Returns
     -------
-    Symbol -> what it is, of states, inputs, parameters and symbols in front of it. No symbol stands in a kink, so that its sign
-    depends on nothing that is computed on the way.
+    Symbol -> its expression in states, inputs, parameters and earlier symbols. No kink contains such a symbol, so that its sign
+    does not depend on intermediate values.
     """
     long = [term for terms in loads for term in terms if _is_long(term)]
     shared = _shared(tuple(e for e in (*masses, *long) if not e.has(*_KINKS)))
@@ -172,10 +172,10 @@ def _is_long(term: sp.Expr) -> bool:
 
 @lru_cache(maxsize=64)
 def _shared(expressions: tuple[sp.Expr, ...]) -> tuple[tuple[sp.Expr, ...], StraightLine]:
-    """Return expressions and their parts; a rig's are the same whatever effects act on it."""
+    """Return expressions and their parts; those of a rig do not depend on its effects."""
     return expressions, straight_line(expressions, name="inner")
 
 
 def _symbol(name: str, *indices: int) -> sp.Symbol:
-    # Names of a rig hold no blank, so none is called so.
+    # Names of a rig contain no blank, so there is no conflict.
     return sp.Symbol(" ".join([name, *map(str, indices)]), real=True)

@@ -1,4 +1,4 @@
-"""Symbolic derivatives of the equations of a rig by states and inputs, evaluated with numbers, and its equilibrium."""
+"""Symbolic derivatives of the equations of a rig by states and inputs, evaluated numerically, and its equilibrium."""
 
 from __future__ import annotations
 
@@ -22,27 +22,28 @@ from rigsight.simulate.structure import TIME, Structure, input_symbols
 Floats = NDArray[np.float64]
 
 _NEAR = 1e-6
-"""How near a place of rest must be, relative to each state or in its SI unit: its search stops at 1e-8."""
+"""Distance from an equilibrium up to which a state counts as one, relative to each state or in SI units; the search for it stops
+at 1e-8."""
 
 
 def slope_functions(structure: Structure) -> SlopeFunctions:
-    """Return the derivatives of a structure's equations; those of the same structure are the same object."""
+    """Return the derivatives of a structure's equations; repeated calls return the same object."""
     return _functions_of(_SameStructure(structure))
 
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Derivatives of the equations at one place.
+    """Derivatives of the equations at one point.
 
     Attributes
     ----------
     states, inputs
-        Of the rates of the states, by states, shape (n_states, n_states), and by inputs, their rates and their curvatures, shape
-        (3, n_states, n_inputs).
+        Of the rates of the states, by states, shape (n_states, n_states), and by inputs and their first and second time
+        derivatives, shape (3, n_states, n_inputs).
     outputs_by_states, outputs_by_inputs
         Of the outputs, shapes (n_outputs, n_states) and (3, n_outputs, n_inputs).
     rests
-        Whether that place is an equilibrium.
+        Whether the point is an equilibrium.
     """
 
     states: Floats
@@ -61,9 +62,9 @@ class _Motion:
     mass
         The mass matrix, shape (n, n).
     balance, changes
-        Forces, then rates of the states that are no motion, and their derivatives by states and inputs, shape (n_rows, n_by).
+        Forces, then rates of the states other than the motion, and their derivatives by states and inputs, shape (n_rows, n_by).
     turned
-        Derivatives of the mass matrix times accelerations, which are the last arguments, shape (n, n_by).
+        Derivatives of the mass matrix times the accelerations, which are the last arguments, shape (n, n_by).
     """
 
     mass: Callable[..., Any]
@@ -73,7 +74,7 @@ class _Motion:
 
 
 class SlopeFunctions:
-    """Compiled derivatives of a structure's equations; the mass matrix is inverted in numbers, as symbols it would explode."""
+    """Compiled derivatives of a structure's equations; the mass matrix is inverted numerically (its symbolic inverse is long)."""
 
     def __init__(self, structure: Structure) -> None:
         self._n = len(structure.tree.motion.coordinates)
@@ -160,7 +161,7 @@ class SlopeFunctions:
 
 
 def declared_start(structure: Structure, p: Floats) -> Floats:
-    """Return the start values of the rig's file, shape (n_states,); zero where it declares none."""
+    """Return the start values declared in the rig file, shape (n_states,); zero for states without one."""
     mechanism, values = structure.rig.mechanism, dict(zip(structure.names, p, strict=True))
     found = np.zeros(len(structure.states))
     for symbol, expression in mechanism.initial.items():
@@ -176,7 +177,7 @@ def _is_finite(
 
 
 class _SameStructure:
-    """Let a structure, whose rig holds dictionaries and so cannot be hashed, be the key of a cache by identity."""
+    """A cache key by identity, because a structure's rig contains dictionaries and cannot be hashed."""
 
     def __init__(self, structure: Structure) -> None:
         self.structure = structure
@@ -194,7 +195,7 @@ def _functions_of(key: _SameStructure) -> SlopeFunctions:
 
 
 def _whole(structure: Structure, arguments: Sequence[sp.Symbol], by: Sequence[sp.Symbol]) -> _Motion:
-    """Return the functions of equations that are differentiated as they are."""
+    """Return the functions of equations that are differentiated as whole expressions."""
     tree, motion = structure.tree, structure.tree.motion
     mass = motion.mass.applyfunc(tree.flattened)
     forces = [tree.flattened(force) for force in motion.forces]
@@ -242,7 +243,7 @@ def _jacobian(expressions: Sequence[sp.Expr], by: Sequence[sp.Symbol]) -> sp.Mat
 
 
 def _slope(expression: Any, symbol: sp.Symbol) -> Any:
-    # The jump of a sign has no slope; what rests on it is left out.
+    # The jump of a sign has no slope: terms with it are left out.
     return sp.diff(expression, symbol).replace(sp.DiracDelta, lambda *_: sp.S.Zero)
 
 

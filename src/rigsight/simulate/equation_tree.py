@@ -1,4 +1,4 @@
-"""The equations of a rig with effects before substitution: one tree that everything else reads."""
+"""The equations of a rig with effects before substitution: one tree from which all other forms are derived."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rigsight.simulate.elimination import acceleration_symbols
 
 
 class Kind(StrEnum):
-    """What a named value of the equations is."""
+    """Kinds of named values in the equations."""
 
     SIGNAL = "signal"
     DRIVE = "drive"
@@ -35,7 +35,7 @@ class late(sp.Function):  # type: ignore[misc]  # noqa: N801
 
 
 class shifted(late):  # noqa: N801
-    """The same of a reading that nothing else reads, whose record is shifted as a whole, either way."""
+    """The same for a reading that is only recorded: its record is shifted as a whole, in either direction."""
 
 
 @dataclass(frozen=True)
@@ -45,17 +45,17 @@ class Definition:
     Attributes
     ----------
     symbol
-        Its symbol in the definitions and equations behind it.
+        Its symbol in later definitions and equations.
     expression
-        What it is, of inputs, states, parameters and the definitions in front of it; a delay is `late` of a signal.
+        Its expression in inputs, states, parameters and earlier definitions; a delay is `late` of a signal.
     kind
-        What it is in the signal path.
+        Its kind in the signal path.
     owner
-        Name of the effect that it belongs to; None for the rig.
+        Name of the effect to which it belongs; None for the rig.
     rate_of
-        Symbol of the definition whose time derivative this is, if it is one: people see a dot instead of an equation.
+        Symbol of the definition whose time derivative this is, if it is one; it is displayed as a dot instead of an equation.
     name
-        The rig's own name of it: a signal, a drive that is told by a control law, a sensor that one reads. None for an effect's.
+        Its name in the rig: a signal, a drive with a control law, a sensor read by a law. None for that of an effect.
     """
 
     symbol: sp.Symbol
@@ -68,16 +68,16 @@ class Definition:
 
 @dataclass(frozen=True)
 class EquationsOfMotion:
-    """``mass @ accelerations = forces``, of n degrees of freedom; n = 0 where the motion is prescribed.
+    """``mass @ accelerations = forces``, for n degrees of freedom; n = 0 if the motion is prescribed.
 
     Attributes
     ----------
     coordinates, velocities
         Symbols of the states, n each.
     mass
-        Mass matrix (n, n) of parameters, coordinates and definitions.
+        Mass matrix (n, n) in terms of parameters, coordinates and definitions.
     terms
-        For each coordinate the parts of its generalized force with their signs, in the order in which people read them.
+        The parts of the generalized force of each coordinate, with their signs, in display order.
     dimensions, rate_dimensions
         Dimension texts of the coordinates and of the velocities, n each.
     """
@@ -96,12 +96,12 @@ class EquationsOfMotion:
 
     @cached_property
     def is_written(self) -> bool:
-        """Whether the accelerations are formulas, or else symbols of what is found by `Elimination`."""
+        """True if the accelerations are formulas, False if they are symbols whose values come from `Elimination`."""
         return has_short_inverse(self.mass)
 
     @property
     def accelerations(self) -> tuple[sp.Expr, ...]:
-        """Rates of the velocities: the forces through the inverse of the mass matrix, or symbols, see `is_written`."""
+        """Rates of the velocities: inverse of the mass matrix times forces, or symbols, see `is_written`."""
         if not self.is_written:
             return acceleration_symbols(len(self.coordinates))
         if len(self.coordinates) == 1:
@@ -118,13 +118,13 @@ class FirstOrderState:
     symbol
         Its symbol.
     terms
-        The parts of its rate, in the order in which people read them.
+        The parts of its rate, in display order.
     dimension
         Dimension text.
     limit
         Half-width of the range that it cannot leave, if any.
     owner
-        Name of the effect that it belongs to; None for the rig.
+        Name of the effect to which it belongs; None for the rig.
     """
 
     symbol: sp.Symbol
@@ -140,13 +140,13 @@ class FirstOrderState:
 
     @property
     def limited_rate(self) -> sp.Expr:
-        """The rate, zero while the state is driven against an end of its range."""
+        """The rate; zero while the state is at an end of its range and the rate points outward."""
         return rate_within(self.symbol, self.rate, self.limit)
 
 
 @dataclass(frozen=True)
 class Output:
-    """A recorded quantity: its column, and the parts it is the sum of, in the order in which people read them."""
+    """A recorded quantity: the name of its column, and the terms of its sum in display order."""
 
     name: str
     terms: tuple[sp.Expr, ...]
@@ -165,9 +165,9 @@ class EquationTree:
     motion
         The equations of motion.
     states
-        The states beside the motion.
+        The states other than the motion.
     outputs
-        What is recorded of the rig.
+        The recorded quantities.
     """
 
     inputs: tuple[sp.Symbol, ...]
@@ -177,25 +177,25 @@ class EquationTree:
     outputs: tuple[Output, ...]
 
     def flattened(self, expression: sp.Expr) -> sp.Expr:
-        """Return an expression without definitions; what is late stands in it as if it arrived at once."""
+        """Return an expression without definitions and without delays."""
         return expression.xreplace(self._values)
 
     def remembering(self, expression: sp.Expr) -> sp.Expr:
-        """Return an expression without definitions but those in `remembered`, which stand in it under their own symbols."""
+        """Return an expression without definitions, except those in `remembered`, which keep their symbols."""
         return expression.xreplace(self._remembering_values)
 
     @cached_property
     def remembered(self) -> tuple[sp.Symbol, ...]:
-        """What is late and has to be remembered while it is simulated, in the order of definition.
+        """Delayed definitions whose history must be stored during the simulation, in the order of definition.
 
-        That is all that is late but two: the only input of a rig on its way into it, where the whole record is shifted; and a
-        reading that nothing else reads, which is shifted behind the simulation, if its rate has no jumps between samples.
+        These are all but two kinds: the delayed only input of a rig, where the whole record is shifted; and a reading that is
+        only recorded, which is shifted after the simulation if its rate has no jumps between samples.
         """
         delayed = [d.symbol for d in self.definitions if isinstance(d.expression, late)]
         return tuple(s for s in delayed if not self._is_arrival(s) and not self._is_shown_late(s))
 
     def _readers(self, symbol: sp.Symbol) -> tuple[list[sp.Symbol], bool, bool]:
-        """Return the definitions that read a symbol, and whether the motion or a state, and whether an output does."""
+        """Return the definitions that contain a symbol, whether the motion or a state does, and whether an output does."""
         read = [d.symbol for d in self.definitions if symbol in d.expression.free_symbols]
         moving = [*self.motion.mass, *(term for terms in self.motion.terms for term in terms)]
         moving += [part for s in self.states for part in (*s.terms, s.limit or sp.Integer(0))]
@@ -203,7 +203,7 @@ class EquationTree:
         return read, any(symbol in expression.free_symbols for expression in moving), shown
 
     def _is_arrival(self, symbol: sp.Symbol) -> bool:
-        """Return True for the only input on its way into the rig, which reads nothing of it as it is now."""
+        """Return True for the delayed only input of a rig, if the rig does not use it without the delay."""
         root, _ = self.lateness(symbol)
         while root != symbol:
             read, moves, shown = self._readers(root)
@@ -221,9 +221,9 @@ class EquationTree:
         return self.lateness(symbol)[0] in self.inputs
 
     def _is_shown_late(self, symbol: sp.Symbol) -> bool:
-        """Return True for a reading that nothing else reads, and whose rate is one of states alone and without kinks.
+        """Return True for a reading that is only recorded, and whose rate depends on states alone and has no kinks.
 
-        Of a record that is shifted as a whole, rate and kinks do not matter.
+        If the record is shifted as a whole, rate and kinks do not matter.
         """
         if isinstance(self._expressions[symbol], shifted):
             return True
@@ -246,7 +246,7 @@ class EquationTree:
         )
 
     def rate_of(self, reading: sp.Expr) -> sp.Expr:
-        """Return the time derivative of an expression of the states; what is late stands in it as if it arrived at once."""
+        """Return the time derivative of an expression of the states, without delays."""
         motion, flat = self.motion, self.flattened(reading)
         rates = dict(zip(motion.coordinates, motion.velocities, strict=True))
         rates |= zip(motion.velocities, motion.accelerations, strict=True)
@@ -255,7 +255,7 @@ class EquationTree:
         return sum((sp.diff(flat, s) * self.flattened(rates[s]) for s in present), start=sp.Integer(0))
 
     def shown_lateness(self, symbol: sp.Symbol) -> sp.Expr | None:
-        """Return the time by which a reading is shown late behind the simulation; None where it is not."""
+        """Return the delay of a reading that is applied after the simulation; None if there is none."""
         delays: list[sp.Expr] = []
         while symbol not in self.remembered and isinstance(expression := self._expressions.get(symbol), late):
             symbol, delay = expression.args
@@ -263,7 +263,7 @@ class EquationTree:
         return sp.Add(*delays) if delays else None
 
     def lateness(self, symbol: sp.Symbol) -> tuple[sp.Symbol, sp.Expr | None]:
-        """Return what a symbol was before it was delayed, and by how much in all; None without a delay."""
+        """Return the symbol or expression before all delays, and the total delay; None without a delay."""
         delays: list[sp.Expr] = []
         while isinstance(expression := self._expressions.get(symbol), late):
             symbol, delay = expression.args
@@ -293,7 +293,7 @@ class EquationTree:
 
 
 def rate_within(state: sp.Symbol, rate: sp.Expr, limit: sp.Expr | None) -> sp.Expr:
-    """Return the rate of a state that rests at the end of its range that it is driven against."""
+    """Return the rate of a state, zero while it is at an end of its range and the rate points outward."""
     if limit is None:
         return rate
     return rate * (1 - sp.sign(state * sp.sign(rate) - limit)) / 2

@@ -26,11 +26,11 @@ def equations_of_motion(
     rig
         The rig.
     bound
-        Puts the symbols of a structure into an expression of the rig's declaration.
+        Replaces the symbols of the rig's declaration in an expression by those of a structure.
     resisting
-        Joint -> the forces that resist its motion, bound already.
+        Joint -> the forces that resist its motion, in the structure's symbols.
     pulled
-        Accelerations by which an observer pulls the motion, shape (n, 1).
+        Accelerations by which an observer corrects the motion, shape (n, 1).
     """
     mechanism, free = rig.mechanism, rig.mechanism.free
     terms: list[list[sp.Expr]] = [[] for _ in free]
@@ -48,7 +48,7 @@ def equations_of_motion(
         if force != 0:
             own.append(bound(force))
     if mechanism.bodies is not None:
-        # What binds bodies answers to all else that pushes them.
+        # The constraint forces of simulated bodies depend on all other applied forces.
         applied = {applied_symbol(i): sp.Add(*own) for i, own in enumerate(terms)}
         for own, force in zip(terms, mechanism.simulated_forces, strict=True):
             own.append(bound(force).xreplace(applied))

@@ -1,4 +1,4 @@
-"""Equilibrium of a mechanism of any shape: balance of forces, including those held by friction and hysteresis."""
+"""Equilibrium of any mechanism: balance of forces, including those held by friction and hysteresis."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from rigsight.simulate.structure import TIME, Structure, input_symbols
 Floats = NDArray[np.float64]
 
 BALANCED = 1e-8
-"""Share of the forces that are out of balance where the search begins that may be left where it ends."""
+"""Imbalance of forces allowed at the end of the search, relative to that at its start."""
 PATH_STEPS = 32
-"""Steps in which the inputs rise where hysteresis remembers the way: its error is some 3 % of what it holds."""
+"""Steps in which the inputs rise if hysteresis depends on the path; the error is some 3 % of the force that it holds."""
 _HUGE = 1e100
-"""In the place of infinity: its square is still a number."""
+"""Replaces infinity, because its square is still finite."""
 _PRECISE = 1e-15
-"""Change of cost, place and slope at which the search ends: as near as numbers go."""
+"""Change of cost, point and slope at which the search ends, close to the precision of floating-point numbers."""
 
 
 def equilibrium(
@@ -34,8 +34,8 @@ def equilibrium(
 ) -> Floats:
     """Return the static equilibrium reached from rest under slowly rising inputs, with dry friction and hysteresis.
 
-    Without inputs the rig rests where its springs and weights are in balance without friction; from there friction holds a joint
-    until it is overcome. States without forces stay at zero, and so do all states if there is no equilibrium.
+    Without inputs the rig rests where its springs and weights are in balance without friction. From there, friction holds a joint
+    until it is overcome. States on which no force acts stay at zero, and so do all states if there is no equilibrium.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def equilibrium(
 
     References
     ----------
-    M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for the step with multipliers instead of friction signs.
+    M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for steps with multipliers instead of friction signs.
     """
     balance = _balance_of(_Key(structure))
     given = dict(given or {})
@@ -73,16 +73,16 @@ def equilibrium(
 
 @dataclass(frozen=True)
 class _Balance:
-    """Residuals of the equilibrium, as functions of (parameters, inputs, states, states before, friction signs).
+    """Residuals of the equilibrium, as functions of (parameters, inputs, states, previous states, friction signs).
 
     Attributes
     ----------
     rates
-        For each state that can be unknown: its balance, shape (n_unknown,).
+        Balance of each state that can be unknown, shape (n_unknown,).
     turned
-        By how much the joints with dry friction turned since the states before, shape (n_frictions,).
+        Motion of the joints with dry friction since the previous states, shape (n_frictions,).
     unknown
-        Indices of these states: all but the velocities.
+        Indices of the states that can be unknown: all but the velocities.
     n_frictions
         Number of joints with dry friction.
     remembers
@@ -122,7 +122,7 @@ def _reached(
 
     def missing(y: Floats) -> Floats:
         state = states_of(y)
-        # A power of a memory that is empty may divide by zero; what it is multiplied by is zero as well.
+        # A power of a memory that is zero may divide by zero; its factor is then zero as well.
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             rates = np.asarray(balance.rates(p, inputs, state, before, y[n:]), dtype=np.float64)[free]
         rates = np.nan_to_num(rates, nan=0.0, posinf=_HUGE, neginf=-_HUGE)
@@ -133,7 +133,7 @@ def _reached(
     start = np.r_[before[places], signs]
     if start.size == 0:
         return before
-    # What sticks and what slides: a joint whose multiplier is beyond 1 slides, one that slid backwards sticks.
+    # Stick or slide: a joint whose multiplier exceeds 1 slides, one that slid backwards sticks.
     for _ in range(3 * balance.n_frictions + 1):
         found = least_squares(missing, start, x_scale="jac", ftol=_PRECISE, xtol=_PRECISE, gtol=_PRECISE)
         turned = np.asarray(
@@ -149,7 +149,7 @@ def _reached(
 
 
 class _Key:
-    """Let structures, which cannot be hashed, be keys of a cache by identity."""
+    """A cache key by identity, because structures cannot be hashed."""
 
     def __init__(self, structure: Structure) -> None:
         self.structure = structure
@@ -204,7 +204,7 @@ def _balance_of(key: _Key) -> _Balance:
 
 
 def _one_sided(structure: Structure) -> dict[int, float]:
-    """Return where the parameters of friction stand that is larger one way, each with the value at which it vanishes."""
+    """Return the indices of the parameters of directional friction, each with its null value."""
     place = {name: i for i, name in enumerate(structure.names)}
     found: dict[int, float] = {}
     for effect in structure.effects:
@@ -221,7 +221,7 @@ def _one_sided(structure: Structure) -> dict[int, float]:
 
 
 def _moved(structure: Structure, before: Sequence[sp.Symbol]) -> dict[sp.Expr, sp.Expr]:
-    """Return what velocities are over a step of unit time."""
+    """Return the velocities over a step of unit time: differences of coordinates."""
     motion = structure.tree.motion
     return {
         velocity: coordinate - before[i]

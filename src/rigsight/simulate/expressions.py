@@ -10,14 +10,14 @@ import sympy as sp
 def hoist_constants(
     expressions: Sequence[sp.Expr], constants: set[sp.Symbol]
 ) -> tuple[list[sp.Expr], dict[sp.Symbol, sp.Expr]]:
-    """Replace every largest subexpression of constants alone by a symbol.
+    """Replace every largest subexpression that contains only constants by a symbol.
 
     Returns
     -------
     expressions
         The expressions with those subexpressions replaced.
     hoisted
-        Symbol -> the subexpression it stands for.
+        Symbol -> the subexpression that it replaces.
     """
     hoisted: dict[sp.Expr, sp.Symbol] = {}
     walked: dict[sp.Expr, sp.Expr] = {}
@@ -51,18 +51,18 @@ def hoist_constants(
 
 
 def gathered(expression: sp.Expr, constants: set[sp.Symbol], modes: set[sp.Symbol] | None = None) -> sp.Expr:
-    """Return an expression as a sum of products with one constant coefficient each, where that takes fewer operations.
+    """Return an expression as a sum of products with one constant coefficient each, if that takes fewer operations.
 
-    Arguments of functions stay as they are.
+    Arguments of functions are not changed.
 
     Parameters
     ----------
     expression
         Any expression.
     constants
-        Symbols whose functions are computed once, before all else.
+        Symbols whose functions are computed once, in advance.
     modes
-        Signs; a sum of them stays whole, because what it takes away must be exactly zero.
+        Signs; a sum of them is not expanded, because it must be able to cancel to exactly zero.
     """
     inner = {
         atom: sp.Dummy(f"inner{i}", real=True)
@@ -91,7 +91,7 @@ def _whole(expression: sp.Expr, modes: set[sp.Symbol]) -> list[sp.Expr]:
 
 
 def _operations(expression: sp.Expr, constants: set[sp.Symbol]) -> int:
-    """Count the operations that are left once functions of constants are computed; a product that is added costs one."""
+    """Count the operations after functions of constants are computed; multiplying and adding a product costs one."""
     if not expression.free_symbols - constants:
         return 0
     varying = [a for a in expression.args if a.free_symbols - constants]

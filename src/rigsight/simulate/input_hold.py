@@ -1,6 +1,6 @@
 """Input between its samples, as a cubic polynomial per interval.
 
-The hold decides how well a model can fit: a sampled analog signal that is interpolated linearly looks like a small delay and
+The hold limits how well a model can fit: with linear interpolation, a sampled analog signal looks like one with a small delay and
 a gain error that grows with frequency.
 """
 
@@ -24,7 +24,7 @@ BAND_LIMITED_INTERVALS = 2
 _OVERSAMPLING = 16
 _HALF_LENGTH = 48
 _LONGEST_KEPT = 50_000
-"""Samples up to which an input is kept for the next model; all that is kept stays below half a gigabyte."""
+"""Samples up to which an input is cached for the next model; the cache stays below half a gigabyte."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class HeldInput:
     Attributes
     ----------
     coefficients
-        Shape (n_intervals + 1, 4), of several inputs (n_intervals + 1, n_inputs, 4): ``c0 + c1 tau + c2 tau^2 + c3 tau^3`` with
+        Shape (n_intervals + 1, 4), for several inputs (n_intervals + 1, n_inputs, 4): ``c0 + c1 tau + c2 tau^2 + c3 tau^3`` with
         tau [s] from the start of each interval; row 0 is the input before the record, held at its first value.
     interval
         Length of an interval [s].
@@ -51,7 +51,7 @@ class HeldInput:
 
     @property
     def n_pieces(self) -> int:
-        """Pieces of the record."""
+        """Number of intervals of the record."""
         return int(self.coefficients.shape[0]) - 1
 
     def first(self, n_samples: int) -> HeldInput:
@@ -59,16 +59,16 @@ class HeldInput:
         return replace(self, coefficients=self.coefficients[: (n_samples - 1) * self.per_sample + 1])
 
     def read_ahead(self, column: int, by: float) -> HeldInput:
-        """Return the same with one input read some time ahead [s]: between nodes by cubic Hermite interpolation.
+        """Return the same with one input advanced in time, with cubic Hermite interpolation between nodes.
 
-        Beyond either end it goes on with the slope and the curvature that it has there.
+        Beyond either end it is continued with its slope and curvature there.
 
         Parameters
         ----------
         column
             Index of the input.
         by
-            How far; negative for what was before.
+            Time by which it is advanced [s]; negative for a delay.
         """
         n, rows = self.n_pieces, self.coefficients.reshape(self.n_pieces + 1, -1, 4)
         if n == 0 or by == 0.0:
@@ -90,9 +90,9 @@ class HeldInput:
         return replace(self, coefficients=found.reshape(self.coefficients.shape))
 
     def at_samples(self, n_samples: int) -> NDArray[np.float64]:
-        """Return each input with its first and second derivative by time at the samples, shape (3 n_inputs, n_samples).
+        """Return each input with its first and second time derivative at the samples, shape (3 n_inputs, n_samples).
 
-        They are those of the piece that begins there; at the last sample those of the piece that ends there.
+        The values are those of the piece that begins there; at the last sample, those of the piece that ends there.
         """
         rows = self.coefficients.reshape(self.n_pieces + 1, -1, 4)
         starts = rows[1 :: self.per_sample][: n_samples - 1]
@@ -123,7 +123,7 @@ def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput
     return _kept(samples.tobytes(), dt, hold)
 
 
-# A diagnosis fits hundreds of models to the same few records and their pieces.
+# Cached, because a diagnosis fits hundreds of models to the same few records and their windows.
 @lru_cache(maxsize=128)
 def _kept(content: bytes, dt: float, hold: Hold) -> HeldInput:
     return _between(np.frombuffer(content, dtype=np.float64), dt, hold)
@@ -191,7 +191,7 @@ def hold_accelerated_motion(
 
 
 def together(inputs: Sequence[HeldInput]) -> HeldInput:
-    """Return several inputs as one; pieces are divided where others are shorter."""
+    """Return several inputs as one; pieces are divided if those of other inputs are shorter."""
     if len(inputs) == 1:
         return inputs[0]
     per_sample = math.lcm(*(held.per_sample for held in inputs))
@@ -205,7 +205,7 @@ def together(inputs: Sequence[HeldInput]) -> HeldInput:
 
 
 def _divided(held: HeldInput, parts: int) -> HeldInput:
-    """Return an input in pieces of which each is one of so many equal parts of the ones before."""
+    """Return an input with every piece divided into equal parts."""
     if parts == 1:
         return held
     interval = held.interval / parts
@@ -243,7 +243,8 @@ def _band_limited_nodes(
 def _interpolation_taps() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the filters that give values and slopes [per interval] at the interval boundaries.
 
-    The slope is the difference quotient of fourth order of a finer interpolation, which is never computed between these.
+    The slope is the fourth-order difference quotient of a finer interpolation, of which only the values at the boundaries are
+    computed.
     """
     from scipy.signal import firwin
 

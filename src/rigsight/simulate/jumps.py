@@ -1,4 +1,4 @@
-"""Accelerations, found by elimination, that jump when a kink changes sign. Determined numerically at an arbitrary point."""
+"""Jumps of accelerations (from elimination) when a kink changes sign, determined numerically at an arbitrary point."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from rigsight.simulate.elimination import Elimination
 from rigsight.simulate.straight_line import straight_line
 
 _DIGITS = 40
-"""Of the numbers: what is smaller than 1e-25 of them then comes of rounding."""
+"""Digits of the numbers; a result below 1e-25 is then rounding error."""
 
 
 class Jumps:
-    """How accelerations that are found by elimination change with symbols in the equations.
+    """Derivatives of accelerations that are computed by elimination, with respect to symbols in the equations.
 
     Parameters
     ----------
     elimination
-        How they are found.
+        The elimination.
     steps
-        The steps to them, of functions that sympy has numbers for.
+        The steps to the accelerations, in functions that sympy can evaluate.
     still
-        Velocities -> what others make them where a joint rests, of symbols other than `steps`.
+        Velocities -> their expressions in the other velocities while a joint rests, without symbols of `steps`.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Jumps:
         self._place |= {velocity: _number(value, self._place) for velocity, value in still.items()}
 
     def by(self, mode: sp.Symbol) -> list[sp.Expr]:
-        """Return the derivative of each acceleration by a symbol in masses and loads."""
+        """Return the derivative of each acceleration with respect to a symbol in masses and loads."""
         steps, elimination = self._steps, self._elimination
         pushes = [
             _slope(steps[load], mode)
@@ -54,14 +54,14 @@ class Jumps:
     def numbers(
         self, expressions: Sequence[sp.Expr], further: Mapping[sp.Symbol, sp.Expr] | None = None
     ) -> list[sp.Expr]:
-        """Return the numbers of expressions at the place.
+        """Return the values of expressions at the point.
 
         Parameters
         ----------
         expressions
-            Of states, inputs, parameters and steps.
+            Expressions in states, inputs, parameters and steps.
         further
-            Steps behind those to the accelerations.
+            Steps after those to the accelerations.
         """
         line = straight_line(expressions, {**self._steps, **(further or {})})
         numbers = dict(self._place)
@@ -75,6 +75,6 @@ def _number(expression: sp.Expr, numbers: Mapping[sp.Symbol, sp.Expr]) -> sp.Exp
 
 
 def _slope(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    # Term by term: of a long sum few terms hold it.
+    # Term by term, because few terms of a long sum contain the symbol.
     terms = [term for term in sp.Add.make_args(expression) if symbol in term.free_symbols]
     return sp.Add(*(sp.diff(term, symbol) for term in terms))

@@ -14,15 +14,16 @@ from rigsight.simulate.structure import Structure
 
 _KINKS = (sp.Abs, sp.sign, positive_part)
 MOST_FRICTIONS = 8
-"""Joints with dry friction of which each sticks or slides either way: 3^8 ways are tried at an event, a millisecond's work."""
+"""Largest number of joints with dry friction. Each sticks or slides in either direction; trying all 3^8 combinations at an event
+takes a millisecond."""
 _DIGITS = 40
-"""Of the numbers at which an expression is tried."""
+"""Digits of the numbers at which an expression is evaluated."""
 _ROUNDED = 1e-25
-"""What is smaller comes of rounding."""
+"""Size below which a value is rounding error."""
 
 
 class absolute(sp.Function):  # type: ignore[misc]  # noqa: N801
-    """Absolute value that stays one: the base of a power with a real exponent, smooth enough not to be an event."""
+    """Absolute value that is not replaced by a mode: the base of a power with a real exponent, smooth enough to need no event."""
 
     is_real = True
     is_nonnegative = True
@@ -41,9 +42,9 @@ class Friction:
     mode
         Index of its sign among the modes.
     velocity
-        Index of the state that it holds at zero while it sticks; None where the joint's velocity is made of several states.
+        Index of the state that it holds at zero while it sticks; None if the joint's velocity is a sum of several states.
     alone
-        Whether no other velocity feels it, so that what holds it need not be known.
+        Whether it affects no other velocity, so that the holding force need not be computed.
     """
 
     mode: int
@@ -62,13 +63,13 @@ class FrozenStructure:
     modes
         Symbols that take the values -1 and +1.
     switches
-        Expression whose sign each mode is; it may hold modes of earlier switches.
+        Expression whose sign each mode is; it may contain modes of earlier switches.
     frictions
-        The modes of dry friction: signs of a velocity whose flip makes its own acceleration jump, so that it can stay at zero.
+        The modes of dry friction: signs of a velocity whose change makes its own acceleration jump, so that it can stay at zero.
     replacements
-        What was written in the place of kinks, in the order in which it was.
+        The replacements of kinks, in the order in which they were made.
     steps
-        What is computed before rates and outputs, as `Structure.remembering_steps`.
+        Intermediate values computed before rates and outputs, as `Structure.remembering_steps`.
     """
 
     rates: tuple[sp.Expr, ...]
@@ -87,11 +88,11 @@ class FrozenStructure:
 
     @staticmethod
     def friction_sign(index: int) -> sp.Symbol:
-        """Return the symbol that stands for the sign of one of the frictions, or for its multiplier while it sticks."""
+        """Return the symbol of the sign of one of the frictions, which is its multiplier while it sticks."""
         return sp.Symbol(f"friction sign {index}", real=True)
 
     def friction_signs(self, structure: Structure) -> dict[sp.Expr, sp.Expr]:
-        """Return the signs of velocities that dry friction can hold as the equations hold them, and the symbols for them."""
+        """Return the signs in the equations of velocities that dry friction can hold, each with its symbol."""
         found: dict[sp.Expr, sp.Expr] = {}
         expressions = [*(e.rate for e in structure.remembering_equations), *structure.computed_outputs]
         expressions += structure.remembering_steps.values()
@@ -104,14 +105,14 @@ class FrozenStructure:
         return found
 
     def speeds(self, structure: Structure) -> list[sp.Expr]:
-        """Return the velocities that dry friction can hold, with the kinks that they hold as they are."""
+        """Return the velocities that dry friction can hold, with their kinks not replaced."""
         of_signs = {sign: atom.args[0] for atom, sign in self.friction_signs(structure).items()}
         signs = [self.friction_sign(index) for index in range(len(self.frictions))]
         return [of_signs[sign] if sign in of_signs else -of_signs[-sign] for sign in signs]
 
     @property
     def single_friction(self) -> Friction | None:
-        """The only dry friction, if there is one and it holds one velocity and moves no other."""
+        """The only dry friction, if there is exactly one, and it holds one velocity and affects no other."""
         found = self.frictions[0] if len(self.frictions) == 1 else None
         return found if found is not None and found.velocity is not None and found.alone else None
 
@@ -122,7 +123,7 @@ class FrozenStructure:
 
     @property
     def dependent_modes(self) -> tuple[int, ...]:
-        """Indices of the modes whose switch holds another mode: when that one flips, they are to be read anew."""
+        """Indices of the modes whose switch contains another mode; they must be evaluated again when that mode changes."""
         return tuple(i for i, switch in enumerate(self.switches) if switch.free_symbols & set(self.modes))
 
 
@@ -133,7 +134,7 @@ def freeze(structure: Structure) -> FrozenStructure:
         *(state.limited_rate for state in structure.remembering_equations),
         *structure.computed_outputs,
     ]
-    # A kink of what acts later is an event when it happens: when it acts, the past has a corner there.
+    # A kink of a delayed signal is an event when it occurs, because its history then has a corner at that instant.
     expressions += [history.signal for history in structure.histories]
     expressions += structure.remembering_steps.values()
     modes: dict[sp.Expr, sp.Symbol] = {}
@@ -188,7 +189,7 @@ def _innermost_kink(expressions: list[sp.Expr], constant: set[sp.Symbol]) -> sp.
 def _frictions(
     structure: Structure, modes: dict[sp.Expr, sp.Symbol], expressions: list[sp.Expr], steps: list[sp.Expr]
 ) -> tuple[Friction, ...]:
-    """Return the modes that are signs of velocities at which the same velocities' accelerations jump."""
+    """Return the modes that are signs of velocities whose own accelerations jump with them."""
     velocities = structure.tree.motion.velocities
     rates = dict(zip(structure.states, expressions, strict=False))
     named = dict(zip(structure.remembering_steps, map(_of_sympy, steps), strict=True))
@@ -197,7 +198,7 @@ def _frictions(
         moved = [v for v in velocities if v in switch.free_symbols]
         if not moved or any(sp.diff(switch, a, b) != 0 for a in moved for b in moved):
             continue
-        # At rest: one velocity is what the others make it.
+        # At rest, one velocity follows from the others.
         standstill = {moved[0]: moved[0] - switch / sp.diff(switch, moved[0])}
         if structure.elimination is None:
             jump = sum((sp.diff(switch, v) * sp.diff(rates[v], mode) for v in moved), start=sp.Integer(0))
@@ -222,7 +223,7 @@ def _frictions(
 
 
 def is_zero(expression: sp.Expr) -> bool:
-    """Return True for an expression that vanishes at some place of no meaning; sympy would simplify for seconds."""
+    """Return True for an expression that is zero at an arbitrary point, because simplification by sympy would take seconds."""
     expression = _of_sympy(expression)
     symbols = sorted(expression.free_symbols, key=str)
     place = {symbol: sp.sqrt(sp.prime(5 + i)) / (3 + i % 7) for i, symbol in enumerate(symbols)}
@@ -231,5 +232,5 @@ def is_zero(expression: sp.Expr) -> bool:
 
 
 def _of_sympy(expression: sp.Expr) -> sp.Expr:
-    """Return an expression of functions that sympy has numbers for."""
+    """Return an expression in functions that sympy can evaluate."""
     return expression.replace(absolute, sp.Abs).replace(positive_part, lambda part: sp.Max(part, 0))

@@ -1,7 +1,7 @@
 """Linearization of the equations of a rig at its equilibrium.
 
-Derivatives are symbolic. Loops of control laws are closed in the equations, and so in what is returned. At rest dry friction is
-left out, because its jump has no slope.
+Derivatives are symbolic. Loops of control laws are closed in the equations, and so in the result. Dry friction is left out,
+because its jump at rest has no slope.
 """
 
 from __future__ import annotations
@@ -24,16 +24,17 @@ Floats = NDArray[np.float64]
 Stability = Literal["stable", "drifts", "unstable"]
 
 _ROUNDED = 1e-7
-"""Distance of two roots, over the largest pole, that may be rounding: double roots are known to the root of 1e-16."""
+"""Distance of two roots, over the largest pole, that may be rounding error: double roots are accurate to the root of 1e-16."""
 _VANISHES = 1e-10
-"""Share of its parts below which a sum of products is rounding."""
+"""Share of its parts below which a sum of products is rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """``z' = A z + B u`` and ``y = C z + D u + D_1 u' + D_2 u''``, all as deviations from where the rig rests.
+    """``z' = A z + B u`` and ``y = C z + D u + D_1 u' + D_2 u''``, all as deviations from the equilibrium.
 
-    Where the rates of inputs stand in the equations, as of a prescribed motion, z is the state less its share in the input.
+    If the equations contain rates of inputs (a prescribed motion), z is the state minus a part proportional to the inputs and
+    their rates.
 
     Attributes
     ----------
@@ -42,9 +43,9 @@ class Linearization:
     at_inputs
         The constant inputs, shape (n_inputs,).
     at_state
-        Where the rig rests under them, shape (n_states,).
+        The equilibrium under these inputs, shape (n_states,).
     rests
-        False where there is no such place: then the equations were linearized where they come nearest to it.
+        False if there is no equilibrium: the equations were then linearized at the state closest to one.
     state_matrix, input_matrix, output_matrix
         A, B and C, shapes (n_states, n_states), (n_states, n_inputs) and (n_outputs, n_states).
     feedthrough
@@ -67,7 +68,7 @@ class Linearization:
         """Eigenvalues of A [1/s], by their size and then by their imaginary part, shape (n_states,)."""
         found = np.linalg.eigvals(self.state_matrix).astype(np.complex128)
         found[np.abs(found) <= _ROUNDED * float(np.max(np.abs(found), initial=0.0))] = 0.0
-        # A pair has one size but for rounding.
+        # The two poles of a pair have the same size except for rounding.
         return found[np.lexsort((found.imag, np.array([float(f"{abs(pole):.9g}") for pole in found])))]
 
     @property
@@ -77,14 +78,14 @@ class Linearization:
 
     @property
     def damping_ratios(self) -> Floats:
-        """Damping ratio of each pole, negative where it grows and NaN where it lies at zero, shape (n_states,)."""
+        """Damping ratio of each pole, negative for an unstable pole and NaN for a pole at zero, shape (n_states,)."""
         size = self.natural_frequencies
         safe = np.where(size > self._rounding, size, np.nan)
         return np.asarray(-self.poles.real / safe)
 
     @property
     def stability(self) -> Stability:
-        """``"drifts"`` where a pole lies at the edge: nothing brings the rig back."""
+        """Stability from the poles; ``"drifts"`` if a pole is on the imaginary axis, so that the rig does not return."""
         furthest = float(np.max(self.poles.real, initial=-np.inf))
         if furthest > self._rounding:
             return "unstable"
@@ -109,7 +110,7 @@ class Linearization:
         return np.asarray(self.output_matrix @ inner + direct)
 
     def transfer_function(self, source: str, response: str) -> TransferFunction:
-        """Return numerator and denominator from one input to one output; what cancels is left out.
+        """Return numerator and denominator from one input to one output, without zeros and poles that cancel.
 
         Raises
         ------
@@ -132,7 +133,7 @@ class Linearization:
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """A ratio of polynomials of s.
+    """A ratio of polynomials in s.
 
     Attributes
     ----------
@@ -164,20 +165,20 @@ def linearize(
     Parameters
     ----------
     structure
-        Rig and effects; what arrives late does so at once here.
+        Rig and effects; delays are left out.
     values
         Value of each of the structure's parameters, by name.
     inputs
         Constant value of each input; those left out are zero.
     state
-        Where to linearize instead, shape (n_states,).
+        State at which to linearize instead of the equilibrium, shape (n_states,).
     near
-        Of several equilibria that next to this state is taken, shape (n_states,); by default to the start that the rig declares.
+        Of several equilibria, the one closest to this state is used, shape (n_states,); default is the start declared by the rig.
 
     Raises
     ------
     SimulationError
-        If the equations have no slope there.
+        If the mass matrix is singular or the equations have no finite derivative there.
     """
     names = structure.rig.mechanism.inputs
     at_inputs = np.array([(inputs or {}).get(name, 0.0) for name in names], dtype=np.float64)
@@ -194,7 +195,7 @@ def linearize(
             f"The mass matrix of {structure.rig.name} is singular at the equilibrium."
         ) from None
     A, direct = slopes.states, slopes.inputs
-    # z = x - E_0 u - E_1 u' takes the rates of the inputs out of the equations.
+    # z = x - E_0 u - E_1 u' eliminates the rates of the inputs from the equations.
     E_1 = direct[2]
     E_0 = A @ E_1 + direct[1]
     C = slopes.outputs_by_states
@@ -223,8 +224,9 @@ def linearize(
 def _zeros(A: Floats, b: Floats, c: Floats, d: float) -> tuple[NDArray[np.complex128], float]:
     """Return the zeros of ``c (s - A)^-1 b + d`` and the factor of its highest power.
 
-    They are the finite eigenvalues of the system pencil; how many there are follows from the first of d, cb, cAb, ... that is
-    not zero: A. Emami-Naeini and P. Van Dooren, Automatica 18 (1982) 415. Rounding makes large finite ones of infinite ones.
+    They are the finite eigenvalues of the system pencil. Their number follows from the first of d, cb, cAb, ... that is not zero:
+    A. Emami-Naeini and P. Van Dooren, Automatica 18 (1982) 415. With rounding errors, infinite eigenvalues become large finite
+    ones.
     """
     n = A.shape[0]
     size = float(np.max(np.abs(A), initial=0.0)) or 1.0
@@ -244,7 +246,7 @@ def _zeros(A: Floats, b: Floats, c: Floats, d: float) -> tuple[NDArray[np.comple
 
 
 def _polynomial(roots: NDArray[np.complex128]) -> Floats:
-    """Return the coefficients, those that are rounding alone as zeros."""
+    """Return the coefficients, with zeros for those that are rounding error."""
     found, largest = np.atleast_1d(np.poly(roots)).real, np.atleast_1d(np.poly(-np.abs(roots)))
     return np.where(np.abs(found) > _VANISHES * largest, found, 0.0)
 

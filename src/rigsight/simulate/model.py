@@ -1,4 +1,4 @@
-"""A complete simulation as data: rig, effects, every number, the hold of the input."""
+"""A complete simulation as data: rig, effects, all parameter values, the hold of the input."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True)
 class Model:
-    """A simulation that needs nothing else.
+    """A complete simulation.
 
     Attributes
     ----------
@@ -25,21 +25,21 @@ class Model:
     values
         Value of every parameter.
     hold
-        How the input behaves between samples.
+        Hold of the input between samples.
     """
 
     structure: Structure
     values: dict[str, float]
     hold: Hold
 
-    # That of the dataclass would hold every symbol of the rig.
+    # The repr of a dataclass would contain every symbol of the rig.
     def __repr__(self) -> str:
         effects = list(self.structure.effect_names)
         return f"Model(rig={self.structure.rig.name!r}, effects={effects!r}, hold={self.hold!r})"
 
     @classmethod
     def of(cls, structure: Structure, values: Mapping[str, float], hold: Hold) -> Model:
-        """Make a model of a fitted structure, with numbers that were written into its equations as parameters again.
+        """Make a model from a fitted structure; values written into its equations as numbers become parameters again.
 
         Parameters
         ----------
@@ -48,7 +48,7 @@ class Model:
         values
             Value of each of its parameters, by name [SI].
         hold
-            How the input behaves between samples.
+            Hold of the input between samples.
         """
         complete = {**values, **dict(structure.fixed)}
         whole = compose(structure.rig, structure.effects)
@@ -68,7 +68,7 @@ class Model:
         return {
             "schema_version": SCHEMA_VERSION,
             "rig": rig.name,
-            # So that nothing else is needed: neither the user's file nor this version of a built-in one.
+            # Included so that neither the user's rig file nor this version of a built-in rig is needed.
             **({"declaration": dict(rig.declaration)} if rig.declaration else {}),
             "hold": self.hold,
             "constants": {n: v for n, v in self.values.items() if n in constants},

@@ -14,14 +14,14 @@ from rigsight.rigs import Coordinate
 
 
 def measured_before(shown: Sequence[sp.Expr], delay: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Return value and rate of a measured motion before a delay, by its Taylor series: for delays that are nearly none.
+    """Return value and rate of a measured motion before a delay, by a Taylor series that is valid for small delays.
 
     Parameters
     ----------
     shown
-        What was measured, and its first and second derivative by time.
+        The measured motion, and its first and second time derivative.
     delay
-        Time by which the sensor is late [s], less that by which its motion is read ahead (`read_ahead.py`).
+        Delay of the sensor [s], minus the time by which its motion is advanced (`read_ahead.py`).
     """
     value, rate, curvature = shown
     return value + delay * rate + delay**2 / 2 * curvature, rate + delay * curvature
@@ -34,20 +34,20 @@ def observer_acceleration(
     measured: tuple[sp.Expr, sp.Expr],
     bandwidth: sp.Expr,
 ) -> sp.Matrix:
-    """Return the accelerations of the free coordinates that let the error of one sensor die away, shape (n_degrees, 1).
+    """Return the accelerations of the free coordinates with which the error of one sensor decays, shape (n_degrees, 1).
 
     Parameters
     ----------
     free
         Coordinates that move freely.
     reads
-        What the sensor reads of them, without its effects; a velocity or a position.
+        The sensor's reading as an expression of them, without its effects; a velocity or a position.
     shown
-        What it shows without a delay, its effects included, and the rate of that.
+        The simulated reading with the sensor's effects but without a delay, and its rate.
     measured
-        What it showed, and the rate of that.
+        The measured reading, and its rate.
     bandwidth
-        Up to which the observer follows [rad/s].
+        Bandwidth of the observer [rad/s].
     """
     slopes = sp.Matrix([sp.diff(reads, c.rate) for c in free])
     if any(slope != 0 for slope in slopes):

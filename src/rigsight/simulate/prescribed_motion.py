@@ -18,14 +18,14 @@ _cache: OrderedDict[bytes, tuple[NDArray[np.float64], NDArray[np.float64], NDArr
     OrderedDict()
 )
 _CACHED_SAMPLES = 2_000_000
-"""Samples of all records together that are kept, 48 MB: a campaign has few records, or hundreds of short windows of them."""
+"""Number of samples of all records in the cache, 48 MB: a campaign has few records, or hundreds of short windows of them."""
 _PENALTIES = (-16.0, 25.0)
 """Natural logarithm of the weights tried: from no smoothing at all to a straight line."""
 _TRIALS = 42
 _BEYOND = 48
-"""Samples that are predicted beyond either end: a spline that averages over a dozen has forgotten its own end there."""
+"""Samples that are predicted beyond either end: a spline that averages over a dozen is not affected by its own end there."""
 _END = 21
-"""Samples from which the slope at an end is read."""
+"""Samples from which the slope at an end is computed."""
 
 
 def smooth_motion(
@@ -85,7 +85,7 @@ def _kept(
     displacement: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     samples = np.ascontiguousarray(displacement, dtype=np.float64)
-    # Every candidate asks for the same records.
+    # Cached, because every candidate needs the same records.
     key = sha256(samples.tobytes()).digest()
     if key not in _cache:
         _cache[key] = _spline(samples)
@@ -97,16 +97,17 @@ def _kept(
 def smoothed_noise(
     displacement: NDArray[np.float64], noise: NDArray[np.float64], dt: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return by how much noise beside a measured displacement moves its smoothing spline, as smoothed as without the noise.
+    """Return the change of the smoothing spline of a displacement due to additional noise, with unchanged smoothing.
 
-    In cosines, of which each is smoothed by itself; a hundred times as quick as another spline, and the same but for the ends.
+    Each cosine of the noise is smoothed by itself: a hundred times as fast as another spline, with the same result except at the
+    ends.
 
     Parameters
     ----------
     displacement
         Shape (n_samples,).
     noise
-        Small beside what the displacement has of the same kind, shape (n_samples,).
+        Small compared to the noise that the displacement already contains, shape (n_samples,).
     dt
         Sample time [s].
 
@@ -119,7 +120,7 @@ def smoothed_noise(
     weight = _penalty_kept(np.ascontiguousarray(displacement, dtype=np.float64).tobytes())
     lines = dct(noise, norm="ortho") / (1.0 + weight * _stiffness(n))
     slopes = -lines * np.pi * np.arange(n) / n
-    # The sine transform begins with the first frequency, and the last one of it has no cosine.
+    # The sine transform begins with the first frequency, and its last frequency has no cosine.
     return idct(lines, norm="ortho"), idst(np.append(slopes[1:], 0.0), norm="ortho") / dt
 
 
@@ -133,7 +134,7 @@ def _spline(
     samples: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     scale = float(np.std(samples)) or 1.0
-    # A smoothing spline is straight at its ends, and no motion is: they lie beyond those of the record.
+    # A smoothing spline is straight at its ends, unlike a motion, so its ends are moved beyond those of the record.
     longer = continued(samples / scale, _BEYOND)
     index, recorded = np.arange(longer.size, dtype=np.float64), slice(_BEYOND, -_BEYOND)
     spline = make_smoothing_spline(index, longer, lam=_penalty(longer))
@@ -148,8 +149,8 @@ def _spline(
 def _penalty(samples: NDArray[np.float64]) -> float:
     """Return the weight of the squared curvature that generalized cross validation chooses.
 
-    On equally spaced samples a cosine transform makes the smoothing spline diagonal (but for its ends), so that each trial costs
-    one sum; scipy's own choice takes seconds per record. The eigenvalues are those of the cubic spline.
+    For equally spaced samples a cosine transform makes the smoothing spline diagonal (except at its ends), so that each trial
+    costs one sum; scipy's own choice takes seconds per record. The eigenvalues are those of the cubic spline.
     """
     stiffness = _stiffness(samples.size)
     power = dct(samples - _end_slopes(samples), norm="ortho") ** 2
@@ -171,7 +172,7 @@ def _stiffness(n: int) -> NDArray[np.float64]:
 
 
 def _end_slopes(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the parabola with the samples' slopes at both ends: a cosine transform takes any other slope for a corner."""
+    """Return the parabola with the samples' slopes at both ends; a cosine transform treats a nonzero slope there as a corner."""
     count = min(_END, samples.size)
     index = np.arange(count, dtype=np.float64)
     degree = min(3, count - 1)

@@ -1,7 +1,8 @@
 """Observer with a delayed sensor: the measured motion is advanced by the delay before the simulation.
 
-In the equations, a Taylor series accounts only for the change of the delay between parameter sets: it is exact for the first set.
-The whole delay by that series moved the delays of sensors of a pendulum by up to a hundred standard errors.
+In the equations, a Taylor series accounts only for the difference of the delay from that of the first parameter set, for which
+the result is exact. With the series for the whole delay, estimated sensor delays of a pendulum were off by up to a hundred
+standard errors.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ Floats = NDArray[np.float64]
 
 
 def read_ahead(structure: Structure, held: HeldInput, p: Floats) -> tuple[HeldInput, Floats]:
-    """Return input and parameters with the motion of late sensors read ahead by their delays in the first set.
+    """Return input and parameters, with the measured motion of delayed sensors advanced by the delays of the first set.
 
     Parameters
     ----------
     structure
         Rig and effects; without an observer nothing is changed.
     held
-        Input as it was recorded, with what the observer follows.
+        Recorded input, with the readings that the observer follows.
     p
         Shape (n_parameters,) or (n_parameters, n_sets).
     """

@@ -17,21 +17,21 @@ from rigsight.simulate.structure import Structure
 RAMP_PERIODS = 20.0
 """Length of the slow rise of the input in periods of the linear rig."""
 INTERVALS = 100
-"""Pieces of the rise, and of the first wait."""
+"""Number of pieces of the rise, and of the first wait."""
 SETTLED = 1e-9
-"""Relative change of the states over one wait below which they rest."""
+"""Relative change of the states during one wait below which they are at rest."""
 WAITS = 7
 """Each wait is twice as long as the one before."""
 TOLERANCE = 1e-9
-"""Error allowed per step on the way, relative to the largest excursion of each state."""
+"""Error allowed per step, relative to the largest excursion of each state."""
 
 
 def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
-    """Return the states at the start of a record: those that the rig gives, and all others in static equilibrium with them.
+    """Return the states at the start of a record: those that the rig declares, and all others in static equilibrium with them.
 
-    That is the equilibrium under the first sample of the inputs, reached from rest without memory: they are raised slowly from
-    zero, so that hysteresis and friction hold what they would on a rig. A rig without a spring has no equilibrium: it starts at
-    its rest position.
+    This is the equilibrium under the first sample of the inputs, reached from rest with empty memories: the inputs are raised
+    slowly from zero, so that hysteresis and friction hold the same forces as on a rig. A rig without a spring has no equilibrium
+    and starts at its rest position.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) ->
 
 
 def _risen(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
-    """Return where a rig of one motion rests after a slow rise of its input, simulated with much damping."""
+    """Return the state in which a rig with one motion rests after a slow rise of its input, simulated with high damping."""
     state = np.zeros(max(1, len(structure.states)))
     motion = structure.rig.motion
     if motion.inertia is None:
@@ -85,16 +85,16 @@ def _risen(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDA
 
 
 def _value(structure: Structure, p: NDArray[np.float64], expression: sp.Expr) -> float:
-    """Return the value of an expression of the rig's own symbols."""
+    """Return the value of an expression in the rig's own symbols."""
     return float(expression.subs({s: p[structure.names.index(s.name)] for s in expression.free_symbols}))
 
 
 def _quiet_parameters(
     structure: Structure, p: NDArray[np.float64], critical_damping: float
 ) -> NDArray[np.float64]:
-    """Return parameters with the same equilibria that are reached without swinging past them and without waiting.
+    """Return parameters with the same equilibria, but with critical damping and without delays and disturbances.
 
-    Swinging past an equilibrium would leave a memory in hysteresis and friction that a rig at rest does not have.
+    An overshoot of the equilibrium would leave a memory in hysteresis and friction that a rig at rest does not have.
     """
     quiet = p.copy()
     damping = structure.names.index(structure.rig.motion.damping.name)
@@ -120,7 +120,7 @@ def _settled(
     ramp: tuple[float, float],
     duration: float,
 ) -> NDArray[np.float64] | None:
-    """Return the state after a ramp of the input and waits until nothing moves; None if the motion has no end."""
+    """Return the state after a ramp of the input and waits until all states are at rest; None if the simulation fails."""
     velocity = structure.velocity_index or 0
     interval = duration / INTERVALS
     samples = np.linspace(*ramp, INTERVALS + 1)

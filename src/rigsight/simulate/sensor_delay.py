@@ -16,7 +16,7 @@ from rigsight.simulate.structure import Structure
 def as_measured(
     structure: Structure, p: NDArray[np.float64], out: NDArray[np.float64], held: HeldInput
 ) -> NDArray[np.float64]:
-    """Shift outputs by the delays of their sensors; before the record the motion went on as it started, behind it as it ended.
+    """Shift outputs by the delays of their sensors; beyond its ends the record is continued with its rates there.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def as_measured(
     p
         Parameter values, shape (n_parameters, n_sets).
     out
-        What the kernel computed, shape (n_samples, n_computed, n_sets); the last columns are the rates of those that are late.
+        Outputs of the kernel, shape (n_samples, n_computed, n_sets); the last columns are the rates of the delayed outputs.
     held
         Input of the simulation, for its sample time.
 
@@ -51,7 +51,7 @@ def as_measured(
 def _shifted(
     value: NDArray[np.float64], rise: NDArray[np.float64], delays: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return values, shape (n_samples, n_sets), so many samples late; `rise` is their slope per sample."""
+    """Return values, shape (n_samples, n_sets), delayed by numbers of samples (n_sets,); `rise` is their slope per sample."""
     n_samples = value.shape[0]
     shifted = np.empty_like(value)
     for i, delay in enumerate(delays):
@@ -60,7 +60,7 @@ def _shifted(
         s = place - start
         x, v = value[:, i], rise[:, i]
         a, b, va, vb = x[start], x[start + 1], v[start], v[start + 1]
-        # A set that diverges holds numbers beyond the range.
+        # The values of a set that diverges may overflow.
         with np.errstate(over="ignore", invalid="ignore"):
             inside = a + s * (va + s * (3.0 * (b - a) - 2.0 * va - vb + s * (2.0 * (a - b) + va + vb)))
         before = np.where(s < 0.0, x[0] + v[0] * place, inside)

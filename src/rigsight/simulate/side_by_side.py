@@ -1,4 +1,4 @@
-"""Simulate many parameter sets of a structure for a fit: side by side, or one with its derivatives."""
+"""Simulation of many parameter sets of a structure for a fit: side by side, or one with its derivatives."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from rigsight.simulate.structure import Structure
 from rigsight.simulate.substeps import Substeps, relative_needs
 
 _NUDGE = 1e-12
-"""What moves a state that rests: far below any accuracy, and unstable steps make it large all the same."""
+"""Perturbation of a state at rest: far below any accuracy, but unstable steps amplify it visibly."""
 _CAUTION = 0.6
-"""Share of the predicted number of substeps that is tried first."""
+"""Share of the predicted number of substeps below which numbers are not tried."""
 _SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 
 
@@ -53,12 +53,12 @@ def simulate_sets(
     n_samples
         Samples of the record.
     substeps
-        Runge-Kutta steps per piece of the input, see `choose_substeps`. Where something acts late within the rig, each set is
-        simulated accurately, one after the other, and they are not read.
+        Runge-Kutta steps per piece of the input, see `choose_substeps`. If there are delays within the rig, the sets are
+        simulated accurately, one after the other, and this is not used.
 
     Returns
     -------
-    Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
+    Shape (n_samples, n_outputs, n_sets); NaN or infinity for a set that diverges.
     """
     held, p = read_ahead(structure, held, p)
     if structure.histories:
@@ -77,7 +77,7 @@ def _one_by_one(
     initial_states: NDArray[np.float64],
     n_samples: int,
 ) -> NDArray[np.float64]:
-    """Return the outputs of sets that each have a past of their own, shape (n_samples, n_outputs, n_sets)."""
+    """Return the outputs of sets that each need a history of their own, shape (n_samples, n_outputs, n_sets)."""
     sets = []
     for own, state in zip(p.T, initial_states.T, strict=True):
         status, out, _ = kernel_of(structure).simulate_one(
@@ -93,16 +93,16 @@ def normal_equations(
     p: NDArray[np.float64],
     initial_states: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the products of weighted residuals and differences that a step of least squares needs of some records.
+    """Return the products of weighted residuals and differences that a least-squares step needs for some records.
 
-    Their outputs are never kept: for many records and sets these go through the memory for longer than they take to compute.
+    Outputs are not stored: for many records and sets, moving them through memory would take longer than computing them.
 
     Parameters
     ----------
     structure
-        Rig and effects that carry no tangents; no sensor is late, as what it shows is interpolated between samples afterwards.
+        Rig and effects whose kernel has no tangents; no sensor may be delayed, because its reading is interpolated afterwards.
     records
-        What is fitted.
+        The fitted records.
     p
         Shape (n_parameters, n_sets).
     initial_states
@@ -115,7 +115,7 @@ def normal_equations(
     Raises
     ------
     ValueError
-        If a sensor is late.
+        If a sensor is delayed, or there are delays within the rig.
     """
     if structure.is_shifted or structure.histories:
         raise ValueError(
@@ -125,12 +125,12 @@ def normal_equations(
 
 
 def carries_tangents(structure: Structure) -> bool:
-    """Return True if the kernel of a structure carries derivatives along, False if it takes differences of sets."""
+    """Return True if the kernel of a structure integrates derivatives with the motion, False if it uses differences of sets."""
     return kernel_of(structure).carries_tangents
 
 
 def differs_at_events(structure: Structure) -> bool:
-    """Return True where differences of sets have to be long: events and steps of each set lie elsewhere by a tolerance."""
+    """Return True if differences of sets need long steps, because events and steps of each set are located to a tolerance."""
     if structure.is_shifted or structure.histories or structure.jumps_at_a_place:
         return True
     return bool(freeze(structure).frictions) and not carries_tangents(structure)
@@ -144,18 +144,18 @@ def tangent_equations(
     initial_states: NDArray[np.float64],
     initial_slopes: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the products of weighted residuals and their derivatives that a step of least squares needs of some records.
+    """Return the products of weighted residuals and their derivatives that a least-squares step needs for some records.
 
     Parameters
     ----------
     structure
-        Rig and effects, which carry tangents.
+        Rig and effects whose kernel has tangents.
     records
-        What is fitted.
+        The fitted records.
     p
         Shape (n_parameters,).
     dp
-        Derivatives of the parameters by each direction, shape (n_parameters, n_directions).
+        Derivatives of the parameters along each direction, shape (n_parameters, n_directions).
     initial_states
         Shape (n_records, n_states).
     initial_slopes
@@ -178,21 +178,21 @@ def simulate_tangents(
     n_samples: int,
     substeps: int | Substeps,
 ) -> NDArray[np.float64]:
-    """Simulate one parameter set with its derivatives by any directions of parameters and initial states.
+    """Simulate one parameter set with its derivatives along any directions of parameters and initial states.
 
-    They are those of the equations, carried along with the motion: the reversal of a velocity under dry friction and the jump of
-    a held input that arrives late included. No step is chosen.
+    The derivatives of the equations are integrated with the motion, including the reversal of a velocity under dry friction and
+    the jump of a delayed held input. No difference step has to be chosen.
 
     Parameters
     ----------
     structure
-        Rig and effects, which carry tangents.
+        Rig and effects whose kernel has tangents.
     held
         Input between its samples.
     p
         Shape (n_parameters,).
     dp
-        Derivatives of the parameters by each direction, shape (n_parameters, n_directions).
+        Derivatives of the parameters along each direction, shape (n_parameters, n_directions).
     initial_state
         Shape (n_states,).
     initial_slope
@@ -204,8 +204,8 @@ def simulate_tangents(
 
     Returns
     -------
-    Shape (n_samples, n_outputs, 1 + n_directions): the outputs, and behind them their derivatives; NaN or infinity where the
-    simulation diverges.
+    Shape (n_samples, n_outputs, 1 + n_directions): the outputs, followed by their derivatives; NaN or infinity if the simulation
+    diverges.
     """
     steps = Substeps.per_piece(
         substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
@@ -222,9 +222,9 @@ def choose_substeps(
     accuracy: float,
     most: int = _SUBSTEPS[-1],
 ) -> Substeps:
-    """Return few substeps whose error against the accurate integrator is below `accuracy`, fewest where the motion is slow.
+    """Return few substeps whose error relative to the accurate integrator is below `accuracy`, with fewest for slow motion.
 
-    Kinks make the error fall with the square of the step; numbers that this rule excludes are not tried.
+    Because of kinks, the error decreases with the square of the step; numbers that this rule excludes are not tried.
 
     Raises
     ------
@@ -235,11 +235,11 @@ def choose_substeps(
         return Substeps(1)
     taken = np.zeros(held.n_pieces, dtype=np.intc)
     exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)
-    # A motion that has left the range of its squares is finite still.
+    # The squares of a finite motion may overflow.
     with np.errstate(over="ignore", invalid="ignore"):
         size = np.std(exact, axis=0) + 1e-300
     state = np.asarray(initial_state, dtype=np.float64)[:, None]
-    # A state that rests stays at rest with steps that are far too long for it, until anything moves it.
+    # A state exactly at rest would stay at rest even with unstable steps, so it is perturbed.
     both = np.hstack([state, state + _NUDGE * (1.0 + np.abs(state))])
     twice = np.repeat(p[:, None], 2, axis=1)
     least, needs = 1.0, relative_needs(taken)
@@ -253,7 +253,7 @@ def choose_substeps(
         error = float(np.max(errors))
         if error <= accuracy:
             return steps
-        # An error as large as the motion is that of unstable steps, and tells nothing of how far they are from stable ones.
+        # An error as large as the motion comes from unstable steps and does not show how many are needed.
         if error < 1.0:
             least = _CAUTION * substeps * np.sqrt(error / accuracy)
     raise SimulationError(

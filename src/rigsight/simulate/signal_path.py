@@ -1,7 +1,7 @@
 """Insertion of effects into the equations of a rig: one pass along its places, which builds an `EquationTree`.
 
-At a drive: ``signal -> delays -> static effects and lags -> generalized force``. At a joint: ``motion -> what stands between it
-and the spring -> spring -> what changes its torque``, other torques beside. At a sensor: ``reading -> effects -> delays``.
+At a drive: ``signal -> delays -> static effects and lags -> generalized force``. At a joint: ``motion -> effects on deflection ->
+spring -> effects on its torque``, and other torques in parallel. At a sensor: ``reading -> effects -> delays``.
 """
 
 from __future__ import annotations
@@ -48,15 +48,15 @@ def equation_tree(
     effects
         Effects in the order of the signal path.
     symbols
-        Symbol of each parameter of the structure by its name there.
+        Symbol of each parameter of the structure, by its name in the structure.
     unique
         Name of each effect's parameter in the structure, by (effect, own name).
     fixed
         Values of parameters that appear in the equations as numbers.
     offsets
-        Sensors whose readings are shifted, each by a state that never changes.
+        Sensors whose readings are shifted, each by a constant state.
     observed
-        Sensors of an observer, towards whose measured readings the motion is pulled.
+        Sensors of an observer, which corrects the motion towards their measured readings.
     """
     bandwidths = {sensor: symbols[bandwidth_name(sensor)] for sensor in observed}
     ahead = {s: symbols[ahead_name(s)] for s in observed if ahead_name(s) in symbols}
@@ -66,16 +66,16 @@ def equation_tree(
 def bound_to(
     rig: Rig, symbols: Mapping[str, sp.Symbol], expressions: Sequence[sp.Expr]
 ) -> tuple[sp.Expr, ...]:
-    """Return expressions of a rig's declaration in the symbols of its structure, drives and sensors without effects.
+    """Return expressions of a rig's declaration in the symbols of its structure, with drives and sensors without effects.
 
     Parameters
     ----------
     rig
         The rig.
     symbols
-        Symbol of each parameter of the structure by its name there.
+        Symbol of each parameter of the structure, by its name in the structure.
     expressions
-        Of the rig's own names; none reads the force of a joint.
+        Expressions in the rig's own names; none may contain the force of a joint.
     """
     path = _Path(Binder(rig, symbols, {}, {}), rig, ())
     return path.bound(expressions)
@@ -99,11 +99,11 @@ class _Path:
         self._bandwidths = bandwidths or {}
         self._ahead = ahead or {}
         self._shown: dict[str, tuple[sp.Expr, sp.Expr]] = {}
-        """Reading of each sensor of the observer, and the time by which it is late."""
+        """Reading of each sensor of the observer, and its delay."""
         self._offsets = {name: sp.Symbol(f"offset of {name}", real=True) for name in offsets}
         self._definitions: list[Definition] = []
         self._values: dict[sp.Symbol, sp.Expr] = {}
-        """What signals, drives and sensors are, by the symbols under which others read them."""
+        """Expressions of signals, drives and sensors, by the symbols that denote them in the rig."""
         self._read = _read_by_laws(rig)
 
     def tree(self) -> EquationTree:
@@ -146,7 +146,7 @@ class _Path:
         ]
 
     def bound(self, expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
-        """Return expressions with what drives and sensors are in front of any joint."""
+        """Return expressions with drives and sensors replaced by their definitions, without forces of joints."""
         mechanism = self._rig.mechanism
         drives = {drive.name: drive for drive in mechanism.drives}
         sensors = {sensor.name: sensor for sensor in mechanism.sensors}
@@ -178,7 +178,7 @@ class _Path:
         return equations_of_motion(self._rig, self._bound, resisting, pulled)
 
     def _observer(self, states: Sequence[FirstOrderState]) -> sp.Matrix:
-        """Return the accelerations by which an observer follows what sensors showed, shape (n_degrees, 1)."""
+        """Return the accelerations by which an observer follows the measured readings, shape (n_degrees, 1)."""
         mechanism = self._rig.mechanism
         sensors = {sensor.name: sensor for sensor in mechanism.sensors}
         tree = EquationTree((), tuple(self._definitions), EquationsOfMotion(), (), ())
@@ -198,14 +198,14 @@ class _Path:
         return found
 
     def _bound(self, expression: sp.Expr) -> sp.Expr:
-        """Bind an expression of the rig, drives and sensors as they are behind their effects."""
+        """Bind an expression of the rig, with drives and sensors after their effects."""
         for symbol, signal in self._rig.mechanism.signals.items():
             if symbol in expression.free_symbols and symbol not in self._values:
                 self._values[symbol] = self._name(Kind.SIGNAL, symbol.name, self._bound(signal))
         return self._binder.rig(expression).xreplace(self._values)
 
     def _name(self, kind: Kind, name: str, expression: sp.Expr) -> sp.Symbol:
-        """Return a symbol for what the rig calls by a name; what is one symbol already keeps it."""
+        """Return a symbol for a named expression of the rig; an expression that is a symbol already keeps it."""
         if expression.is_Symbol:
             return expression
         symbol = sp.Symbol(f"{name}:{kind.value}", real=True)
@@ -216,7 +216,7 @@ class _Path:
         return [e for e in self._effects if e.place in kinds and self._rig.acts_at(e) == place]
 
     def _drive(self, drive: Drive) -> list[FirstOrderState]:
-        """Chain the actuator effects: what is static or a lag may as well act on what is late already."""
+        """Chain the actuator effects, delays first, because static effects and lags may as well act on the delayed signal."""
         source, lags = self._name(Kind.DRIVE, drive.name, self._bound(drive.signal)), []
         effects = self._at(drive.name, Place.ACTUATOR)
         for effect in effects:
@@ -225,7 +225,7 @@ class _Path:
                 source = self._define(Kind.DRIVE, effect, late(source, delay))
         for effect in effects:
             if effect.drive is not None:
-                # The speed is that of the drive's own shaft, wherever the joints are.
+                # The speed is that of the drive's own shaft, not of a joint.
                 speed = self._bound(self._rig.mechanism.rate(drive.along))
                 signals = {**self._of_motion(), "u": source, "v": speed}
                 lags += self._states(effect, signals)
@@ -247,7 +247,7 @@ class _Path:
             if effect.torque is None:
                 continue
             if effect.reads(canonical.load):
-                # The effects of other joints' springs are left out: two joints may each lean on the other.
+                # Effects on the springs of other joints are left out, because the loads of two joints may depend on each other.
                 load = sp.Add(self._bound(self._rig.mechanism.carried_by(joint)), *carried)
                 signals = {**signals, "load": self._define(Kind.LOAD, effect, load)}
             torque = self._define(Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals))
@@ -260,7 +260,7 @@ class _Path:
         return tuple(term for term in (damping, spring, *torques, force) if term != 0)
 
     def _signals(self, joint: Joint) -> dict[str, sp.Expr]:
-        """Return what effects read of the motion of a joint."""
+        """Return the signals of the motion of a joint that effects use."""
         mechanism = self._rig.mechanism
         x = self._bound(joint.motion) - self._bound(joint.rest)
         rate = mechanism.rate(joint.motion)
@@ -282,20 +282,20 @@ class _Path:
         return signals
 
     def _of_motion(self) -> dict[str, sp.Expr]:
-        """Return what effects at a drive, a sensor or a state read of the motion: that of the first joint."""
+        """Return the signals of the motion for effects at a drive, a sensor or a state: those of the first joint."""
         return self._signals(self._rig.mechanism.joints[0])
 
     def _spring(
         self, effects: Sequence[Effect], signals: Mapping[str, sp.Expr], memories: list[FirstOrderState]
     ) -> tuple[sp.Expr, sp.Expr]:
-        """Chain what stands between displacement and spring, then what changes the spring's torque.
+        """Chain the effects between displacement and spring, then those on the spring's torque.
 
         Returns
         -------
         torque
-            Of the spring.
+            Torque of the spring.
         rate
-            At which it is squeezed.
+            Rate of its deflection.
         """
         deflection, rate = signals["x"], signals["v"]
         for effect in effects:
@@ -325,7 +325,7 @@ class _Path:
         return torque, rate
 
     def _followers(self) -> list[FirstOrderState]:
-        """Return the rig's own states; effects change the rate of the one that follows the motion."""
+        """Return the rig's own states; effects change the rate of the state that follows the motion."""
         follower, found = self._rig.follower, []
         for state in self._rig.mechanism.states:
             if follower is None or state.symbol != follower.symbol:
@@ -341,7 +341,7 @@ class _Path:
                 "lateral_feedback": self._bound(follower.feedback),
             }
             linear = signals["creep_gain"] * signals["creepage"]
-            # Each effect gives the whole rate; two of them add up what each takes off the linear one.
+            # Each effect defines the whole rate; of several effects, the differences from the linear rate are added.
             changes = [
                 self._define(
                     Kind.LATERAL, effect, self._binder.effect(effect, effect.lateral, signals) - linear
@@ -355,7 +355,7 @@ class _Path:
     def _sensor(
         self, sensor: Sensor, resisting: Mapping[str, tuple[sp.Expr, ...]], states: list[FirstOrderState]
     ) -> tuple[sp.Expr, ...]:
-        """Chain the sensor effects: the delays come last, as nothing inside the simulation waits for them."""
+        """Chain the sensor effects, delays last, because the simulation itself may not need the delayed reading."""
         effects = self._at(sensor.name, Place.SENSOR)
         forces = {force_symbol(name): terms for name, terms in resisting.items()}
         shift = self._offsets.get(sensor.name, sp.Integer(0))
@@ -392,7 +392,7 @@ class _Path:
     def _define(
         self, kind: Kind, effect: Effect, expression: sp.Expr, rate_of: sp.Symbol | None = None
     ) -> sp.Symbol:
-        # No name of an effect or a parameter holds a colon.
+        # Names of effects and parameters contain no colon, so there is no conflict.
         symbol = sp.Symbol(f"{effect.name}:{kind.value}", real=True)
         self._definitions.append(Definition(symbol, expression, kind, effect.name, rate_of))
         return symbol
@@ -411,7 +411,7 @@ class _Path:
 
 
 def _read_by_laws(rig: Rig) -> frozenset[sp.Symbol]:
-    """Return the symbols of sensors that control laws, signals, states or other sensors read."""
+    """Return the symbols used by control laws, signals, states, joint forces and sensors, among them those of sensors."""
     mechanism = rig.mechanism
     laws = [drive.signal for drive in mechanism.drives] + [drive.force for drive in mechanism.drives]
     laws += [*mechanism.signals.values(), *(state.rate for state in mechanism.states)]

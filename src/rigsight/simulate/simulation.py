@@ -1,4 +1,4 @@
-"""Simulate a structure for a record's input: one parameter set, accurately."""
+"""Accurate simulation of one parameter set of a structure for a record's input."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ DEFAULT_ACCURACY = 1e-6
 LOCAL_PER_GLOBAL = 0.03
 """Error allowed per step for one unit of global error; measured on 122 rigs of the blind bench and on the sets of the thesis.
 
-Ten times as much costs a tenth less time, and is five times beside the wish where dry friction sticks and slips in a wide sweep.
+Ten times as much saves a tenth of the time, but the error is then five times the requested one if dry friction sticks and slips
+in a wide sweep.
 """
 
 _REASONS = {
@@ -43,11 +44,11 @@ _REASONS = {
 def record_input(structure: Structure, record: Record) -> HeldInput:
     """Return the input of a record between its samples, with the record's hold.
 
-    Where the motion is prescribed, it is the smoothing spline through the measured displacement.
+    A prescribed motion is the smoothing spline through the measured displacement.
     """
     mechanism = structure.rig.mechanism
     if not structure.n_inputs:
-        # What only decays reads nothing, but pieces of time it needs all the same.
+        # A rig without inputs still needs the division of time into pieces.
         return hold_input(np.zeros(record.n_samples), record.dt, "zoh")
     prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
 
@@ -65,7 +66,7 @@ def record_input(structure: Structure, record: Record) -> HeldInput:
 
 
 def _observed(record: Record, sensor: str) -> HeldInput:
-    """Return the measured motion that an observer follows, which is none where it was not measured."""
+    """Return the measured motion that an observer follows; zero if the record does not contain the sensor."""
     if sensor not in record:
         return hold_input(np.zeros(record.n_samples), record.dt, "foh")
     return hold_motion(*smooth_motion(record[sensor], record.dt), record.dt)
@@ -88,20 +89,20 @@ def simulate(
     values
         Value of each of the structure's parameters, by name.
     record
-        Input samples, hold and constants of its own; its outputs are not read.
+        Input samples, hold and constants of the record; its outputs are not used.
     initial_state
         Shape (n_states,), in the order of ``structure.states``; default is the static equilibrium at the first input sample.
     accuracy
         Relative RMS error to aim for.
     before
-        Input samples (the prescribed displacement, where there is one) just before the record at its sample time: what
-        hysteresis, friction and delays remember. Shape (n_before, n_inputs) in the order of the rig's inputs, (n_before,) of a
-        rig with one input, or the samples of each input by its name. The initial state is then that at the first of them.
+        Input samples (or the prescribed displacement) just before the record at its sample time, which set the memory of
+        hysteresis, friction and delays. Shape (n_before, n_inputs) in the order of the rig's inputs, (n_before,) for a rig with
+        one input, or the samples of each input by its name. The initial state is then that at the first of them.
 
     Raises
     ------
     InputError
-        If `before` is not samples of each of the rig's inputs.
+        If `before` does not contain samples of each of the rig's inputs.
     SimulationError
         If the motion diverges or the model is too stiff.
     """
@@ -142,7 +143,7 @@ def _before(
     wanted = f"{structure.rig.name} has the inputs {', '.join(inputs)}"
     if isinstance(before, Mapping):
         if set(before) != set(inputs):
-            raise InputError(f"'before' holds {', '.join(before) or 'nothing'}; {wanted}.")
+            raise InputError(f"'before' has samples of {', '.join(before) or 'nothing'}; {wanted}.")
         columns = [np.asarray(before[name], dtype=np.float64) for name in inputs]
     else:
         samples = np.asarray(before, dtype=np.float64)
@@ -157,7 +158,7 @@ def _before(
 
 
 def record_values(structure: Structure, values: Mapping[str, float], record: Record) -> dict[str, float]:
-    """Return values with the constants that are a record's own in the place of those of all records, and its observer's.
+    """Return values with a record's own constants in place of the common ones, and with the bandwidths of its observer.
 
     Raises
     ------
@@ -174,12 +175,12 @@ def record_values(structure: Structure, values: Mapping[str, float], record: Rec
 def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArray[np.float64]:
     """Return the parameter values in the order of the structure, shape (n_parameters,).
 
-    A missing value is the parameter's default; values of other names are not read.
+    A missing value is the parameter's default; values of other names are ignored.
 
     Raises
     ------
     InputError
-        Listing what is missing and has no default.
+        If a value without a default is missing; the message lists all of them.
     """
     known = {p.name: values.get(p.name, p.default) for p in structure.parameters}
     missing = [name for name, value in known.items() if value is None]
@@ -201,7 +202,7 @@ def simulate_outputs(
 ) -> NDArray[np.float64]:
     """Return the outputs of one parameter set, shape (n_samples, n_outputs).
 
-    Where `taken` is given, shape (n_pieces,), the steps of each piece of the input are written there.
+    If `taken` is given, shape (n_pieces,), the number of steps in each piece of the input is written to it.
 
     Raises
     ------
@@ -219,5 +220,5 @@ def simulate_outputs(
 
 
 def state_vector(structure: Structure, state: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the states that a kernel begins with."""
+    """Return the initial states in the form that a kernel takes."""
     return np.asarray(state, dtype=np.float64)[: max(1, len(structure.states))]

@@ -1,4 +1,4 @@
-"""Evaluation of long expressions part by part, so that nothing is computed twice."""
+"""Evaluation of long expressions part by part, so that common parts are computed once."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ class StraightLine:
     Attributes
     ----------
     parts
-        Symbol -> what it is, of arguments and of symbols in front of it.
+        Symbol -> its expression in arguments and earlier symbols.
     results
-        The expressions, of arguments and parts.
+        The expressions in terms of arguments and parts.
     """
 
     parts: Mapping[sp.Symbol, sp.Expr]
     results: tuple[sp.Expr, ...]
 
     def function(self, arguments: Sequence[sp.Symbol], modules: list[Any]) -> Callable[..., Any]:
-        """Return a function of numbers or arrays that gives the results as a list.
+        """Return a function of numbers or arrays that returns the results as a list.
 
         Parameters
         ----------
         arguments
             Its arguments.
         modules
-            As `sympy.lambdify` takes them.
+            As for `sympy.lambdify`.
         """
-        # Names that Python can read, or sympy would look through all parts for each that it cannot.
+        # Valid Python names, because sympy would search all parts to replace each invalid one.
         plain = {s: sp.Symbol(f"v{i}", real=True) for i, s in enumerate((*arguments, *self.parts))}
         parts = [(plain[s], part.xreplace(plain)) for s, part in self.parts.items()]
         results = [result.xreplace(plain) for result in self.results]
@@ -58,9 +58,9 @@ def straight_line(
     expressions
         The expressions.
     steps
-        Symbols in them that are parts already -> what they are, of symbols in front of them.
+        Symbols in them that are parts already -> their expressions in earlier symbols.
     name
-        What further parts are called: this and a number.
+        Prefix of the names of further parts, followed by a number.
     """
     expressions = tuple(map(sp.sympify, expressions))
     steps = needed_steps(expressions, steps)
@@ -73,14 +73,14 @@ def straight_line(
 def needed_steps(
     expressions: Iterable[sp.Expr], steps: Mapping[sp.Symbol, sp.Expr]
 ) -> dict[sp.Symbol, sp.Expr]:
-    """Return those of the steps that expressions are made of.
+    """Return those of the steps that expressions need.
 
     Parameters
     ----------
     expressions
         The expressions.
     steps
-        Symbol -> what it is, of symbols in front of it.
+        Symbol -> its expression in earlier symbols.
     """
     waiting = [s for expression in expressions for s in expression.free_symbols if s in steps]
     found: set[sp.Symbol] = set()
@@ -93,12 +93,12 @@ def needed_steps(
 
 
 def of_parts(parts: Mapping[sp.Symbol, sp.Expr], results: tuple[sp.Expr, ...]) -> StraightLine:
-    """Return results with the parts that they are made of, each behind those that it is made of itself.
+    """Return results with the parts that they need, each part after those on which it depends.
 
     Parameters
     ----------
     parts
-        Symbol -> what it is, in any order.
+        Symbol -> its expression, in any order.
     results
         The results.
     """

@@ -1,4 +1,4 @@
-"""A rig with a tuple of effects for simulation: its parameters, its equations, and these with definitions substituted."""
+"""A rig with a tuple of effects for simulation: its parameters, and its equations with and without definitions."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from rigsight.simulate.equation_tree import EquationTree, late, rate_within
 INPUT = sp.Symbol("input value", real=True)
 INPUT_RATE = sp.Symbol("input rate", real=True)
 INPUT_CURVATURE = sp.Symbol("input curvature", real=True)
-"""The first input of a rig, and its first and second derivative by time; names of a rig hold no blank, so none is called so."""
+"""The first input of a rig, and its first and second time derivative; names of a rig contain no blank, so none conflicts."""
 TIME = sp.Symbol("time now", real=True)
 
 
 def input_symbols(index: int) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
-    """Return the symbols of one of a rig's inputs, of its first and of its second derivative by time."""
+    """Return the symbols of one of a rig's inputs and of its first and second time derivative."""
     if index == 0:
         return INPUT, INPUT_RATE, INPUT_CURVATURE
     value, rate, curvature = (
@@ -33,7 +33,7 @@ def input_symbols(index: int) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
 
 @dataclass(frozen=True)
 class StateEquation:
-    """One state of a structure: its rate, its dimension and the half-width of the range it cannot leave, if any."""
+    """One state of a structure: its rate, its dimension and the half-width of the range that it cannot leave, if any."""
 
     symbol: sp.Symbol
     rate: sp.Expr
@@ -42,22 +42,22 @@ class StateEquation:
 
     @property
     def limited_rate(self) -> sp.Expr:
-        """The rate, zero while the state is driven against an end of its range."""
+        """The rate; zero while the state is at an end of its range and the rate points outward."""
         return rate_within(self.symbol, self.rate, self.limit)
 
 
 @dataclass(frozen=True)
 class History:
-    """A signal that acts late within the rig, so that its past is remembered.
+    """A signal that is delayed within the rig, so that its history is stored.
 
     Attributes
     ----------
     symbol
-        What stands for it where it acts.
+        Symbol of the delayed signal.
     signal
-        The signal, of states, inputs, parameters and other histories.
+        The signal as an expression in states, inputs, parameters and other histories.
     delay
-        Time by which it is late, of parameters.
+        The delay as an expression in parameters.
     """
 
     symbol: sp.Symbol
@@ -72,17 +72,17 @@ class Structure:
     Attributes
     ----------
     rig, effects
-        What was composed; the effects in the order of the signal path.
+        The rig, and its effects in the order of the signal path.
     fixed
         Effect parameters written into the equations as numbers.
     parameters, parameter_symbols
         Constants, rig parameters and effect parameters with units, and their symbols; names are unique.
     tree
-        The equations: named definitions, motion, states and outputs. What follows from it here holds no definitions.
+        The equations: named definitions, motion, states and outputs. The equations derived from it here have no definitions.
     offsets
         Sensors whose readings are shifted by the last states, in their order.
     observed
-        Sensors of an observer, towards whose measured readings the motion is pulled; these are inputs behind those of the rig.
+        Sensors of an observer, which corrects the motion towards their measured readings; these inputs follow those of the rig.
     """
 
     rig: Rig
@@ -96,20 +96,20 @@ class Structure:
 
     @property
     def n_inputs(self) -> int:
-        """Number of the rig's inputs and of the readings that an observer takes in."""
+        """Number of the rig's inputs and of the readings that an observer uses."""
         return len(self.rig.inputs) + len(self.observed)
 
     @cached_property
     def equations(self) -> tuple[StateEquation, ...]:
         """The states with their rates, dimensions and limits: coordinates, velocities, then the others.
 
-        What is late stands in them as if it arrived at once.
+        They contain no delays.
         """
         return self._equations(self.tree.flattened)
 
     @cached_property
     def remembering_equations(self) -> tuple[StateEquation, ...]:
-        """The same with the symbols of `histories`, as they are simulated."""
+        """The same with the symbols of `histories`, as used in the simulation."""
         return self._equations(self.tree.remembering) if self.histories else self.equations
 
     def _equations(self, flattened: Callable[[sp.Expr], sp.Expr]) -> tuple[StateEquation, ...]:
@@ -127,7 +127,7 @@ class Structure:
 
     @property
     def out_of_balance(self) -> tuple[sp.Expr, ...]:
-        """For each coordinate what vanishes at standstill: its acceleration as a formula, or the force that is left."""
+        """An expression for each coordinate that is zero in equilibrium: its acceleration as a formula, or its total force."""
         motion = self.tree.motion
         if self.elimination is not None:
             return tuple(map(self.tree.flattened, motion.forces))
@@ -136,15 +136,15 @@ class Structure:
 
     @cached_property
     def elimination(self) -> Elimination | None:
-        """How accelerations are found that stand in the equations as symbols; None where they are formulas."""
+        """The elimination for accelerations that appear in the equations as symbols; None if they are formulas."""
         motion = self.tree.motion
         return None if motion.is_written else Elimination.of(motion.mass)
 
     @cached_property
     def steps(self) -> dict[sp.Symbol, sp.Expr]:
-        """What is computed before the equations, symbol by symbol: masses, loads and what the accelerations are found with.
+        """Values computed before the equations, symbol by symbol: masses, loads and the steps to the accelerations.
 
-        It is empty where accelerations are formulas. What is late stands in it as if it arrived at once.
+        Empty if accelerations are formulas. They contain no delays.
         """
         return self._steps(self.tree.flattened)
 
@@ -163,12 +163,12 @@ class Structure:
 
     @cached_property
     def outputs(self) -> tuple[sp.Expr, ...]:
-        """The rig's outputs as expressions; what is late stands in them as if it arrived at once."""
+        """The rig's outputs as expressions without delays."""
         return tuple(self.tree.flattened(sp.Add(*output.terms)) for output in self.tree.outputs)
 
     @cached_property
     def histories(self) -> tuple[History, ...]:
-        """What acts late within the rig and is remembered while it is simulated."""
+        """Signals that are delayed within the rig and whose history is stored during the simulation."""
         tree = self.tree
         late_signals = {
             d.symbol: d.expression.args for d in tree.definitions if isinstance(d.expression, late)
@@ -180,17 +180,17 @@ class Structure:
 
     @cached_property
     def shown_late(self) -> tuple[sp.Expr | None, ...]:
-        """For each output the time by which it is shown late behind the simulation, or None."""
+        """For each output the delay that is applied after the simulation, or None."""
         return tuple(self.tree.shown_lateness(sp.Add(*output.terms)) for output in self.tree.outputs)
 
     @property
     def is_shifted(self) -> bool:
-        """Whether outputs are known only once all of a record is simulated."""
+        """Whether outputs are available only after the whole record has been simulated."""
         return any(delay is not None for delay in self.shown_late)
 
     @cached_property
     def delay(self) -> sp.Expr | None:
-        """Time by which the only input arrives late, or None."""
+        """Delay of the only input, or None."""
         tree = self.tree
         arriving = [
             tree.lateness(d.symbol)[1]
@@ -203,7 +203,7 @@ class Structure:
 
     @cached_property
     def observed_delays(self) -> dict[str, sp.Expr]:
-        """Time by which sensors of an observer are late, of parameters; those that are on time are left out."""
+        """Delays of the sensors of an observer as expressions in parameters; sensors without a delay are left out."""
         symbols = dict(zip(self.names, self.parameter_symbols, strict=True))
         found: dict[str, sp.Expr] = {}
         for effect in self.effects:
@@ -221,7 +221,7 @@ class Structure:
 
     @property
     def jumps_at_a_place(self) -> bool:
-        """Whether a force jumps where a motion gets somewhere: a damper that is squeezed with a spring, behind a play."""
+        """Whether a force jumps at a position: that of a damper parallel to a spring, behind a play."""
         return any(
             effect.deflection is not None and joint_of(self.rig, effect).damps_spring
             for effect in self.effects
@@ -229,12 +229,12 @@ class Structure:
 
     @property
     def first_shown_late(self) -> sp.Expr | None:
-        """Time by which the first output is measured late, or None."""
+        """Delay of the first output that is applied after the simulation, or None."""
         return self.shown_late[0]
 
     @property
     def velocity_index(self) -> int | None:
-        """Index of the velocity of the moving mass among the states, None where the motion is prescribed."""
+        """Index of the (first) velocity among the states, None if the motion is prescribed."""
         return len(self.tree.motion.coordinates) or None
 
     @property
@@ -244,7 +244,7 @@ class Structure:
 
     @cached_property
     def computed_outputs(self) -> tuple[sp.Expr, ...]:
-        """The outputs, and behind them the rates of those that are shown late: they are interpolated with them."""
+        """The outputs, followed by the rates of those in `shown_late`, which are needed for their interpolation."""
         shown = self.outputs
         if self.histories:
             shown = tuple(self.tree.remembering(sp.Add(*output.terms)) for output in self.tree.outputs)
@@ -299,14 +299,14 @@ class Structure:
 
     @property
     def special_cases(self) -> frozenset[str]:
-        """Own names of the effects' parameters that stand in the equations at their special values."""
+        """Own names of the effects' parameters that are written into the equations at their special values."""
         fixed = dict(self.fixed)
         return frozenset(
             own for e in self.effects for own in e.special_cases if self.parameter_name(e, own) in fixed
         )
 
     def values_of(self, effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
-        """Return an effect's own values by their own names, out of values of this structure."""
+        """Return an effect's values by their own names, from values of this structure."""
         names = {p.name: self.parameter_name(effect, p.name) for p in effect.parameters}
         return {own: values[name] for own, name in names.items() if name in values}
 
@@ -317,19 +317,19 @@ def bandwidth_name(sensor: str) -> str:
 
 
 def ahead_name(sensor: str) -> str:
-    """Return the name of the time by which the measured motion of a late sensor is read ahead for an observer."""
+    """Return the name of the time by which the measured motion of a delayed sensor is advanced for an observer."""
     return f"reading ahead of {sensor}"
 
 
 def _slope(reading: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Return the derivative of a reading; where it jumps, that beside the jump."""
+    """Return the derivative of a reading, without the impulse at a jump."""
     return sp.diff(reading, symbol).replace(sp.DiracDelta, lambda *_: sp.Integer(0))
 
 
 def carried_over(values: Mapping[str, float], source: Structure, target: Structure) -> dict[str, float]:
-    """Return values of one structure by the names that they have in another, as far as it has them.
+    """Return values of one structure by their names in another, for the parameters that both have.
 
-    An effect's parameter may be qualified in one and not in the other.
+    An effect's parameter may have a qualified name in one and not in the other.
     """
     carried = {
         p.name: values[p.name] for p in (*target.rig.constants, *target.rig.parameters) if p.name in values
@@ -344,7 +344,7 @@ def carried_over(values: Mapping[str, float], source: Structure, target: Structu
 
 
 def special_values(rig: Rig, effects: Iterable[Effect], beside: Iterable[Effect] = ()) -> dict[str, float]:
-    """Return the values at which parameters of effects shorten the equations, by their names beside other effects."""
+    """Return the special values of effects, which shorten the equations, by their names in a structure with other effects."""
     effects = tuple(effects)
     names = unique_names(rig, (*effects, *beside))
     return {

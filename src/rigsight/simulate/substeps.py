@@ -6,23 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 _NEEDED_BY = 0.99
-"""Share of the pieces that need no more than the full number of steps: those that need more are cut up by events."""
+"""Share of the pieces that need at most the full number of steps; the others need more only because events divide them."""
 
 
 class Substeps(int):
-    """The most Runge-Kutta steps that a piece of an input takes, and how many each takes.
+    """Largest number of Runge-Kutta steps in a piece of an input, and the number in each piece.
 
     Attributes
     ----------
     needs
-        Steps that each piece needs as a share of the most, see `relative_needs`; None where every piece takes the most.
+        Steps that each piece needs as a share of the largest number, see `relative_needs`; None if all pieces take that number.
     """
 
     needs: NDArray[np.float64] | None
     _schedule: NDArray[np.intc] | None
 
     def __new__(cls, most: int, needs: NDArray[np.float64] | None = None) -> Substeps:
-        """Make the most steps of a piece, `needs` saying which need as many."""
+        """Create the schedule from the largest number of steps and the `needs` of the pieces."""
         made = super().__new__(cls, most)
         made.needs = needs
         made._schedule = None
@@ -30,26 +30,26 @@ class Substeps(int):
 
     @property
     def mean(self) -> float:
-        """Steps per piece on average: what a simulation costs."""
+        """Mean number of steps per piece, which determines the cost of a simulation."""
         return float(self) if self.needs is None else float(np.mean(self.per_piece(self.needs.size)))
 
     def with_most(self, most: int) -> Substeps:
-        """Return the same needs with another number of steps at the most."""
+        """Return the same needs with another largest number of steps."""
         return Substeps(most, self.needs)
 
     def per_piece(self, n_pieces: int) -> NDArray[np.intc]:
-        """Return the steps of each piece, shape (n_pieces,); all the most where these needs are of another input."""
+        """Return the steps of each piece, shape (n_pieces,); the largest number for all if the needs are of another input."""
         if self.needs is None or self.needs.size != n_pieces:
             return np.full(n_pieces, int(self), dtype=np.intc)
         if self._schedule is None:
-            # A product such as 3 * (1 / 3) may lie above the whole number that it is.
+            # A product such as 3 * (1 / 3) may be slightly above its exact integer value.
             steps = np.ceil(self.needs * int(self) - 1e-9)
             self._schedule = np.asarray(np.clip(steps, 1, int(self)), dtype=np.intc)
         return self._schedule
 
 
 def relative_needs(taken: NDArray[np.intc]) -> NDArray[np.float64]:
-    """Return how many steps pieces need in units of what all but a few of them can do with.
+    """Return the steps that pieces need, relative to a number that is sufficient for all but a few of them.
 
     Parameters
     ----------

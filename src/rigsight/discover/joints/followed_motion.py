@@ -26,44 +26,44 @@ Floats = NDArray[np.float64]
 DECADES = (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0)
 """Intensities of an unknown force that are tried, in decades of its size and the motion's angular frequency."""
 BREADTH = 30.0
-"""Standard deviation of the first state in units of its size: what no sensor shows may be far off."""
+"""Standard deviation of the first state in units of its size: the estimate of a state that no sensor measures may be far off."""
 _KNOWN = 0.5
-"""Standard deviation of a parameter that was identified without the force, in units of itself: what is the same as the force to
-the sensors (the inertia of the joint it acts on) would run away otherwise."""
+"""Relative standard deviation of a parameter that was identified without the force. Without this prior, a parameter that the
+sensors do not distinguish from the force (the inertia of the joint on which it acts) would diverge."""
 _FACTOR = 2.0
-"""Most by which a linearized estimate may change a parameter at once."""
+"""Largest factor by which one linearized estimate may change a parameter."""
 _FACTOR_IN_ALL = 4.0
-"""Most by which a parameter may differ from what was known beforehand: a force at the wrong joint would take it anywhere."""
+"""Largest factor by which a parameter may differ from its prior value; a force at the wrong joint could distort it further."""
 
 
 @dataclass(eq=False)
 class FollowedMotion:
-    """A rig with an unknown force at some joints, as far as its motion is known.
+    """A rig with an unknown force at some joints, and the current estimate of its motion.
 
     Attributes
     ----------
     equations
         Of the rig with the forces.
     forces
-        Where each force and its rate stand among the states.
+        Index of each force and of its rate among the states.
     fitted
-        Parameters of which the equations give derivatives.
+        Parameters with respect to which the equations have derivatives.
     values
         Constants and parameters.
     motions
         States per record, shape (n_samples, n_states) each.
     sizes
-        Of the states.
+        Typical size of each state, shape (n_states,).
     omega
         Angular frequency of the motion [rad/s].
     decade
-        Logarithm of the forces' intensity.
+        Common logarithm of the forces' intensity.
     errors
         Standard errors of the states, as `motions`.
     known
-        Values that were known beforehand.
+        Prior values of constants and parameters.
     jumps
-        Per record where the forces may jump, shape (n_samples,); None for nowhere.
+        Samples of each record after which the forces may jump, shape (n_samples,); None for none.
     """
 
     equations: MotionEquations
@@ -79,31 +79,31 @@ class FollowedMotion:
     jumps: list[NDArray[np.bool_] | None] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Keep the prior values, to which an estimate is held where the records do not determine it."""
+        """Keep the prior values; they hold an estimate that the records do not determine."""
         self.known = dict(self.values)
         self.jumps = [None] * len(self.motions)
 
     @property
     def offsets(self) -> Floats:
-        """How far the fitted parameters are from what was known beforehand, shape (n_fitted,)."""
+        """Differences of the fitted parameters from their prior values, shape (n_fitted,)."""
         return np.array([self.values[p.name] - self.known[p.name] for p in self.fitted])
 
     def linearized(self, records: Sequence[Record]) -> list[LinearizedMotion]:
-        """Linearize about what is known of the motion in each record."""
+        """Linearize about the current estimate of the motion in each record."""
         return [
             self.equations.about(record, self.values, motion)
             for record, motion in zip(records, self.motions, strict=True)
         ]
 
     def left(self, records: Sequence[Record], noise: Floats) -> float:
-        """Return the weighted square of what the sensors showed beside the motion."""
+        """Return the weighted sum of squares of the sensor residuals of this motion."""
         return float(sum(np.nansum((m.residual / noise) ** 2) for m in self.linearized(records)))
 
 
 def with_unknown_forces(
     rig: Rig, joints: Sequence[str], fitted: Sequence[Parameter]
 ) -> tuple[MotionEquations, tuple[tuple[int, int], ...]]:
-    """Return the equations of a rig with an unknown force at each of some joints, and where the forces stand among the states."""
+    """Return the equations of a rig with an unknown force at each of some joints, and the indices of the forces in the state."""
     effects = [placed(UNKNOWN_FORCE, joint) for joint in joints]
     structure = compose(rig, effects)
     equations = MotionEquations(structure, [p.name for p in fitted])
@@ -113,14 +113,14 @@ def with_unknown_forces(
 def improved(
     followed: Sequence[FollowedMotion], records: Sequence[Record], noise: Floats, decades: Sequence[float]
 ) -> float:
-    """Estimate motion and forces once more, for rigs with as many states side by side.
+    """Estimate motion and forces once more, for several rigs with the same number of states at once.
 
     Parameters
     ----------
     followed
-        What is known so far; changed in place.
+        The current estimates; changed in place.
     records
-        Inputs, and what the sensors showed.
+        Inputs and sensor readings.
     noise
         Noise floor of each output, shape (n_outputs,).
     decades
@@ -128,7 +128,7 @@ def improved(
 
     Returns
     -------
-    The largest change of a state that is no force, in its size.
+    The largest change of a state other than the forces, relative to its size.
     """
     n_records = len(records)
     linear = [motion for one in followed for motion in one.linearized(records)]
@@ -168,7 +168,7 @@ def _intensities(followed: Sequence[FollowedMotion], decades: Floats, n_records:
 
 
 def _squares(cases: Cases, gains: Gains) -> Floats:
-    """Return the sum of the squares of what the filter did not expect, shape (n_cases, n_intensities)."""
+    """Return the sum of squares of the filter's whitened prediction errors, shape (n_cases, n_intensities)."""
     total = np.zeros(gains.variance.shape[1:3])
 
     def tell(_sample: int, _sensor: int, rows: Floats) -> None:
@@ -180,16 +180,16 @@ def _squares(cases: Cases, gains: Gains) -> Floats:
 
 
 def prior_spread(one: FollowedMotion, target: float, own: Floats) -> Floats:
-    """Return how far the parameters may be off by what was known beforehand, shape (n_fitted,).
+    """Return the prior standard deviations of the parameters, shape (n_fitted,).
 
     Parameters
     ----------
     one
         The rig.
     target
-        Square of the whitened readings: one that was zero may explain all of it.
+        Sum of squares of the whitened readings: a parameter with prior value zero may explain all of it.
     own
-        Squares of the whitened responses to the parameters.
+        Sums of squares of the whitened responses to the parameters.
     """
     known = np.array([one.known[p.name] for p in one.fitted])
     reach = np.sqrt(target / np.where(own > 0.0, own, 1.0))
@@ -197,7 +197,7 @@ def prior_spread(one: FollowedMotion, target: float, own: Floats) -> Floats:
 
 
 def within_reach(one: FollowedMotion, found: Mapping[str, float]) -> dict[str, float]:
-    """Return estimates of the parameters, as far from the values of the linearization as that can be trusted, and admissible."""
+    """Return the estimates of the parameters, limited to their bounds and to the range in which the linearization is trusted."""
     values = dict(one.values)
     for parameter in one.fitted:
         value = values[parameter.name]

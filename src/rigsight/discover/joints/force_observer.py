@@ -28,25 +28,26 @@ AtSample = Callable[[int], Floats]
 """Columns of one sample: shape (n_cases, n_states, n_columns) or (n_cases, n_outputs, n_columns)."""
 
 _EVENED = 64
-"""Samples after which rounding is taken out of the covariance's symmetry."""
+"""Samples after which the covariance is made symmetric again, which rounding errors disturb."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cases:
-    """Linearized motions of the same structure or of structures alike, in units in which noise and states are about one.
+    """Linearized motions of one structure or of structures with equal shapes, scaled so that noise and states are about one.
 
-    Axis 0 is time, axis 1 the case. What is shorter than the longest is filled up with samples that nothing measures.
+    Axis 0 is time, axis 1 the case. Cases shorter than the longest one are padded with samples without measurement.
 
     Attributes
     ----------
     transition
         Shape (n_samples - 1, n_cases, n_states, n_states).
     seen
-        Shape (n_samples, n_cases, n_outputs, n_states); zero where nothing was measured.
+        Derivative of the readings by the state, shape (n_samples, n_cases, n_outputs, n_states); zero where nothing was
+        measured.
     drive
         Known changes of the next state by column, shape (n_samples - 1, n_cases, n_states, n_columns).
     data
-        What the sensors show of each column, shape (n_samples, n_cases, n_outputs, n_columns).
+        Direct part of each column in the readings, shape (n_samples, n_cases, n_outputs, n_columns).
     measured
         True where a sensor was read, shape (n_samples, n_cases, n_outputs).
     start
@@ -54,9 +55,9 @@ class Cases:
     walk
         Covariance that an intensity of one adds from sample to sample, shape (n_cases, n_states, n_states).
     jump
-        Directions in which anything may happen behind some samples, shape (n_samples - 1, n_cases, n_states, n_directions).
+        Directions in which the state may jump after some samples, shape (n_samples - 1, n_cases, n_states, n_directions).
     jumps
-        Behind which samples, shape (n_samples, n_cases).
+        True for the samples after which it may, shape (n_samples, n_cases).
     """
 
     transition: Floats
@@ -71,7 +72,7 @@ class Cases:
 
     @property
     def n_measured(self) -> NDArray[np.int_]:
-        """Measured values of each case."""
+        """Number of measured values of each case, shape (n_cases,)."""
         return np.asarray(np.count_nonzero(self.measured, axis=(0, 2)))
 
 
@@ -84,7 +85,7 @@ def cases_of(
     jumps: Sequence[NDArray[np.bool_] | None],
     lasting: bool,
 ) -> Cases:
-    """Bring linearized motions into one form; the first column is what was measured, the others are the parameters.
+    """Bring linearized motions into one form; the first column is the measured residual, the others are the parameters.
 
     Parameters
     ----------
@@ -99,9 +100,9 @@ def cases_of(
     breadth
         Standard deviation of the first state in units of the sizes.
     jumps
-        Behind which samples the unknown forces may be others by their size, shape (n_samples,) each; None for nowhere.
+        Samples after which the unknown forces may jump by about their size, shape (n_samples,) each; None for none.
     lasting
-        True where they stay what they have become, False where they are others for that sample alone.
+        True if the force keeps its value after a jump, False if it changes for that sample interval alone.
     """
     longest = max(motion.residual.shape[0] for motion in motions)
     n_cases, (n_outputs, n) = len(motions), motions[0].seen.shape[1:]
@@ -144,16 +145,16 @@ def cases_of(
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """What a filter needs of the covariances, shape (n_samples, n_cases, n_intensities, ...) each.
+    """Gains and variances of a filter, shape (n_samples, n_cases, n_intensities, ...) each.
 
     Attributes
     ----------
     gain
-        (..., n_outputs, n_states).
+        Change of the state by each reading, (..., n_outputs, n_states).
     variance
-        Of each whitened reading before it is whitened, (..., n_outputs).
+        Of the prediction error of each reading, (..., n_outputs).
     predicted
-        Covariance before the sample is read, (..., n_states, n_states); empty unless it was to be kept.
+        Covariance before the readings of a sample are used, (..., n_states, n_states); empty unless requested.
     """
 
     gain: Floats
@@ -169,7 +170,7 @@ class Gains:
 
 
 def gains_of(cases: Cases, intensities: Floats, keep: bool = False) -> Gains:
-    """Run the covariances through time.
+    """Compute covariances and gains along the records.
 
     Parameters
     ----------
@@ -208,7 +209,7 @@ def gains_of(cases: Cases, intensities: Floats, keep: bool = False) -> Gains:
 
 
 def whitened(cases: Cases, gains: Gains, drive: AtSample, data: AtSample, tell: Rows) -> None:
-    """Send columns through the filter.
+    """Pass columns through the filter.
 
     Parameters
     ----------
@@ -236,7 +237,7 @@ def whitened(cases: Cases, gains: Gains, drive: AtSample, data: AtSample, tell: 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """States with the knowledge of a whole record: deviations from the reference and their standard errors, in the sizes.
+    """States estimated from a whole record: deviations from the reference and their standard errors, in units of the sizes.
 
     Shape (n_samples, n_cases, n_states) each.
     """
@@ -251,7 +252,7 @@ def smoothed(cases: Cases, gains: Gains, drive: Floats, data: Floats) -> Smoothe
     Parameters
     ----------
     cases, gains
-        The filter, its covariances kept.
+        The filter, with `Gains.predicted`.
     drive, data
         Shape (n_samples - 1, n_cases, n_states) and (n_samples, n_cases, n_outputs).
     """

@@ -1,7 +1,7 @@
 """The whole discovery on a rig of several joints: records and a rig -> missing force per joint, its law, refitted equations.
 
-Linearized responses propose joint and law; the rig with this law is refitted by output error, and free runs on held-out records
-decide.
+Linearized responses propose joint and law. The rig with this law is refitted by output error, and the equations are selected by
+free runs on held-out records.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ Floats = NDArray[np.float64]
 
 _EVALUATIONS = 100
 _FLOOR = 1.5
-"""Noise floors from which on something is missing still."""
+"""Error in noise floors above which an effect is still missing."""
 _NO_WORSE = 1.05
-"""Factor of the held-out error up to which an equation with fewer terms is worth shortening further."""
+"""Factor of the held-out error up to which an equation with fewer terms is shortened further."""
 _VAGUE = 3.0
-"""Standard errors below which a coefficient cannot be told from zero."""
+"""Ratio to its standard error below which a coefficient cannot be distinguished from zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def discover_at_joints(
 
 
 def _shorter(polisher: _Polisher, best: _Polished, say: Callable[[str], None]) -> list[_Polished]:
-    """Polish equations with a term less, or with a special case of a term in its place, for as long as they are no worse."""
+    """Polish equations with one term less, or with a special case in place of a term, until the error increases."""
     found: list[_Polished] = []
     while best.terms:
         values = {**best.fit.values}
@@ -140,7 +140,7 @@ def _simpler(one: _Polished) -> list[tuple[LawTerm, ...]]:
 
 
 class _Polisher:
-    """Fits the rig with terms at its joints, and scores it on records it has not seen."""
+    """Fits the rig with terms at its joints, and scores it on the held-out records."""
 
     def __init__(self, data: RegressionData, threads: IdleThreads) -> None:
         self.rig, self.noise, self._threads = data.rig, data.noise, threads
@@ -195,7 +195,7 @@ def _assembled(
     ordered = sorted(found, key=criterion)
     close = [one for one in ordered if criterion(one) <= criterion(ordered[0]) + STRONG]
     chosen = min(close, key=lambda one: (len(one.fit.free), criterion(one)))
-    # The joint of the equation comes first, whatever the linearized responses say.
+    # The joints of the chosen equation come first, whatever the ranking by linearized responses.
     own_joints = {str(term.effect.at) for term in chosen.terms}
     joints = tuple(sorted(joints, key=lambda force: force.joint not in own_joints))
     structure, values = chosen.fit.structure, chosen.fit.values
@@ -281,7 +281,7 @@ def _terms(
 
 
 def _independent(rig: Rig, one: _Polished) -> float:
-    """Return the number of independent samples behind the held-out errors of all sensors."""
+    """Return the number of independent samples in the held-out errors of all sensors."""
     return sum(
         independent_samples(shown)
         for left in one.residuals
@@ -293,7 +293,7 @@ def _independent(rig: Rig, one: _Polished) -> float:
 def _relative(
     rig: Rig, noise: Mapping[str, float], held_out: Sequence[Record], chosen: _Polished
 ) -> tuple[float, float]:
-    """Return held-out error and noise floor relative to the spread of what each sensor showed, RMS over the sensors."""
+    """Return held-out error and noise floor relative to the standard deviation of each sensor's readings, RMS over sensors."""
     errors, floors = [], []
     for i, signal in enumerate(rig.outputs):
         shown = [record[signal.name] for record in held_out if signal.name in record]
@@ -323,7 +323,7 @@ def _warnings(
     joints: Sequence[JointForce],
     coefficients: Mapping[str, Coefficient],
 ) -> list[str]:
-    """Return what a user should know, one sentence each."""
+    """Return the warnings for the user, one sentence each."""
     found = [how] if how else []
     first, agreeing = joints[0], not_contradicted(joints)
     ruled_out = [force.joint for force in joints if force not in agreeing]

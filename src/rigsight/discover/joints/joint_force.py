@@ -1,7 +1,8 @@
-"""The force missing at each joint of a rig, how much of the sensor errors it would explain, and its law.
+"""The force missing at each joint of a rig, the share of the sensor errors that it would explain, and its law.
 
-For rigs of several joints, degrees of freedom, inputs or sensors. For each joint in turn, everything missing is assumed to act
-there. Law and parameters of the rig are estimated together, and the joints are ranked by the likelihood of all sensor readings.
+For rigs of several joints, degrees of freedom, inputs or sensors. For each joint in turn, the whole missing force is assumed to
+act there. Law and parameters of the rig are estimated together, and the joints are ranked by the likelihood of all sensor
+readings.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from rigsight.simulate import compose, simulate
 Floats = NDArray[np.float64]
 
 _ROUNDS = 7
-"""Rounds of law and motion; numbers that were identified without the force are far off at first."""
+"""Alternating estimates of law and motion: parameters that were identified without the force are far off at first."""
 _FOR_ALL = 3
-"""Rounds for every joint; further ones are for those that are not ruled out."""
+"""Rounds for every joint; only joints that are not ruled out get further ones."""
 _RULED_OUT = 3.0
-"""Factor over the least contradiction of the sensors (RMS) at which a joint is ruled out."""
+"""Factor over the smallest sensor residual (RMS) at which a joint is ruled out."""
 _SETTLED = 0.01
-"""Relative change of parameters and coefficients from which another round changes nothing."""
+"""Relative change of parameters and coefficients below which the rounds have converged."""
 _LARGE = 98.0
-"""Percentile of a motion or a force that is its size."""
+"""Percentile of the magnitude of a motion or force that is taken as its size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +49,9 @@ class ForceTrace:
     displacement, velocity
         Motion of the joint from its rest.
     force, standard_error
-        The force that resists it, and how well it is known.
+        The force that resists it, and its standard error.
     law
-        What the law says of it.
+        The force according to the law.
     """
 
     record: str
@@ -69,11 +70,12 @@ class JointLaw:
     Attributes
     ----------
     terms
-        The surest first; empty where no term describes the force.
+        The most significant first; empty if no term describes the force.
     share
-        Share of the force that they explain (as power).
+        Share of the force's mean square that they explain.
     inclusion
-        How often sparse regression takes each term when stretches of the records are drawn anew, by the name of the effect.
+        Share of resampled data sets (stretches of the records, drawn at random) in which sparse regression selects a term, by
+        the name of the effect.
     """
 
     terms: tuple[LawTerm, ...]
@@ -83,7 +85,7 @@ class JointLaw:
 
 @dataclass(frozen=True, eq=False)
 class JointForce:
-    """What is missing at one joint, if all that is missing acts there.
+    """The force missing at one joint, if the whole missing force acts there.
 
     Attributes
     ----------
@@ -96,15 +98,15 @@ class JointForce:
     share
         Share of the weighted square of the rig's free-run errors that the force explains; all sensors together.
     error_over_noise
-        What the sensors still contradict, RMS in units of their noise floors: far above 1, this joint alone cannot be it.
+        Remaining sensor residual, RMS in units of the noise floors; far above 1, a force at this joint alone is not the cause.
     standard_error
-        RMS of that of the force.
+        RMS of the standard error of the force.
     law
         The fitted law.
     parameters
         The rig's own, estimated with the law.
     criterion
-        Bayesian information criterion of law, parameters and what remains unknown; the smallest comes first.
+        Bayesian information criterion of law, parameters and remaining unknown force; the smallest comes first.
     """
 
     joint: str
@@ -153,20 +155,20 @@ def missing_forces(
     noise: Mapping[str, float],
     rng: np.random.Generator | None = None,
 ) -> tuple[JointForce, ...]:
-    """Return the force that would have to be missing at each joint; the joint at which it is likeliest to act comes first.
+    """Return the force that would have to be missing at each joint; the most likely joint comes first.
 
     Parameters
     ----------
     rig
         The rig.
     records
-        Estimation records: inputs, and what the sensors showed. A sensor may be missing in some.
+        Estimation records: inputs and sensor readings. A sensor may be missing in some.
     values
         Constants and re-identified parameters, by name.
     noise
         Noise floor of each output.
     rng
-        Source of the ensemble behind the inclusion probabilities of the first joint's terms; None for none.
+        Source of the ensemble for the inclusion probabilities of the first joint's terms; None to leave them out.
 
     Raises
     ------
@@ -213,7 +215,7 @@ def not_contradicted(forces: Sequence[JointForce]) -> tuple[JointForce, ...]:
     Parameters
     ----------
     forces
-        As of `missing_forces`.
+        Result of `missing_forces`.
     """
     least = min((force.error_over_noise for force in forces), default=0.0)
     return tuple(force for force in forces if force.error_over_noise <= _RULED_OUT * least)
@@ -226,7 +228,7 @@ def _improved(
     noise: Mapping[str, float],
     laws: dict[str, RegressedLaw],
 ) -> tuple[tuple[JointMotion, ...], float]:
-    """Regress the law of each joint, take over its parameters and follow the motion once more; return the largest change."""
+    """Regress the law of each joint, adopt its parameters and estimate the motion again; return it and the largest change."""
     floors = noise_of(rig, noise)
     change = 0.0
     for one, law in zip(found, regressed_laws(found, floors, [_sizes(one) for one in found]), strict=True):
@@ -276,7 +278,7 @@ def _sizes(one: JointMotion) -> dict[str, float]:
 def _free_run_square(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float], noise: Floats, followed: FollowedMotion
 ) -> float:
-    """Return the weighted square of the free-run errors of the rig's own equations; no more than if nothing moved."""
+    """Return the weighted sum of squares of the free-run errors of the rig's own equations, at most that of a rig at rest."""
     structure, total = compose(rig), 0.0
     others = np.setdiff1d(np.arange(followed.sizes.size), np.ravel(followed.forces))
     for record, motion in zip(records, followed.motions, strict=True):

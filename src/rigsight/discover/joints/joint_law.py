@@ -1,7 +1,7 @@
 """Law of the missing force at a joint: sparse regression on terms of the motion of the joint, weighted by the sensor noise.
 
-The part of the force that no term explains remains an unknown force, whose intensity competes with the terms. The likelihood
-decides; it is comparable between joints and so also shows at which joint the law acts.
+The part of the force that no term explains remains an unknown force, whose intensity competes with the terms. The law is selected
+by its likelihood, which is comparable between joints and so also shows at which joint the law acts.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ _MOST_TERMS = 4
 _SAME_COLUMN = 1.0 - 1e-7
 """Correlation above which terms cannot be distinguished by a record of this length; otherwise the likelihood decides."""
 _SAME_STIFFNESS = 0.5
-"""Relative difference within which a coefficient is the stiffness of the spring: play leaves it as it is."""
+"""Relative difference within which a coefficient counts as the stiffness of the spring, which play does not change."""
 _WORTH = 0.05
-"""Share of the law's force (RMS) that each of its terms must have: what is smaller describes errors of the description."""
+"""Share of the law's force (RMS) that each of its terms must have: a smaller one only corrects errors of the other terms."""
 _COMPETING = 6
-"""Terms that an ensemble draws for."""
+"""Number of terms that compete in an ensemble."""
 _LOOKED_AT = 2
-"""Intensities of what remains unknown for which laws of several terms are looked for."""
+"""Number of intensities of the remaining unknown force for which laws of several terms are searched."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class LawTerm:
     effect
         The term, placed at its joint.
     values
-        Its parameters by their own names: coefficients, and what stands inside.
+        Its parameters by their own names: coefficients, and nonlinear parameters inside the term.
     std
         Standard error of each coefficient.
     units
@@ -72,7 +72,7 @@ class LawTerm:
 
     @property
     def text(self) -> str:
-        """The term with its numbers in words."""
+        """The term in words, with its parameter values."""
         kind = kind_of(self.effect.name).replace("_", " ")
         numbers = ", ".join(f"{name} = {value:.3g} {self.units[name]}" for name, value in self.values.items())
         if self.effect.torque is None:
@@ -95,18 +95,18 @@ class LawTerm:
 
 @dataclass(frozen=True, eq=False)
 class RegressedLaw:
-    """A law with the rig's parameters beside it.
+    """A law, with the rig's parameters estimated with it.
 
     Attributes
     ----------
     terms
-        The surest first; may be empty.
+        The most significant first; may be empty.
     parameters
         The rig's own, estimated with the law.
     criterion
         Bayesian information criterion; comparable between joints.
     decade
-        Logarithm of the intensity of what remains unknown.
+        Common logarithm of the intensity of the remaining unknown force.
     """
 
     terms: tuple[LawTerm, ...]
@@ -116,7 +116,7 @@ class RegressedLaw:
 
 
 def joint_effects(rig: Rig, joint: Joint) -> list[Effect]:
-    """Return the effects that a regression can hold as terms at a joint, placed there."""
+    """Return the effects that can be terms of a regression at a joint, placed there."""
     found = [
         e for e in offered_effects(rig, joint.stiffness != 0) if e.place is Place.DYNAMICS and not e.states
     ]
@@ -130,7 +130,7 @@ def joint_effects(rig: Rig, joint: Joint) -> list[Effect]:
 
 
 def force_along(term: LawTerm, found: JointMotion, index: int, parameters: Mapping[str, float]) -> Floats:
-    """Return what a term resists with along the motion of its joint in a record, shape (n_samples,).
+    """Return the resisting force of a term along the motion of its joint in a record, shape (n_samples,).
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def force_along(term: LawTerm, found: JointMotion, index: int, parameters: Mappi
     found
         Its joint.
     index
-        Of the record.
+        Index of the record.
     parameters
         Constants and parameters of the rig.
     """
@@ -159,7 +159,7 @@ def _motion(found: JointMotion, index: int) -> Motion:
 def regressed_laws(
     found: Sequence[JointMotion], noise: Floats, scales: Sequence[Mapping[str, float]]
 ) -> list[RegressedLaw]:
-    """Return, for each joint, the law with the fewest terms that the sensors cannot tell from the likeliest one.
+    """Return, for each joint, the law with the fewest terms that the sensors do not distinguish from the most likely one.
 
     Parameters
     ----------
@@ -190,14 +190,14 @@ def inclusion(
     law: RegressedLaw,
     rng: np.random.Generator,
 ) -> dict[str, float]:
-    """Return how often sparse regression takes terms when stretches of the records are drawn anew, by name of the effect.
+    """Return inclusion probabilities: the shares of resampled data sets in which terms are selected, by name of the effect.
 
     Parameters
     ----------
     found, noise, scales
         As for `regressed_laws`, of one joint.
     law
-        Its law; the terms that explain most without it compete with its own.
+        Its law; its terms compete with those that explain most of the force by themselves.
     rng
         Source of the ensemble.
     """
@@ -227,7 +227,7 @@ def _offered(found: JointMotion, scales: Mapping[str, float]) -> list[TermSignal
 
 @dataclass(frozen=True, eq=False)
 class _Library:
-    """The terms of a joint at their best inner values, for one intensity of what remains unknown.
+    """The terms of a joint at their best nonlinear parameters, for one intensity of the remaining unknown force.
 
     `forces` are the terms along all records as forces, shape (n_samples, n_terms).
     """
@@ -263,7 +263,7 @@ def _best_law(
         for own in libraries
     ]
     laws = [law for of_library in short for law in of_library]
-    # Longer laws are looked for where the short ones do best.
+    # Longer laws are searched at the intensities at which the short ones are most likely.
     order = np.argsort([min(law.criterion for law in of_library) for of_library in short])
     for own in (libraries[int(i)] for i in order[:_LOOKED_AT]):
         if own.terms:
@@ -302,7 +302,7 @@ def _library(
 def _law(
     regression: SensorRegression, chosen: Sequence[Candidate], forces: Floats, found: JointMotion
 ) -> RegressedLaw | None:
-    """Return a law of certain terms; None where one would have to push, is no part of the spring, or hardly matters."""
+    """Return the law of given terms; None if a term would drive the motion, does not fit the spring, or is negligible."""
     followed, rig = found.followed, found.followed.equations.structure.rig
     projected = regression.projected
     base = projected.base
@@ -311,7 +311,7 @@ def _law(
     solution, *_ = np.linalg.lstsq(matrix / size, projected.target, rcond=1e-12)
     left = projected.target - (matrix / size) @ solution
     inverse = np.linalg.pinv((matrix / size).T @ (matrix / size), rcond=1e-14, hermitian=True)
-    # Where something remains that no row explains, errors are larger than the noise says.
+    # A residual above the noise makes the standard errors larger than the noise alone would.
     excess = max(1.0, float(left @ left) / projected.independent)
     errors = np.sqrt(np.diag(inverse) * excess) / size
     solution = solution / size

@@ -1,7 +1,7 @@
-"""The force at one joint alone that would make a rig follow its sensors, and the motion of that joint.
+"""The force at one joint alone with which a rig would follow its sensors, and the motion of that joint.
 
-First all joints have an unknown force, so that the motion follows the sensors wherever the missing force acts. Then each joint
-has it alone: the remaining sensor errors are evidence against this joint.
+First all joints have an unknown force, so that the motion follows the sensors wherever the missing force acts. Then only one
+joint at a time has an unknown force: the remaining sensor errors are evidence against this joint.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ Floats = NDArray[np.float64]
 
 _PASSES = 4
 _SETTLED = 1e-2
-"""Change of the motion, in its sizes, from which another linearization changes nothing."""
+"""Change of the motion, in units of its sizes, below which the linearization has converged."""
 _AT_REST = 0.02
-"""Share of a joint's usual velocity below which it may stick: dry friction is then whatever holds it, and jumps when it turns."""
+"""Share of a joint's RMS velocity below which it may stick: dry friction then has any value that holds the joint, and it jumps
+when the motion reverses."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """One joint while it carries the unknown force alone.
+    """One joint, if the unknown force acts there alone.
 
     Attributes
     ----------
@@ -46,13 +47,13 @@ class JointMotion:
     followed
         The rig with the unknown force there.
     records
-        What was measured.
+        The measured records.
     displacement, velocity
         Of the joint from its rest, shape (n_samples,) per record.
     force, error
         The unknown force that resists it and its standard error, per record.
     left
-        Weighted square of what the sensors showed beside this motion.
+        Weighted sum of squares of the sensor residuals of this motion.
     """
 
     joint: Joint
@@ -66,21 +67,21 @@ class JointMotion:
 
 
 def noise_of(rig: Rig, noise: Mapping[str, float]) -> Floats:
-    """Return the noise floor of each output, shape (n_outputs,); one for a sensor that no record holds, which weighs nothing."""
+    """Return the noise floor of each output, shape (n_outputs,); 1 for a sensor in no record, where it has no influence."""
     return np.array([noise.get(signal.name, 1.0) for signal in rig.outputs])
 
 
 def joint_motions(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float], noise: Mapping[str, float]
 ) -> tuple[JointMotion, ...]:
-    """Return each joint with the force that it would have to carry alone, in the order of the rig.
+    """Return each joint with the unknown force that would have to act there alone, in the order of the rig.
 
     Parameters
     ----------
     rig
         The rig.
     records
-        Inputs, and what the sensors showed.
+        Inputs and sensor readings.
     values
         Constants and re-identified parameters, by name.
     noise
@@ -109,7 +110,7 @@ def followed_again(
     records: Sequence[Record],
     noise: Mapping[str, float],
 ) -> tuple[JointMotion, ...]:
-    """Return each joint with its force, estimated once more about what is known of it; the force may jump where the joint rests.
+    """Return each joint with its force, estimated again about the current motion; the force may jump where the joint rests.
 
     Parameters
     ----------
@@ -176,7 +177,7 @@ def _sizes(
     linear: LinearizedMotion,
     omega: float,
 ) -> Floats:
-    """Return the size of every state: from sensors of it, its rate or its coordinate, else from the other states."""
+    """Return the size of every state: from sensors of the state, its rate or its coordinate, else from the other states."""
     seen = np.max(np.abs(linear.seen), axis=0)
     spreads = np.array(
         [max((float(np.std(r[s.name])) for r in records if s.name in r), default=0.0) for s in rig.outputs]
@@ -190,7 +191,7 @@ def _sizes(
     size[:n] = np.where(size[:n] > 0.0, size[:n], np.max(moving) if moving.size else 1.0)
     size[n : 2 * n] = np.maximum(size[n : 2 * n], omega * size[:n])
     size = np.where(size > 0.0, size, 1.0)
-    # Size of a force that moves its joint by its motion within one radian of the motion.
+    # Size of a force: that which moves its joint by the size of the joint's motion within one radian.
     rates = (linear.transition[0] - np.eye(n_states)) / linear.dt
     for joint, (force, rate) in zip(rig.mechanism.joints, forces, strict=True):
         motion = joint_motion(equations.structure, joint)[0]
@@ -208,7 +209,7 @@ def _sizes(
 
 
 def _resting(joint: Joint, one: FollowedMotion, records: Sequence[Record]) -> Iterator[NDArray[np.bool_]]:
-    """Yield, per record, where a joint may be at rest or turns round behind a sample."""
+    """Yield, per record, the samples after which a joint may be at rest or reverses."""
     expression = joint_motion(one.equations.structure, joint)[1]
     velocities = [
         one.equations.along([expression], record, one.values, motion)[0]
@@ -218,7 +219,7 @@ def _resting(joint: Joint, one: FollowedMotion, records: Sequence[Record]) -> It
     for velocity in velocities:
         slow = np.abs(velocity) < _AT_REST * usual
         turns = np.append(velocity[1:] * velocity[:-1] < 0.0, False)
-        # The force is another one from the sample before the first slow one on.
+        # The force may change from the sample before the first slow one on.
         yield slow | turns | np.append(slow[1:], False)
 
 

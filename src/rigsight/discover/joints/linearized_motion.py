@@ -1,7 +1,8 @@
 """Sensitivity of the motion and readings of a structure to small changes of state and parameters along a record.
 
 The equations are flattened once into functions of arrays. From sample to sample they are integrated together with their
-derivatives (Runge-Kutta of fourth order), each sample anew from a reference motion: nothing grows where a rig is unstable.
+derivatives (Runge-Kutta of fourth order), starting anew at each sample of a reference motion: errors do not grow if a rig is
+unstable.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ from rigsight.simulate.structure import TIME, input_symbols
 Floats = NDArray[np.float64]
 
 _LONGEST_STEP = 0.5
-"""Integration step times the fastest rate of the linearized equations: the method is then far inside its range of stability."""
+"""Integration step times the fastest rate of the linearized equations; this is well within the stability limit of the method."""
 _MOST_STEPS = 32
-"""Per piece of the input; what is stiffer than that follows at once."""
+"""Largest number of steps per piece of the input; a state too stiff for it is assumed to follow without delay."""
 _LOOKED_AT = 25
-"""Samples of a record at which the fastest rate is looked for."""
+"""Number of samples of a record at which the fastest rate is computed."""
 _FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0), "DiracDelta": lambda x: 0.0 * x}
 
 
@@ -48,13 +49,13 @@ class LinearizedMotion:
     by_parameter
         Derivative of the next state by parameters, shape (n_samples - 1, n_states, n_parameters).
     defect
-        Where the equations lead from one reference state, less the next one, shape (n_samples - 1, n_states).
+        State simulated one sample ahead from a reference state, minus the next reference state, shape (n_samples - 1, n_states).
     seen
         Derivative of the readings by the state, shape (n_samples, n_outputs, n_states).
     seen_by_parameter
-        Shape (n_samples, n_outputs, n_parameters).
+        Derivative of the readings by parameters, shape (n_samples, n_outputs, n_parameters).
     residual
-        Measured less the readings of the reference, shape (n_samples, n_outputs); NaN where nothing was measured.
+        Measured minus the readings of the reference, shape (n_samples, n_outputs); NaN where nothing was measured.
     dt
         Sample time [s].
     """
@@ -77,7 +78,7 @@ class MotionEquations:
     structure
         Rig and effects.
     fitted
-        Names of the parameters by which derivatives are taken.
+        Names of the parameters with respect to which derivatives are taken.
     """
 
     def __init__(self, structure: Structure, fitted: Sequence[str]) -> None:
@@ -102,7 +103,7 @@ class MotionEquations:
         accelerations = [sp.Symbol(f"acceleration_{i}", real=True) for i in range(self._n)]
         mass = [tree.flattened(entry) for entry in motion.mass]
         forces = [tree.flattened(force) for force in motion.forces]
-        # The mass matrix is inverted in numbers: in symbols that of a robot fills pages.
+        # The mass matrix is inverted numerically: the symbolic inverse for a robot fills pages.
         balance = [
             force - sum((mass[i * self._n + j] * accelerations[j] for j in range(self._n)), start=sp.S.Zero)
             for i, force in enumerate(forces)
@@ -117,7 +118,7 @@ class MotionEquations:
         Parameters
         ----------
         record
-            Inputs, and what the sensors show; a sensor may be missing.
+            Inputs and sensor readings; a sensor may be missing.
         values
             Value of every parameter of the structure.
         reference
@@ -160,11 +161,11 @@ class MotionEquations:
         return np.ascontiguousarray(reference.T), u, times
 
     def _inputs(self, held: HeldInput, pieces: NDArray[np.int_], tau: Floats) -> Floats:
-        """Return inputs with their derivatives within pieces, shape (3 n_inputs, n); a rig without any reads none."""
+        """Return inputs with their derivatives within pieces, shape (3 n_inputs, n); empty for a rig without inputs."""
         return _input_at(held, pieces, tau)[: 3 * len(self.structure.rig.inputs)]
 
     def _stepped(self, x: Floats, held: HeldInput, record: Record, p: Floats) -> tuple[Floats, Floats]:
-        """Return the state a sample later, shape (n_states, n), and its derivatives, shape (n, n_states, n_states + n_fitted)."""
+        """Return the state one sample later, shape (n_states, n), and its slopes, shape (n, n_states, n_states + n_fitted)."""
         count = x.shape[1]
         first = held.per_sample * np.arange(count)
         steps = self._steps(x, self._inputs(held, first, np.zeros(count)), p, held.interval)
@@ -250,7 +251,7 @@ def _in_parts(
     arguments: Sequence[sp.Symbol],
     directions: Sequence[sp.Symbol],
 ) -> tuple[Any, Any]:
-    """Return masses, forces and other expressions, and the slopes of what is out of balance, of long equations of motion."""
+    """Return functions for long equations of motion: masses, forces and other values; slopes of the residual of the balance."""
     begun = elimination.begun(structure.steps)
     values = straight_line([*elimination.entries, *elimination.loads, *others], begun)
     slopes = slopes_of(straight_line([*elimination.left, *others], begun), directions)
@@ -261,7 +262,7 @@ def _in_parts(
 
 
 def _compiled(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> Any:
-    # Names of states hold points and parentheses.
+    # Names of states contain points and parentheses.
     plain = {symbol: sp.Symbol(f"a{i}", real=True) for i, symbol in enumerate(arguments)}
     written = [sp.sympify(expression).xreplace(plain) for expression in expressions]
     return sp.lambdify(list(plain.values()), written, [_FUNCTIONS, "numpy"], cse=True)

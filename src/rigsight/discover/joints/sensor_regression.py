@@ -1,6 +1,6 @@
 """Sensor responses to forces with known time histories at a joint: rows for a regression, whitened like the measurements.
 
-The terms are filtered through the linearized equations of the rig instead of applying an inverse to the records: nothing is
+The terms are filtered through the linearized equations of the rig, rather than the records through their inverse: no signal is
 differentiated.
 """
 
@@ -20,25 +20,25 @@ from rigsight.records.record import Record
 Floats = NDArray[np.float64]
 
 _DECADES = (4.0, 1.0, -2.0, -5.0, -10.0)
-"""Intensities of what remains unknown beside a law, as those of the whole force; the last leaves nothing unknown."""
+"""Intensities of the unknown force that a law leaves, in the same units as for the whole force; the last is practically zero."""
 
 
 @dataclass(frozen=True, eq=False)
 class SensorRegression:
-    """What the sensors showed, regressed on parameters and terms, for one intensity of the force that remains unknown.
+    """Regression of the sensor readings on parameters and terms, for one intensity of the remaining unknown force.
 
     Attributes
     ----------
     projected
-        Target, and the rig's parameters as columns that are always there.
+        Target, and the rig's parameters as columns that are always included.
     columns
         One for each term, shape (n_rows, n_terms).
     fitted
-        Names of the parameters behind the columns of `projected`.
+        Names of the parameters of the columns of `projected`.
     logarithms
         Sum of the logarithms of the variances that the rows were divided by.
     decade
-        Logarithm of that intensity.
+        Common logarithm of that intensity.
     """
 
     projected: Projected
@@ -48,7 +48,7 @@ class SensorRegression:
     decade: float
 
     def criterion(self, left: float, n_terms: int) -> float:
-        """Return the Bayesian information criterion of an equation with some terms that leaves a square of so much."""
+        """Return the Bayesian information criterion of an equation with a residual sum of squares and a number of terms."""
         return self.logarithms + left + n_terms * float(np.log(self.projected.independent))
 
 
@@ -65,11 +65,11 @@ def sensor_regressions(
     followed
         The rig with the force at each joint.
     records
-        Inputs, and what the sensors showed.
+        Inputs and sensor readings.
     noise
         Noise floor of each output, shape (n_outputs,).
     signals
-        For each joint forces that resist it, shape (n_samples, n_terms) per record, linear between samples.
+        Forces that resist each joint, shape (n_samples, n_terms) per record, linear between samples.
     """
     n_records, forces = len(records), followed[0].forces
     ((force, rate),) = forces
@@ -140,7 +140,7 @@ def sensor_regressions(
 
 
 def _without(motion: Floats, force: tuple[int, int]) -> Floats:
-    """Return a reference that moves as it does, but without the force: the law is to explain all of it."""
+    """Return the reference with the same motion but without the force, because the law is to explain all of it."""
     bare = motion.copy()
     bare[:, list(force)] = 0.0
     return bare
@@ -159,7 +159,7 @@ def _short(rows: Floats) -> Floats:
 def _regression(
     followed: FollowedMotion, rows: Floats, known: int, logarithms: float, decade: float, independent: int
 ) -> SensorRegression:
-    """Add what was known of the parameters beforehand as rows; a parameter that no sensor answers to is left out."""
+    """Add the prior of the parameters as rows; a parameter that affects no sensor is left out."""
     squares = np.sum(rows**2, axis=0)
     spread = prior_spread(followed, float(squares[0]), squares[1:known])
     before = np.zeros((known - 1, rows.shape[1]))

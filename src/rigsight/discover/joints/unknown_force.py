@@ -24,17 +24,17 @@ UNKNOWN_FORCE = Effect(
     torque=_FORCE,
     states=(State(_FORCE, _RATE, "force"), State(_RATE, sp.S.Zero, "force time^-1")),
 )
-"""An observer adds noise to the rate of its rate; without it the force is a straight line."""
+"""An observer adds noise to the second derivative of the force; without it the force is a straight line over time."""
 
 
 def force_states(structure: Structure, effect: Effect) -> tuple[int, int]:
-    """Return where an unknown force and its rate stand among the states of a structure."""
+    """Return the indices of an unknown force and of its rate among the states of a structure."""
     force, rate = (structure.states.index(state_symbol(effect, symbol)) for symbol in (_FORCE, _RATE))
     return force, rate
 
 
 def joint_motion(structure: Structure, joint: Joint) -> tuple[sp.Expr, sp.Expr]:
-    """Return the motion of a joint from its rest and its velocity, of the structure's symbols."""
+    """Return the motion of a joint from its rest and its velocity, in the structure's symbols."""
     mechanism = structure.rig.mechanism
     bound: dict[sp.Symbol, sp.Expr] = {
         sp.Symbol(name, real=True): symbol

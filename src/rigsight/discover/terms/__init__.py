@@ -1,1 +1,1 @@
-"""Terms that a discovered equation may contain: powers, effects, memory; and how they are written."""
+"""Terms that a discovered equation may contain (powers, effects, memory), and their notation."""

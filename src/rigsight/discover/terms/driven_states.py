@@ -1,7 +1,7 @@
 """States of an effect along a measured motion, if they depend on it linearly.
 
-Rates that are linear in states and signals, with coefficients that depend only on parameters, are a linear filter: its step from
-sample to sample is exact for the hold of the record, and the same code serves every effect of this kind.
+Rates that are linear in states and signals, with coefficients that depend only on parameters, form a linear filter: its step from
+sample to sample is exact for the hold of the record, and the same code works for every effect of this kind.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 
 _SIGNALS = (canonical.x, canonical.v, canonical.u)
-"""What a motion knows at every sample."""
+"""Signals of a motion that are known at every sample."""
 
 Filter = tuple[sp.Matrix, sp.Matrix]
 """Rates per unit of each state, and per unit of each signal."""
@@ -28,7 +28,7 @@ Filter = tuple[sp.Matrix, sp.Matrix]
 
 @lru_cache(maxsize=256)
 def linear_filter(effect_states: tuple[tuple[sp.Symbol, sp.Expr], ...]) -> Filter | None:
-    """Return the filter that states with these rates are, None where they are none.
+    """Return the linear filter that these rates describe; None if they are not linear.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def linear_filter(effect_states: tuple[tuple[sp.Symbol, sp.Expr], ...]) -> Filte
 
 
 def is_filter(effect: Effect) -> bool:
-    """Return True if an effect's states follow displacement, velocity and input linearly, and nothing stops them."""
+    """Return True if an effect's states depend linearly on displacement, velocity and input, and have no limit."""
     if not effect.states or any(state.limit is not None for state in effect.states):
         return False
     own = {state.symbol for state in effect.states}
@@ -60,12 +60,12 @@ def states_along(
 ) -> dict[str, NDArray[np.float64]]:
     """Return the states of a filter along a motion by name, shape (n_samples,) each.
 
-    They start where they rest under the first sample of each signal.
+    They start in equilibrium with the first sample of each signal.
 
     Parameters
     ----------
     effect
-        One of which `is_filter` says so.
+        An effect for which `is_filter` is true.
     values
         Its parameters.
     motion

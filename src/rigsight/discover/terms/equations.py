@@ -13,24 +13,24 @@ from rigsight.simulate.printing.shown import ShownEquation, flat_equations
 from rigsight.simulate.printing.text import text_equation
 
 _DIGITS = 4
-"""Of the numbers that an effect's equation holds; parameters stand as symbols and lose none."""
+"""Significant digits of numbers in an effect's equation; parameters are written as symbols."""
 
 
 def equations(structure: Structure, numbers: Mapping[str, float]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the equations of a structure as text and as LaTeX: of motion, of each state, of outputs that are more than a state.
+    """Return the equations of a structure as text and as LaTeX: of motion, of states, of outputs other than single states.
 
     Parameters
     ----------
     structure
         Rig and effects.
     numbers
-        Parameters that stand as numbers: those that no fit moved, a scale of one or a force of zero.
+        Parameters written as numbers: those that were not fitted, such as a scale of one or a force of zero.
     """
     symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))
     written = {symbols[name]: sp.nsimplify(value) for name, value in numbers.items()}
     shown = flat_equations(structure, written)
     rounded = [_rounded(equation) for equation in shown.equations]
-    # Text calls parameters what the tables of their numbers do.
+    # The text uses the same parameter names as the tables of their values.
     plain = {symbol: name.plain.replace(" ", "_") for symbol, name in shown.names.items()}
     plain |= {symbol: name for name, symbol in symbols.items()}
     text = tuple(text_equation(equation, plain) for equation in rounded)

@@ -1,8 +1,8 @@
 """The equation of a hidden force with memory, as far as the records show it.
 
-The drive less inertia, damping and the spring without memory is the hysteretic force F itself. It is the loop's state times a
+The drive minus inertia, damping and the spring without memory is the hysteretic force F. It is the loop's state times a
 stiffness, so the rate that the effect declares for its state, ``z' = A x' - ...``, is an equation of F with other coefficients.
-Its terms, those of each parameter in which it is linear, are found by regression like any other, together with a relaxing force
+Its terms, one for each parameter in which it is linear, are found by regression like any other, together with a relaxing force
 and one without memory; this shows which of them the records support. Because a noisy displacement is differentiated twice, this
 test fails at noise levels at which the loop itself is still found.
 """
@@ -41,9 +41,9 @@ class ForceLaw:
     effect
         The loop.
     terms
-        Right-hand side per unit of each coefficient, by the name that people read.
+        Right-hand side per unit of each coefficient, by its printed name.
     parameters
-        The parameter behind each of the effect's own terms, by the same names.
+        The parameter of each of the effect's own terms, by the same names.
     """
 
     effect: Effect
@@ -52,7 +52,7 @@ class ForceLaw:
 
     @classmethod
     def of(cls, effect: Effect) -> ForceLaw | None:
-        """Derive the equation from the rate that an effect declares; None where its force is not one free state."""
+        """Derive the equation from the rate that an effect declares; None if its force is not a single state without limit."""
         if not is_loop(effect) or len(effect.states) != 1 or effect.states[0].limit is not None:
             return None
         (state,) = effect.states
@@ -80,7 +80,7 @@ class ForceEquation:
     Attributes
     ----------
     law
-        What was offered.
+        The terms offered to the regression.
     coefficients, inclusion
         By term of the law [SI].
     share
@@ -110,11 +110,11 @@ def force_equation(
     motions
         Of all records.
     rows
-        How signals become rows.
+        The form of the rows.
     forces
-        Per record the hysteretic force, shape (n_samples,).
+        The hysteretic force of each record, shape (n_samples,).
     values
-        Parameters of the effect, for those that stand inside a term.
+        Parameters of the effect, of which nonlinear ones are needed inside the terms.
     rng
         Source of the ensemble.
     """
@@ -128,7 +128,7 @@ def force_equation(
         ]
     )
     rate = np.concatenate(target)
-    # Nothing is projected out but a constant rate, which no force can have for long.
+    # Only a constant rate is projected out, which no force can have for long.
     projected = Projected(np.ones((rate.size, 1)), rate, rate.size * rows.independent_share(1))
     inclusion = inclusion_probabilities(projected, matrix, rng)
     taken = inclusion >= 0.5

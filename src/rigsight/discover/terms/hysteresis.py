@@ -1,7 +1,8 @@
-"""Hidden forces with memory: the states of a loop follow from the measured motion, so it is a regression column.
+"""Hidden forces with memory: the states of a loop follow from the measured motion, so the loop can be a regression column.
 
 Any effect that replaces the deflection of the spring by states is such a loop. Its nonlinear parameters are taken from its
-declaration and found by variable projection: a grid over them, linear regression for the rest, and a descent from the best point.
+declaration and estimated by variable projection: a grid over them, linear regression for the rest, and a descent from the best
+points.
 """
 
 from __future__ import annotations
@@ -28,28 +29,29 @@ from rigsight.simulate.input_hold import hold_motion
 from rigsight.units import characteristic_value
 
 _POINTS = 7
-"""Of the grid along each coordinate: decades of sizes lie less than a factor of three apart."""
+"""Points of the grid along each coordinate; over decades, neighboring sizes differ by less than a factor of three."""
 _LEAST_SIZE = 0.1
 _WITHIN = (3.0, 0.1)
-"""Factors inside the range of a size from which the grid begins and at which it ends: at its ends a loop is a spring, or none."""
+"""Factors on the ends of the range of a size at which the grid begins and ends: at the very ends a loop is only a spring, or
+vanishes."""
 _OF_POWERS = 0.5
 """Share of its range that the grid of a power spans, about its middle."""
 _TIMES_SPECIAL = (1.0, 1.5, 2.0)
-"""Where a parameter with a special value is looked at; it stays at the best of them."""
+"""Multiples of a special value at which such a parameter is tried; it keeps the best of them."""
 _SUBSTEPS = 2
 _RUNAWAY = 1e6
-"""Loop in units of the displacement beyond which its shape is unstable, and no column."""
+"""Size of the loop in units of the displacement above which its shape is unstable and the column is not used."""
 _STARTS = 3
 _REFINEMENTS = 40
 _STEP = 1e-3
-"""In the logarithm, or in a power: it moves the column by more than the integrator's error."""
+"""Step of a difference quotient in the logarithm, or in a power: it changes the column by more than the integrator's error."""
 
 Point = tuple[float, ...]
-"""Coordinates of a loop's shape: those that are refined, then those that stay as the grid has them."""
+"""Coordinates of a loop's shape: those that are refined, then those that keep their grid values."""
 
 
 def is_loop(effect: Effect) -> bool:
-    """Return True for a spring of which a share has a memory that the deflection alone drives."""
+    """Return True for a spring with a part whose memory depends on the deflection alone."""
     known = {canonical.deflection, canonical.deflection_rate}
     known |= {sp.Symbol(p.name, real=True) for p in effect.parameters} | {s.symbol for s in effect.states}
     return (
@@ -64,17 +66,17 @@ def is_loop(effect: Effect) -> bool:
 class LoopShape:
     """The coordinates in which the shape of a loop is searched for, as its effect declares them.
 
-    Sum and difference of a pair, and what is searched logarithmically, are sizes, whose logarithm is moved; of what remains,
-    parameters with a special value stay at points of the grid.
+    Sum and difference of a pair, and parameters that are searched logarithmically, are sizes: the coordinate is their logarithm.
+    Of the other parameters, those with a special value keep the values of the grid.
 
     Attributes
     ----------
     pairs
-        Parameters that are moved as sum and difference.
+        Parameters that are varied as sum and difference.
     single
-        Parameters that are moved alone.
+        Parameters that are varied alone.
     kept
-        Parameters that stay at points of the grid, with their special values.
+        Parameters that keep the values of the grid, with their special values.
     dimensions
         Dimension text of each parameter.
     """
@@ -86,7 +88,7 @@ class LoopShape:
 
     @classmethod
     def of(cls, effect: Effect) -> LoopShape:
-        """Read the coordinates from a declaration."""
+        """Take the coordinates from the declaration of an effect."""
         paired = {name for pair in effect.searched_as for name in (pair.first, pair.second)}
         inside = [
             p
@@ -113,7 +115,7 @@ class LoopShape:
 
     @property
     def grid(self) -> list[Point]:
-        """Points to look at first."""
+        """Points that are tried first."""
         sized = [True] * (2 * len(self.pairs)) + [p.logarithmic for p in self.single]
         axes: list[Sequence[float]] = []
         for low, high, is_size in zip(*self.bounds, sized, strict=True):
@@ -127,7 +129,7 @@ class LoopShape:
         return list(itertools.product(*axes))
 
     def values(self, point: Point, scales: Mapping[str, float]) -> dict[str, float]:
-        """Return the inner parameters at a point, whose sizes are in units of what the records show."""
+        """Return the nonlinear parameters at a point, whose sizes are in units of the characteristic scales."""
         first_kept = 2 * len(self.pairs) + len(self.single)
         found = dict(zip((name for name, _ in self.kept), point[first_kept:], strict=True))
         for index, pair in enumerate(self.pairs):
@@ -152,9 +154,9 @@ class Loop:
     Attributes
     ----------
     values
-        Inner parameters of the effect.
+        Nonlinear parameters of the effect.
     column
-        Rows of the loop's own deflection of all records, shape (n_rows,).
+        Rows of the loop's own deflection in all records, shape (n_rows,).
     share
         Share of the residual of the rig's own terms that the loop explains.
     """
@@ -178,24 +180,24 @@ def best_loop(
     driven: bool,
     threads: IdleThreads,
 ) -> Loop | None:
-    """Return the loop that explains most of the residual of the rig's own terms, None where none explains anything.
+    """Return the loop that explains most of the residual of the rig's own terms; None if none explains any of it.
 
     Parameters
     ----------
     effect
-        The effect, one of which `is_loop` says so.
+        An effect for which `is_loop` is true.
     motions
         Of all records.
     rows
-        How signals become rows.
+        The form of the rows.
     projected
-        The rig's own terms (its spring among them: it takes the part without memory).
+        The rig's own terms, including its spring, which represents the part without memory.
     scales
         Size of each base quantity.
     driven
         True if the acceleration is regressed, false if the force is.
     threads
-        Who helps with the motions.
+        Threads that simulate the records in parallel.
     """
     shape = LoopShape.of(effect)
     structure = loop_structure(effect)
@@ -226,7 +228,7 @@ def best_loop(
         seen: dict[bytes, NDArray[np.float64]] = {}
 
         def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-            """Return the residual at a point and at a step along each axis: a few loops cost as much as one."""
+            """Return the residual at a point and one step along each axis; a few loops at once cost as much as one."""
             key = theta.tobytes()
             if key not in seen:
                 seen.clear()
@@ -253,7 +255,7 @@ def best_loop(
 
 
 def _apart(grid: Sequence[Point], shares: Sequence[float]) -> list[Point]:
-    """Return the best points of a grid, each of another size: a slider may be taken for its neighbor."""
+    """Return the best points of a grid, each with another size, because a slider may be mistaken for its neighbor."""
     found: list[Point] = []
     for index in np.argsort(shares)[::-1]:
         point = grid[int(index)]
@@ -263,7 +265,7 @@ def _apart(grid: Sequence[Point], shares: Sequence[float]) -> list[Point]:
 
 
 def _share(projected: Projected, column: NDArray[np.float64]) -> float:
-    """Return what a loop explains; a loop that would have to push instead of resist explains nothing."""
+    """Return the share that a loop explains; 0 for a loop that would have to drive the motion instead of resisting it."""
     if not np.all(np.isfinite(column)):
         return 0.0
     weights, share = projected.explained(column[:, None])

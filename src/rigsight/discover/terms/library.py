@@ -1,8 +1,8 @@
 """Library of terms that the equation may contain, evaluated along the measured motion.
 
-Every candidate comes from an effect's own declaration. Parameters in which the torque is linear become coefficients; nonlinear
-ones (a clearance, a dead time, the shape of a loop) are found by variable projection: a grid over them, linear regression for the
-rest. Each effect then contributes one column to the library, at its best nonlinear parameters.
+Every candidate comes from the declaration of an effect. Parameters in which the torque is linear become coefficients; nonlinear
+ones (a clearance, a dead time, the shape of a loop) are estimated by variable projection: a grid over them, linear regression for
+the rest. Each effect then contributes one column to the library, at its best nonlinear parameters.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ _MOST_SHARE = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One effect at its best inner values, as one column of the library.
+    """One effect at its best nonlinear parameters, as one column of the library.
 
     Attributes
     ----------
     effect
         The effect.
     inner
-        Values of the parameters that stand inside the term.
+        Values of the nonlinear parameters inside the term.
     linear
-        Share of each of the effect's linear parameters in the coefficient of the column; empty where it has none.
+        Share of each of the effect's linear parameters in the coefficient of the column; empty if it has none.
     column
         Rows of all records, shape (n_rows,).
     """
@@ -65,11 +65,11 @@ class Candidate:
 
 
 def offered_effects(rig: Rig, has_stiffness: bool) -> list[Effect]:
-    """Return the effects that a regression can hold as terms on this rig.
+    """Return the effects that can be terms of a regression on this rig.
 
-    A state has no signal of its own along a measured motion; loops, and what filters the drive, are the exceptions, because
-    theirs follow from motion and input. A torque of states is none: a mass that rides along would explain the acceleration by
-    the acceleration.
+    Effects with states are left out, because a state is not measured, except loops and filters of the drive, whose states
+    follow from motion and input. A torque that depends on states is left out in any case: an attached mass would explain the
+    acceleration by the acceleration.
     """
     changes_spring = [e for e in (*CATALOGUE, *MONOMIALS) if e.spring is not None or e.deflection is not None]
     return [
@@ -82,12 +82,12 @@ def offered_effects(rig: Rig, has_stiffness: bool) -> list[Effect]:
 
 
 def plain_terms(rig: Rig, has_stiffness: bool) -> list[Effect]:
-    """Return those of the offered effects that are a torque with one coefficient and nothing inside."""
+    """Return those of the offered effects that are a torque with one coefficient and no other parameter."""
     return [effect for effect in offered_effects(rig, has_stiffness) if _is_plain(effect)]
 
 
 def _is_static(effect: Effect) -> bool:
-    """Return True for a known signal of displacement, velocity and input: no state, no use of a torque it would change."""
+    """Return True for a known function of displacement, velocity and input, without states or other torques."""
     known = (effect.torque, effect.deflection, effect.drive, effect.delay)
     symbols = {
         canonical.x,
@@ -127,7 +127,7 @@ def candidates(
     motions
         Of all records.
     rows
-        How signals become rows.
+        The form of the rows.
     projected
         The rig's own terms, projected out of every column.
     scales
@@ -135,7 +135,7 @@ def candidates(
     driven
         True if the acceleration is regressed, false if the force is: a resisting force has the other sign there.
     threads
-        Who looks for inner values; None for the calling thread alone.
+        Threads that search the nonlinear parameters; None for the calling thread alone.
     """
     sign = -1.0 if driven else 1.0
     helpers = threads or IdleThreads()
@@ -187,7 +187,7 @@ def _best_inner(
 
 
 def mixed(signals: TermSignals, parts: NDArray[np.float64], projected: Projected) -> tuple[Candidate, float]:
-    """Return the parts of a term as one column, mixed as the regression wishes them, and the share it explains.
+    """Return the parts of a term as one column, mixed as in the regression, and the share that it explains.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def mixed(signals: TermSignals, parts: NDArray[np.float64], projected: Projected
     parts
         Rows of its parts, shape (n_rows, n_parts).
     projected
-        What is regressed.
+        The regression.
     """
     weights, share = projected.explained(parts)
     if not np.any(weights):
@@ -208,14 +208,14 @@ def mixed(signals: TermSignals, parts: NDArray[np.float64], projected: Projected
 
 
 def _is_plain(effect: Effect) -> bool:
-    """Return True for a torque with one coefficient and nothing inside."""
+    """Return True for a torque with one coefficient and no other parameter."""
     return effect.torque is not None and not effect.states and len(effect.parameters) == 1
 
 
 def _library_columns(
     effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows
 ) -> list[NDArray[np.float64]]:
-    """Return the columns of the terms without inner parameters, as a pysindy library gives them on [x, x']."""
+    """Return the columns of the terms without nonlinear parameters, computed by a pysindy library from [x, x']."""
     if not effects:
         return []
     with warnings.catch_warnings():
@@ -228,7 +228,7 @@ def _library_columns(
     )
     columns: list[list[NDArray[np.float64]]] = [[] for _ in effects]
     for motion in motions:
-        # In SI, as a sine is none of the angle in other units; every regression brings its columns to one length itself.
+        # In SI, because a sine requires the angle in radians; every regression scales its columns itself.
         values = np.asarray(library.fit_transform(np.column_stack([motion.x, motion.v])))
         for i in range(len(effects)):
             columns[i].append(rows.of(np.ascontiguousarray(values[:, i])))
@@ -255,18 +255,18 @@ def _slope(effect: Effect, parameter: Parameter) -> sp.Expr:
 
 @dataclass(frozen=True, eq=False)
 class TermSignals:
-    """What an effect with certain inner values is along measured motions.
+    """An effect along measured motions, for given nonlinear parameters.
 
     Attributes
     ----------
     effect
         The effect.
     inner
-        Values of the parameters that stand inside the term.
+        Values of the nonlinear parameters inside the term.
     names
-        Linear parameters, one for each part; empty where the term has one part without a coefficient of its own.
+        Linear parameters, one for each part; empty if the term has a single part without a coefficient of its own.
     parts
-        Per record the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
+        For each record, the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
     """
 
     effect: Effect
@@ -278,7 +278,7 @@ class TermSignals:
 def term_signals(
     effect: Effect, motions: Sequence[Motion], scales: Mapping[str, float]
 ) -> Iterator[TermSignals]:
-    """Yield an effect along measured motions, for each point of the grid of its inner values.
+    """Yield an effect along measured motions, for each point of the grid of its nonlinear parameters.
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) ->
 
 
 def deflection_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
-    """Return what the spring sees of a measured motion behind a static effect, shape (n_samples,)."""
+    """Return the deflection of the spring along a measured motion with a static effect (such as play), shape (n_samples,)."""
     assert effect.deflection is not None
     return _evaluated(effect.deflection, values, motion)
 

@@ -1,7 +1,7 @@
 """Torques of displacement and velocity for discovered equations that no effect of the catalogue describes.
 
 The products ``x^i x'^j`` up to the third degree, each declared as an effect so that the engine simulates a discovered model like
-any other. They are descriptive and not causes, so a diagnosis does not use them.
+any other. They only describe a force and name no cause, so a diagnosis does not use them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def _monomial(i: int, j: int) -> Effect:
     dimension = " ".join(
         factor for factor in ("force", f"x^{-(i + j)}" if i + j else "", f"time^{j}" if j else "") if factor
     )
-    # Odd in the velocity: it can only take energy out (or, with a negative coefficient, put it in).
+    # Odd in the velocity and even in the displacement: it dissipates energy (or, with a negative coefficient, supplies it).
     damps = j % 2 == 1 and i % 2 == 0
     return Effect(
         name=f"{_PREFIX}_x{i}_v{j}",
@@ -63,13 +63,13 @@ def _powers() -> list[tuple[int, int]]:
 
 
 MONOMIALS: tuple[Effect, ...] = tuple(_monomial(i, j) for i, j in _powers())
-"""Declared once; a monomial that an effect of the catalogue already is stands there and not here."""
+"""Monomials of degree 2 and 3, without those that an effect of the catalogue already describes."""
 
 
 LINEAR: tuple[Effect, ...] = tuple(_monomial(i, j) for i, j in ((0, 0), (1, 0), (0, 1)))
-"""A constant force, a spring and a damper: terms for a joint whose rig declares none."""
+"""A constant force, a spring and a damper: terms for a joint for which the rig declares none."""
 
 
 def known_terms() -> dict[str, Effect]:
-    """Return every effect that a model may hold, by name: those of the catalogue and the monomials."""
+    """Return every effect that a model may contain, by name: those of the catalogue and the monomials."""
     return {effect.name: effect for effect in (*CATALOGUE, *MONOMIALS, *LINEAR)}

@@ -1,1 +1,1 @@
-"""Output-error fits: the parameters with which a simulation follows its records, and their uncertainty."""
+"""Output-error fits: parameters with which a simulation agrees with its records, and their uncertainty."""

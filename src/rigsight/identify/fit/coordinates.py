@@ -1,8 +1,8 @@
 """Search coordinates: parameters in characteristic units, logarithms of positive ones, and well-determined combinations.
 
-Such combinations are the sum and difference of a pair, the excess of one parameter over another that it never falls below, and
-for a hysteretic spring the post-yield stiffness and the hysteretic remainder: if the latter is large, the product of the
-stiffness and its post-yield ratio is known far better than either.
+Such combinations are the sum and difference of a pair, the excess of one parameter over another that is never larger, and for a
+hysteretic spring the post-yield stiffness and the hysteretic remainder: if the latter is large, the product of the stiffness and
+its post-yield ratio is known far better than either.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from rigsight.simulate import Structure, parameter_vector
 from rigsight.units import characteristic_value
 
 STEP = 1e-4
-"""Difference of a coordinate where there may be events: far above the tolerance of their location, far below any curvature."""
+"""Difference step of a coordinate if there may be events: far above the tolerance of their location, far below any curvature."""
 FINE_STEP = 1e-6
-"""Difference of a coordinate where nothing is an event: sets side by side take the same steps, so that only rounding differs."""
+"""Difference step of a coordinate without events: sets side by side take the same steps, so that only rounding limits it."""
 _MARGIN = 1e-9
 _LEAST_STIFFNESS = 1e-12
 _MOST_STIFFNESS = 1e12
@@ -29,7 +29,7 @@ _MOST_STIFFNESS = 1e12
 
 @dataclass(frozen=True)
 class _Pair:
-    """Two coordinates that stand for sum and difference, in the power 1/n where an exponent is named."""
+    """Two coordinates for sum and difference, to the power 1/n if an exponent is named."""
 
     first: int
     second: int
@@ -42,7 +42,7 @@ class _Pair:
 
 @dataclass(frozen=True)
 class _Split:
-    """Coordinates that stand for the logarithm of the stiffness with memory and for the one without."""
+    """Coordinates for the logarithm of the stiffness with memory, and for the stiffness without memory."""
 
     stiffness: int
     share: int
@@ -57,7 +57,7 @@ class Coordinates:
     structure
         Rig and effects.
     free
-        Parameters that the search moves.
+        Parameters that are fitted.
     lower, upper
         Bounds of the coordinates, shape (n_free,).
     """
@@ -128,7 +128,7 @@ class Coordinates:
         )
 
     def to_parameters(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the full parameter vector, shape (n_parameters,), of coordinates of shape (n_free,)."""
+        """Return the full parameter vector, shape (n_parameters,), for coordinates of shape (n_free,)."""
         own = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, theta, 0.0)), theta) * self.scale
         p = self.base.copy()
         p[self.index] = own
@@ -192,7 +192,7 @@ class Coordinates:
             for place in (pair.first, pair.second):
                 row = np.zeros(len(self.free))
                 if pair.exponent in self.free:
-                    # A power of zero stays zero whatever its exponent.
+                    # A power of zero is zero for any exponent.
                     base = max(float(np.abs(theta[place]) * self.scale[pair.first]), 1e-300)
                     growth = pair.forward(theta[place], power) * size * np.log(base)
                     row[self.free.index(pair.exponent)] = growth * own[self.free.index(pair.exponent)]
@@ -218,9 +218,9 @@ class Coordinates:
 
 
 def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
-    """Return where a spring's stiffness and its post-yield ratio stand, if a search moves both; of several effects the first.
+    """Return the indices of a spring's stiffness and post-yield ratio, if both are fitted; for the first of several effects.
 
-    The spring is that of the joint at which the effect acts; one whose stiffness is no plain parameter has no such place.
+    The spring is that of the joint at which the effect acts; its stiffness must be a single parameter.
     """
     rig = structure.rig
     stiffness_at = {joint.name: joint.stiffness for joint in rig.mechanism.joints}

@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
 
 _DEPENDENT = 1e-14
-"""Share of the largest eigenvalue below which a direction of the coordinates moves nothing but rounding errors."""
+"""Share of the largest eigenvalue below which the effect of a direction of the coordinates is rounding error."""
 _MARGIN = 3.0
-"""By how much an error of the derivatives is multiplied before a direction that stands out of it is believed; an assumption."""
+"""Factor by which the influence of a direction must exceed the error of the derivatives to count as determined; an assumption."""
 _MIXED = 30.0
-"""The same for the part that a coordinate takes in such a direction, as errors of the derivatives mix it with others.
+"""The same factor for the component of a coordinate in an undetermined direction, because errors of the derivatives mix
+coordinates.
 
-An assumption: ten times as much as for the direction itself; an arm with three undetermined numbers was looked at.
+An assumption: ten times the factor for the direction itself, chosen on an arm with three undetermined parameters.
 """
 _TAKES_PART = 1e-9
 SMOOTHED = 15
-"""Lines over which a residual spectrum is averaged. A number of lines, not a share of them: lines lie one per duration of the
-record however fast it is sampled, and the resonance excited by a disturbance is some of them wide."""
+"""Lines over which a residual spectrum is averaged. A number of lines, not a share of them: the distance of lines depends on the
+duration of the record and not on the sample rate, and the resonance excited by a disturbance is several lines wide."""
 
 
 def colored_covariance(
@@ -33,20 +34,20 @@ def colored_covariance(
     """Return the covariance of the common coordinates, allowing for colored residuals.
 
     ``(J^T J)^-1 (sum_f J(f)^* S(f) J(f)^T) (J^T J)^-1`` with the smoothed residual spectrum S of each record, a matrix over its
-    outputs: a disturbance in front of two sensors moves both. Coordinates that the records do not determine get an infinite
+    outputs: a disturbance that acts before two sensors moves both. Coordinates that the records do not determine get an infinite
     variance.
 
     Parameters
     ----------
     sensitivities
-        Per record the weighted residuals, shape (n,), and their derivatives, shape (n, n_common + n_own): the first columns
+        For each record the weighted residuals, shape (n,), and their derivatives, shape (n, n_common + n_own): the first columns
         belong to common coordinates, the others to this record's own (its initial states).
     n_common
         Number of common coordinates.
     n_outputs
-        Per record how many outputs of equal length stand one after the other in its residuals; by default one.
+        For each record the number of outputs of equal length that follow each other in its residuals; by default one.
     derivative_error
-        Relative error of the derivatives: dependent columns differ by as much.
+        Relative error of the derivatives, by which linearly dependent columns may differ.
 
     Returns
     -------
@@ -75,14 +76,14 @@ def colored_covariance(
 def sandwich_covariance(
     bread: NDArray[np.float64], filling: NDArray[np.float64], derivative_error: float = 0.0
 ) -> NDArray[np.float64]:
-    """Return ``bread^-1 filling bread^-1`` with infinite variances of coordinates that the bread does not determine.
+    """Return ``bread^-1 filling bread^-1``, with infinite variances for coordinates that the bread does not determine.
 
     Parameters
     ----------
     bread
         J^T J of the weighted residuals, shape (n, n).
     filling
-        Covariance of J^T r, shape (n, n); the bread itself where the residuals are independent with variance 1.
+        Covariance of J^T r, shape (n, n); equal to the bread if the residuals are independent with variance 1.
     derivative_error
         Relative error of the derivatives in the bread.
 
@@ -110,7 +111,7 @@ def sandwich_covariance(
 
 
 def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ``chain covariance chain^T`` where variances may be infinite.
+    """Return ``chain covariance chain^T``, for variances that may be infinite.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.flo
 
     Returns
     -------
-    Shape (m, m); a parameter that depends on an undetermined coordinate has an infinite variance, no other is touched.
+    Shape (m, m); a parameter that depends on an undetermined coordinate has an infinite variance, the others are unaffected.
     """
     infinite = np.isinf(np.diag(covariance))
     finite = np.where(infinite[:, None] | infinite[None, :], 0.0, covariance)
@@ -141,7 +142,7 @@ def spectral_product(
     Parameters
     ----------
     residual
-        Of `count` outputs, one after the other, shape (count * n_samples,).
+        Residuals of `count` outputs, one after the other, shape (count * n_samples,).
     derivative
         J, in the same order, shape (count * n_samples, n).
     count
@@ -168,7 +169,7 @@ def spectral_product(
 
 
 def smoothed_spectrum(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Average over neighbors; beyond zero and Nyquist the spectrum of a real signal goes on conjugated."""
+    """Average over neighbors; beyond zero and Nyquist the spectrum of a real signal is continued by its conjugate."""
     half = min(SMOOTHED // 2, spectrum.size - 1)
     before, after = spectrum[half:0:-1].conj(), spectrum[-2 : -2 - half : -1].conj()
     around = np.concatenate([before, spectrum, after])

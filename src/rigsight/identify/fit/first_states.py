@@ -22,15 +22,15 @@ Floats = NDArray[np.float64]
 
 _FIRST_SAMPLES = 7
 _RESTING = 1e-3
-"""Share of its range within which an input rests."""
+"""Share of its range within which an input counts as resting."""
 _PULL = 1e-3
-"""Weight of the equilibrium beside that of a sensor: it decides only what no sensor tells."""
+"""Weight of the equilibrium relative to that of a sensor: it determines only what the sensors do not."""
 _MOST_EVALUATIONS = 100
 _HUGE = 1e6
 
 
 def first_state(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
-    """Guess the initial state from the first samples: readings, their slopes, no memory, settled lags.
+    """Return an estimate of the initial state from the first samples: readings and their slopes, empty memory, settled lags.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def first_state(structure: Structure, record: Record, values: Mapping[str, float
 
 
 def state_at_rest(structure: Structure, record: Record, guess: Floats, values: Mapping[str, float]) -> Floats:
-    """Return the guess without motion, shape (n_states,): what the sensors show on average for as long as the inputs rest.
+    """Return the estimate for a rig at rest, shape (n_states,), from the mean readings before the inputs change.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def state_at_rest(structure: Structure, record: Record, guess: Floats, values: M
 
 
 def moves_freely(rig: Rig, record: Record) -> bool:
-    """Return True for a record of a rig with masses in which no input changes."""
+    """Return True for a record without changing inputs, of a rig whose motion is not prescribed."""
     return rig.is_driven and all(is_constant(record[signal.name]) for signal in rig.inputs)
 
 
@@ -96,18 +96,18 @@ def rig_state(
 ) -> Floats:
     """Return the state of a rig without effects that agrees best with the first samples of its sensors.
 
-    What they do not tell is that of the static equilibrium under the first input.
+    States that they do not determine are those of the static equilibrium under the first input.
 
     Parameters
     ----------
     equations
-        The rig's.
+        Equations of the rig.
     record
         May lack sensors.
     values
         Constants and parameters by name.
     resting
-        Samples during which nothing moves; None for a rig that may move from the first one on.
+        Number of samples during which the rig is at rest; None if it may move from the first sample on.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def rig_state(
     """
     if not equations.shows_all_states(set(record.signals)):
         return _rig_state(equations, record, values, resting, equations.sensor_names)
-    # Then it does not depend on the values, and every candidate asks for the same records.
+    # The state then does not depend on the values, so it is cached for all candidates.
     moving = [name for name in equations.sensor_names if name not in equations.of_own_states]
     known = _known.setdefault(record, {})
     key = (id(equations), resting)
@@ -175,7 +175,7 @@ def _of_one_motion(structure: Structure, record: Record, values: Mapping[str, fl
     count = min(_FIRST_SAMPLES, record.n_samples)
     time = np.arange(count) * record.dt
     displacement = record[structure.rig.outputs[0].name][:count]
-    # A motion that nothing drives begins with its largest force: its path is bent.
+    # A free motion begins with its largest force, so its path is curved.
     degree = 2 if moves_freely(structure.rig, record) and count > 2 else 1
     state[1], state[0] = np.polyfit(time, displacement, degree)[-2:]
     for i, (name, dimension) in enumerate(
@@ -189,9 +189,9 @@ def _of_one_motion(structure: Structure, record: Record, values: Mapping[str, fl
 
 
 def _guessed_offsets(structure: Structure, record: Record, values: Mapping[str, float]) -> dict[str, float]:
-    """Return by how much each sensor that may have an offset reads more on average than the rig rests at under the mean input.
+    """Return, for each sensor with a free offset, its mean reading minus that of the equilibrium under the mean input.
 
-    Sensors may have been zeroed anywhere, farther off than a descent finds back.
+    The zero of a sensor may be far off, too far for a descent from an offset of zero.
     """
     if not structure.offsets:
         return {}
@@ -204,7 +204,9 @@ def _guessed_offsets(structure: Structure, record: Record, values: Mapping[str, 
     elif stiffness > 0.0:
         levels = {response: rest + (evaluated(motion.drive_gain, values) * mean[source] + bias) / stiffness}
     else:
-        return dict.fromkeys(structure.offsets, 0.0)  # nothing tells it from where the mass lies
+        return dict.fromkeys(
+            structure.offsets, 0.0
+        )  # without a spring it cannot be distinguished from the position
     if rig.follower is not None:
         follower = rig.follower
         own = {**values, follower.symbol.name: 0.0}
@@ -214,13 +216,13 @@ def _guessed_offsets(structure: Structure, record: Record, values: Mapping[str, 
 
 
 def _without(record: Record, offsets: Mapping[str, float]) -> Record:
-    """Return a record as its sensors would have shown it without these offsets."""
+    """Return a record without these offsets of its sensors."""
     own = {name: record[name] - offset for name, offset in offsets.items() if name in record and offset}
     return record.with_signals(**own) if own else record
 
 
 def _equilibrium(equations: RigEquations, u: Floats, p: Floats) -> Floats:
-    """Return where the rig rests under an input, nearest to where its file starts it; what nothing holds stays there."""
+    """Return the equilibrium under an input closest to the declared start; states without a restoring force stay at the start."""
     n, state = equations.n_coordinates, np.zeros(equations.n_states)
     values = dict(zip(equations.structure.names, p, strict=True))
     for symbol, expression in equations.rig.mechanism.initial.items():
@@ -243,12 +245,12 @@ def _equilibrium(equations: RigEquations, u: Floats, p: Floats) -> Floats:
 
 
 def _finite(values: Floats) -> Floats:
-    """Return values of which those that are no number are large."""
+    """Return values with NaN and infinity replaced by large values."""
     return np.nan_to_num(values, nan=_HUGE, posinf=_HUGE, neginf=-_HUGE)
 
 
 def _is_rate(u: Floats) -> NDArray[np.bool_]:
-    """Return which rows of inputs with their derivatives are derivatives."""
+    """Return True for the rows of `u` that are derivatives of inputs."""
     return (np.arange(u.shape[0]) % 3 > 0)[:, None]
 
 
@@ -272,7 +274,7 @@ def _sizes(signal: Floats, dt: float) -> tuple[float, float]:
 def _state_scale(
     equations: RigEquations, state: Floats, u: Floats, p: Floats, seen: Sequence[int], sizes: Floats
 ) -> Floats:
-    """Return the size that each state has by the sensor that shows it best, one where none does, shape (n_states,)."""
+    """Return the size of each state from the sensor that shows it best, one if none does, shape (n_states,)."""
     by_state = np.abs(equations.readings_by_state(state[:, None], u, p)[seen, :, 0])
     n, scale = equations.n_coordinates, np.full(state.size, np.inf)
     for row, (size, slope) in zip(by_state, sizes, strict=True):
@@ -285,7 +287,7 @@ def _state_scale(
 def _with_effects(
     structure: Structure, record: Record, equations: RigEquations, values: Mapping[str, float], own: Floats
 ) -> Floats:
-    """Return the states of a structure: those of its rig, lags of its effects settled, and no memory."""
+    """Return the states of a structure: those of its rig, settled lags of its effects, and empty memory."""
     state = np.zeros(len(structure.states))
     state[: own.size] = own
     lagging = [
@@ -311,7 +313,7 @@ def _with_effects(
 
 
 def _resting_samples(record: Record, inputs: Sequence[str]) -> int:
-    """Return how many samples pass before an input moves."""
+    """Return the number of samples before an input changes."""
     first = record.n_samples
     for name in inputs:
         drive = record[name]

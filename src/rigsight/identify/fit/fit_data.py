@@ -17,23 +17,23 @@ from rigsight.simulate.input_hold import HeldInput
 Result = TypeVar("Result")
 
 _LEAST_RANGE = 1e-9
-"""Least unit of a limited state, in units of its size: a play of zero has no range."""
+"""Smallest unit of a state with a limited range, relative to its size, because a play of zero has no range."""
 
 
 @dataclass(frozen=True)
 class RecordData:
-    """One record as a fit sees it.
+    """One record in the form that a fit needs.
 
     Attributes
     ----------
     record, held
         The record, and its input between samples.
     measured
-        Shape (n_samples, n_outputs), NaN where an output was not measured.
+        Shape (n_samples, n_outputs), NaN for an output that was not measured.
     weights
-        Reciprocal noise of each output, 0 where it was not measured.
+        Reciprocal noise of each output, 0 if it was not measured.
     own
-        Places in the parameter vector of the constants that are the record's own, and their values.
+        Indices in the parameter vector of the record's own constants, and their values.
     """
 
     record: Record
@@ -43,7 +43,7 @@ class RecordData:
     own: tuple[tuple[int, float], ...] = ()
 
     def first(self, n_samples: int) -> RecordData:
-        """Return the first samples of measurement and input."""
+        """Return the data with only the first samples of measurement and input."""
         return replace(self, held=self.held.first(n_samples), measured=self.measured[:n_samples])
 
     def parameters(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -58,22 +58,22 @@ class RecordData:
 
 @dataclass(frozen=True)
 class FitData:
-    """What is fitted to what.
+    """Structure and records of a fit.
 
     Attributes
     ----------
     structure
-        Rig and effects, and behind all other states the offsets of sensors that are free.
+        Rig and effects; the free offsets of sensors come after all other states.
     records
         The records.
     limited
-        Which states cannot leave a range, shape (n_states,).
+        True for states that cannot leave a range, shape (n_states,).
     unlimited_sizes
         Characteristic size of each state, shape (n_states, 1).
     accuracy
         Relative accuracy of the simulations.
     threads
-        Who helps with the records.
+        Threads among which the records are distributed.
     """
 
     structure: Structure
@@ -84,14 +84,14 @@ class FitData:
     threads: IdleThreads = field(default_factory=IdleThreads)
 
     def of_each_record(self, one: Callable[[int], Result]) -> list[Result]:
-        """Return what a function makes of the number of each record, in their order."""
+        """Return the results of a function for the index of each record, in their order."""
         return self.threads.results(one, [record.record.n_samples for record in self.records])
 
     def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the unit in which a fit moves each initial state, shape (n_states, n_sets).
+        """Return the unit of each initial state in the fit, shape (n_states, n_sets).
 
-        A state that cannot leave a range is moved in units of that range, whatever the parameters make of it: beyond an end
-        nothing depends on it, and a fit that wandered there would not come back.
+        A state with a limited range is fitted in units of that range, which may depend on the parameters: beyond its ends the
+        outputs do not depend on the state, and a fit that got there would not return.
         """
         sizes = np.repeat(self.unlimited_sizes, p.shape[1], axis=1)
         if np.any(self.limited):
@@ -103,12 +103,12 @@ class FitData:
 def record_data(
     structure: Structure, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
 ) -> RecordData:
-    """Return a record as a fit sees it.
+    """Return a record in the form that a fit needs.
 
     Parameters
     ----------
     structure
-        As it is simulated in the fit.
+        The structure that is simulated in the fit.
     record
         May lack outputs.
     names
@@ -130,7 +130,7 @@ def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.f
     Parameters
     ----------
     record
-        What was measured.
+        The measured record.
     out
         Simulated outputs, shape (n_samples, n_outputs, n_sets).
     """
@@ -139,7 +139,7 @@ def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.f
     residuals = np.empty(used.size * n_samples)
     differences = np.empty((used.size * n_samples, n_sets - 1))
     for place, i in enumerate(used):
-        # In place: these are the largest arrays of a fit, and every copy goes through the memory.
+        # In place, because these are the largest arrays of a fit and copies would be slow.
         rows = slice(place * n_samples, (place + 1) * n_samples)
         np.subtract(record.measured[:, i], out[:, i, 0], out=residuals[rows])
         residuals[rows] *= record.weights[i]

@@ -14,20 +14,20 @@ from rigsight.records.record import Record
 
 
 class FitMemory(Protocol):
-    """Where the outcomes of fits are kept, so that work that was interrupted goes on where it stopped."""
+    """Storage of the outcomes of fits, so that interrupted work can be continued."""
 
     def recall(self, key: str) -> Mapping[str, Any] | None:
-        """Return the outcome that was remembered under a key, None if there is none."""
+        """Return the outcome that was stored under a key, None if there is none."""
 
     def remember(self, key: str, outcome: Mapping[str, Any]) -> None:
-        """Keep an outcome, numbers and text only, under a key."""
+        """Store an outcome, which consists of numbers and text, under a key."""
 
 
 def record_digest(record: Record) -> str:
-    """Return a hash of all that a fit takes from a record."""
+    """Return a hash of everything that a fit uses of a record."""
     digest = hashlib.blake2b(digest_size=16)
     told: list[Any] = [record.n_samples, record.dt, record.hold, sorted(record.signals)]
-    # Without any of its own, what was remembered before there were such constants stays known.
+    # Added only if present, so that outcomes stored before such constants existed remain valid.
     told += [sorted(record.constants.items())] if record.constants else []
     told += [sorted(record.observed.items())] if record.observed else []
     digest.update(json.dumps(told).encode())
@@ -37,9 +37,9 @@ def record_digest(record: Record) -> str:
 
 
 def fit_key(problem: Sequence[Any], theta: NDArray[np.float64], settings: Sequence[Any]) -> str:
-    """Return a hash of a fit: of its problem (plain data), of its start and of its settings.
+    """Return a hash of a fit: of its problem (plain data), its start and its settings.
 
-    The number of a start is hashed bit by bit: a fit from a neighboring value is another fit.
+    Start values are hashed bit by bit: a fit from a slightly different value is a different fit.
     """
     digest = hashlib.blake2b(digest_size=16)
     digest.update(json.dumps([problem, settings]).encode())

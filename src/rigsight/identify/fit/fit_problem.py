@@ -1,6 +1,6 @@
 """Cost, derivatives and Gauss-Newton matrix of an output-error fit as functions of its coordinates and initial states.
 
-They come from one call of the kernel for all records. It integrates the derivatives together with the motion or, where that takes
+They come from one call of the kernel for all records. It integrates the derivatives together with the motion or, if that takes
 longer, the current parameters and every shifted set in parallel lanes.
 """
 
@@ -30,17 +30,18 @@ from rigsight.simulate import (
 )
 
 MOST_SUBSTEPS = 16
-"""A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
+"""Largest number of substeps; a model that is too stiff for it is fitted with this number, and its residuals are recomputed
+accurately."""
 _WORTH_REFINING = 1e-3
-"""Share of the cost that finer steps must promise to remove, of a model near the noise floor."""
+"""Share of the cost by which finer steps must be expected to lower it, for a model near the noise floor."""
 _MOST_WORTH = 1e-2
-"""The same of a model that is far above it, half a percent of its error: a time constant that samples do not show is pushed to
-zero for ever smaller gains, in ever finer steps, and from there many a candidate cannot be simulated."""
+"""The same for a model far above the noise floor, half a percent of its error. With less, a time constant that the samples do not
+resolve would tend to zero in ever finer steps for ever smaller gains, and many candidates could not be simulated from there."""
 _FAR = 10.0
-"""Error in units of the noise that is far above it: benches of the catalogue are judged from ten floors on."""
+"""Error in units of the noise that counts as far above it: benches of the catalogue are judged from ten floors on."""
 _WORSE = 1e3
 _DIVERGED = 1e100
-"""Sum of squares, in units of the noise, of a simulation that left the range in which an optimizer can compare numbers."""
+"""Sum of squares, in units of the noise, above which a simulation counts as diverged."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Evaluation:
 
     @cached_property
     def compressed(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """R and c with R^T R = J^T J and R^T c = J^T r, also where the derivatives are dependent."""
+        """R and c with R^T R = J^T J and R^T c = J^T r, also for linearly dependent derivatives."""
         size = np.sqrt(np.diag(self.normal))
         size[size == 0.0] = 1.0
         eigenvalues, vectors = symmetric_eigen(self.normal / np.outer(size, size))
@@ -99,7 +100,7 @@ class Problem:
         return [row * sizes for row in places]
 
     def choose_substeps(self, theta: NDArray[np.float64]) -> None:
-        """Choose the substeps of each record from the accuracy wish at these coordinates."""
+        """Choose the substeps of each record that give the requested accuracy at these coordinates."""
         p = self.coordinates.to_parameters(theta[: self.n_free])
         states = self.states(theta)
 
@@ -121,7 +122,7 @@ class Problem:
         self.substeps = self.data.of_each_record(chosen)
 
     def refined(self, theta: NDArray[np.float64]) -> bool:
-        """Double the substeps if the cost would then fall further from here; return True if so."""
+        """Double the substeps if the cost could then be lowered further from here; return True if so."""
         before = self.substeps
         within_reach = self._removable(theta)
         self.substeps = [n.with_most(min(2 * n, MOST_SUBSTEPS)) for n in before]
@@ -137,7 +138,7 @@ class Problem:
         return _MOST_WORTH if self.at(theta).cost > _FAR**2 * n_samples else _WORTH_REFINING
 
     def _removable(self, theta: NDArray[np.float64]) -> float:
-        """Return the share of the cost that a full Gauss-Newton step promises to remove."""
+        """Return the share of the cost by which a full Gauss-Newton step would lower it in the linear approximation."""
         evaluation = self.at(theta)
         if not np.isfinite(evaluation.cost):
             return 0.0
@@ -156,7 +157,7 @@ class Problem:
         return np.append(projection, np.sqrt(rest))
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the derivatives that go with `residual`."""
+        """Return the derivatives of `residual`."""
         root, _ = self.at(theta).compressed
         return np.vstack([root, np.zeros(theta.size)])
 
@@ -164,7 +165,7 @@ class Problem:
         """Evaluate, or return the last evaluation if it was here."""
         if self._last is not None and np.array_equal(self._last.theta, theta):
             return self._last
-        # A diverging simulation overflows here; that is what the check below is for.
+        # A diverging simulation overflows here; the check below detects it.
         with np.errstate(over="ignore", invalid="ignore"):
             products = np.array(self._products(theta))
             cost = float(np.sum(products[:, 0, 0]))
@@ -205,14 +206,14 @@ class Problem:
         return normal, gradient
 
     def columns(self, index: int) -> NDArray[np.intp]:
-        """Return which coordinates a record depends on: the parameters and its own initial states."""
+        """Return the indices of the coordinates on which a record depends: the parameters and its own initial states."""
         own = self.n_free + index * self.n_states + np.arange(self.n_states)
         return np.concatenate([np.arange(self.n_free), own]).astype(np.intp)
 
     def sensitivities(
         self, theta: NDArray[np.float64]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Return per record the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
+        """Return, for each record, the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
         data = self.data
         if carries_tangents(data.structure):
             p, dp, x0, dx0 = self._place(theta)
@@ -230,7 +231,7 @@ class Problem:
                         n,
                         self.substeps[index],
                     )
-                    # To `weighted` they are outputs of sets that differ by one.
+                    # `weighted` expects outputs of sets, here of sets that differ by a unit step.
                     out[:, :, 1:] += out[:, :, :1]
                     return weighted(own, out)
 
@@ -248,10 +249,10 @@ class Problem:
     def _place(
         self, theta: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return parameters, initial states and their derivatives by the coordinates that a record depends on.
+        """Return parameters, initial states and their derivatives by the coordinates on which a record depends.
 
-        Shapes (n_parameters,), (n_parameters, n), (n_records, n_states) and (n_states, n) with n = n_free + n_states. No state
-        is limited where this is asked for, so that the unit of none depends on the parameters.
+        Shapes (n_parameters,), (n_parameters, n), (n_records, n_states) and (n_states, n) with n = n_free + n_states. Structures
+        for which this is called have no limited states, so that the units of states do not depend on the parameters.
         """
         own = theta[: self.n_free]
         p = self.coordinates.to_parameters(own)
@@ -263,9 +264,9 @@ class Problem:
     def _sets(
         self, theta: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return the shift of each coordinate, and what differences are taken of: the place itself and each shifted one.
+        """Return the shift of each coordinate, and the sets of which differences are taken: the point and each shifted point.
 
-        These are parameters, shape (n_parameters, n_sets), and initial states, shape (n_records, n_states, n_sets).
+        The sets are parameters, shape (n_parameters, n_sets), and initial states, shape (n_records, n_states, n_sets).
         """
         shifts = np.where(theta + self.steps > self.upper, -self.steps, self.steps)
         base = self.coordinates.to_parameters(theta[: self.n_free])
@@ -282,7 +283,7 @@ class Problem:
         return shifts, p, states * self.data.state_sizes(p)
 
     def _products(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Return per record the products of its residual and its derivatives, shape (1 + n, 1 + n), n = n_free + n_states."""
+        """Return each record's products of residual and derivatives, shape (1 + n, 1 + n), n = n_free + n_states."""
         data = self.data
         if data.structure.is_shifted or data.structure.histories:
             columns = [np.column_stack(parts) for parts in self.sensitivities(theta)]
@@ -317,7 +318,7 @@ class Problem:
         p: NDArray[np.float64],
         several: Callable[[NDArray[np.float64], list[int]], NDArray[np.float64]],
     ) -> Callable[[Sequence[int]], list[NDArray[np.float64]]]:
-        """Return a function of shares of the records that calls another one for those of equal constants together."""
+        """Return a function of shares of the records that calls another one for each group with equal constants."""
 
         def of_share(share: Sequence[int]) -> list[NDArray[np.float64]]:
             groups: dict[tuple[tuple[int, float], ...], list[int]] = {}
@@ -332,7 +333,7 @@ class Problem:
         return of_share
 
     def _fitted_records(self) -> list[FittedRecord]:
-        # Equal numbers of steps may stand for other needs: these are the same if they are the same object.
+        # Substeps with equal numbers may have different needs, so they are compared by identity.
         if [id(substeps) for substeps, _ in self._fitted] != [id(substeps) for substeps in self.substeps]:
             self._fitted = [
                 (

@@ -1,4 +1,4 @@
-"""What a grey-box fit found."""
+"""Result of a grey-box fit."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ class FitResult:
     structure
         Rig and effects that were fitted.
     success, message
-        Whether the optimizer converged, and its words.
+        Whether the optimizer converged, and its message.
     values
         Every parameter of the structure by name, fitted or not.
     standard_errors
-        Of the fitted parameters by name, allowing for colored residuals; infinite where the records do not determine one.
+        Of the fitted parameters by name, allowing for colored residuals; infinite if the records do not determine the parameter.
     initial_states
-        Per record, shape (n_states + n_offsets,): behind the states of the structure stand the offsets that were free.
+        Per record, shape (n_states + n_offsets,): the states of the structure, followed by the free offsets.
     offset_names
         Sensors whose offsets were free in each record, in that order.
     cost
         Sum of squared weighted residuals.
     n_samples
-        Residuals in that sum.
+        Number of residuals in that sum.
     n_evaluations
-        Evaluations of residuals and derivatives.
+        Number of evaluations of residuals and derivatives.
     free
         Names of the fitted parameters, in the order of `covariance`.
     covariance
@@ -54,7 +54,7 @@ class FitResult:
     free: tuple[str, ...]
     covariance: NDArray[np.float64]
     residuals: tuple[NDArray[np.float64], ...]
-    """Measured minus simulated per record, shape (n_samples, n_outputs), NaN where an output was not measured."""
+    """Measured minus simulated per record, shape (n_samples, n_outputs), NaN for an output that was not measured."""
     substeps: tuple[Substeps, ...] = ()
     offset_names: tuple[str, ...] = ()
 
@@ -65,12 +65,12 @@ class FitResult:
         return tuple(state[: state.size - count] for state in self.initial_states)
 
     def offsets(self, index: int) -> dict[str, float]:
-        """Return the offset of each sensor in a record, by name; empty where none was free.
+        """Return the offset of each sensor in a record, by name; empty if none was free.
 
         Parameters
         ----------
         index
-            Place of the record in the fit.
+            Index of the record in the fit.
         """
         if not self.offset_names:
             return {}

@@ -1,7 +1,7 @@
 """Output-error fit of a structure's parameters, initial states included, to any number of records at once.
 
-The optimizer is scipy's bounded trust-region least squares, fed with an equivalent compressed problem: it only uses J^T J, J^T r
-and r^T r, so a square root of J^T J stands for the tall Jacobian.
+The optimizer is scipy's bounded trust-region least squares, applied to an equivalent compressed problem: it only uses J^T J,
+J^T r and r^T r, so a square root of J^T J replaces the tall Jacobian.
 
 References
 ----------
@@ -41,18 +41,18 @@ from rigsight.units import characteristic_value
 DEFAULT_ACCURACY = 1e-4
 """Relative accuracy of simulations inside a fit: below the noise of any bench."""
 _MOST_ROUNDS = 4
-"""Fits that follow each other with finer steps."""
+"""Largest number of successive searches with finer steps."""
 _WORTH_A_ROUND = 1e-3
-"""Share of the cost that a round must have removed for another one."""
+"""Share of the cost by which a round must have lowered it for another round."""
 _STATE_RANGE = 20.0
-"""How far an initial state may move from its guess, in units of its size."""
+"""Largest distance of an initial state from its first estimate, in units of its size."""
 _Outcome = tuple[NDArray[np.float64], bool, str]
-"""Coordinates and places where a search ended, whether it converged, and the optimizer's words."""
+"""Coordinates and initial states at the end of a search, whether it converged, and the optimizer's message."""
 
 
 @dataclass(frozen=True)
 class _Begin:
-    """Where a search starts: parameters and initial states together, and the states with their bounds per record."""
+    """Start of a search: parameters and initial states together, and the states with their bounds per record."""
 
     coordinates: Coordinates
     theta: NDArray[np.float64]
@@ -73,9 +73,9 @@ class GreyBoxFit:
     structure
         Rig and effects.
     records
-        Records to fit; a record may lack sensors, of a rig of one motion any but the first. Offsets that one of them leaves free
-        (`Record.free_offsets`) are estimated in each. Its observer (`Record.observed`) acts in the fit, not in the
-        result.
+        Records to fit; a record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of
+        them (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of
+        the result.
     scales
         Size of each base quantity, see `characteristic_scales`.
     output_noise
@@ -83,9 +83,9 @@ class GreyBoxFit:
     accuracy
         Relative accuracy of the simulations; the number of substeps follows from it.
     memory
-        Where outcomes are kept; a fit that was done before is not done again, and comes out the same.
+        Storage of outcomes; a stored fit is not repeated and gives the same result.
     threads
-        Who helps with the records; None for the calling thread alone.
+        Threads among which the records are distributed; None for the calling thread alone.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class GreyBoxFit:
         self._problem: list[Any] = []
         if memory is not None:
             self._problem = [
-                # Bounds and start values stand in no equation.
+                # Included because bounds and start values do not appear in the equations.
                 dict(structure.rig.declaration),
                 [
                     str(equation)
@@ -154,14 +154,14 @@ class GreyBoxFit:
         tolerance
             Relative change of the cost at which the optimizer stops.
         finish
-            Compute standard errors, and residuals with the accurate integrator. False for a first look.
+            Compute standard errors, and residuals with the accurate integrator. False for a rough fit.
         substeps
-            Integration steps per sample of each record; default is chosen from the accuracy with the accurate integrator.
+            Integration steps per piece of the input of each record; by default they follow from the accuracy.
 
         Returns
         -------
-        The result; ``success`` is False, with the reason as ``message``, where the start cannot be simulated or the
-        optimizer ran out of evaluations.
+        The result; ``success`` is False, with the reason as ``message``, if the start cannot be simulated or the optimizer ran
+        out of evaluations.
         """
         begin = self._begin(start, free, initial_states)
         coordinates, theta = begin.coordinates, begin.theta
@@ -181,7 +181,7 @@ class GreyBoxFit:
             for _ in range(_MOST_ROUNDS if finish and substeps is None else 1):
                 solution = searched(problem, theta, (lower, upper), tolerance, max_evaluations)
                 theta = solution.x
-                # A time constant on its way to zero is held back where steps chosen for a longer one become unstable.
+                # A time constant that tends to zero stops where the steps chosen for a longer one become unstable.
                 if not (finish and substeps is None and problem.refined(theta)):
                     break
             if finish and tolerance <= FINE_TOLERANCE and np.any(self.data.limited):
@@ -202,24 +202,24 @@ class GreyBoxFit:
         tolerance: float = 1e-5,
         most_rounds: int = 5,
     ) -> FitResult:
-        """Fit the free parameters to many short records, each with the initial state that suits the parameters best.
+        """Fit the free parameters to many short records, each with the best initial state for the parameters.
 
-        For motion whose memory sticks and slips: `fit`, which moves everything together, can stop far from the best place there.
+        For motion with friction or hysteresis: there, `fit`, which varies everything together, can stop far from the minimum.
 
         Parameters
         ----------
         start, free
-            As of `fit`.
+            As for `fit`.
         max_evaluations
             Limit for the optimizer in each round.
         tolerance
             Relative change of the cost at which a round ends.
         most_rounds
-            Rounds; between them limited states try other places.
+            Largest number of rounds; between them other values of limited states are tried.
 
         Returns
         -------
-        As of `fit`.
+        As for `fit`.
         """
         begin = self._begin(start, free, None)
         coordinates, n_free = begin.coordinates, len(free)
@@ -248,13 +248,13 @@ class GreyBoxFit:
     def information(self, start: Mapping[str, float], free: Sequence[str]) -> NDArray[np.float64]:
         """Return the information of the records on parameters at their start, with unknown initial states.
 
-        The Fisher information of relative changes, of changes in units of their size where a value is zero; NaN where the start
+        This is the Fisher information of relative changes (of changes in units of the size, if a value is zero); NaN if the start
         cannot be simulated.
 
         Parameters
         ----------
         start, free
-            As of `fit`.
+            As for `fit`.
 
         Returns
         -------
@@ -388,7 +388,7 @@ class GreyBoxFit:
         )
 
     def _values(self, p: NDArray[np.float64]) -> dict[str, float]:
-        # The bandwidths of an observer stand behind all other parameters.
+        # The bandwidths of an observer come after all other parameters.
         return dict(zip(self.structure.names, map(float, p), strict=False))
 
     def _left(self, index: int, p: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:

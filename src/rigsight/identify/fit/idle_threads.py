@@ -1,8 +1,8 @@
 """Distribution of threads: idle threads help with the records of a running fit.
 
-Candidates are fitted side by side as long as there are at least as many of them as jobs. Otherwise, and when one takes much
-longer than the others, idle jobs take a share of the records of a running fit, because simulations release the interpreter lock.
-The results and the order of summation do not depend on the number of jobs.
+Candidates are fitted in parallel as long as there are at least as many of them as jobs. Otherwise, and if one takes much longer
+than the others, idle jobs take a share of the records of a running fit; this works because simulations release the interpreter
+lock. The results and the order of summation do not depend on the number of jobs.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class IdleThreads:
     Parameters
     ----------
     n_jobs
-        Threads that may compute at the same time, the one that asks among them.
+        Number of threads that may compute at the same time, including the calling one.
     """
 
     def __init__(self, n_jobs: int = 1) -> None:
@@ -37,7 +37,7 @@ class IdleThreads:
 
     @contextmanager
     def one_busy(self) -> Iterator[None]:
-        """Count the thread that calls as busy: it works on a fit of its own beside others."""
+        """Count the calling thread as busy while it works on a fit of its own, in parallel with others."""
         with self._lock:
             self._busy += 1
         try:
@@ -47,7 +47,7 @@ class IdleThreads:
                 self._busy -= 1
 
     def side_by_side(self, one: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """Yield what a function makes of each item, in their order; who has no item left helps with the records of others.
+        """Yield the results of a function for each item, in order; threads without an item help with the records of others.
 
         Parameters
         ----------
@@ -68,28 +68,28 @@ class IdleThreads:
         yield from parallel(delayed(counted)(item) for item in items)
 
     def results(self, one: Callable[[int], Result], sizes: Sequence[int]) -> list[Result]:
-        """Return what a function makes of each of some numbers ``0, 1, ...``, in their order.
+        """Return the results of a function for the numbers ``0, 1, ...``, in order.
 
         Parameters
         ----------
         one
             Called for each number, by any thread.
         sizes
-            How much work each is, in any unit.
+            Amount of work of each, in any unit.
         """
         return self.results_of_shares(lambda numbers: [one(number) for number in numbers], sizes)
 
     def results_of_shares(
         self, several: Callable[[Sequence[int]], Sequence[Result]], sizes: Sequence[int]
     ) -> list[Result]:
-        """Return the same where a function takes several numbers at once.
+        """Return the same for a function that takes several numbers at once.
 
         Parameters
         ----------
         several
             Called for shares of the numbers, by any thread; returns its results in their order.
         sizes
-            How much work each number is, in any unit.
+            Amount of work of each number, in any unit.
         """
         free = self._borrowed(len(sizes) - 1)
         if not free or self._pool is None:
@@ -106,16 +106,16 @@ class IdleThreads:
         return [found[index] for index in range(len(sizes))]
 
     def _borrowed(self, most: int) -> int:
-        """Count as many idle threads as busy as can help, and return their number."""
+        """Count as many idle threads as can help as busy, and return their number."""
         with self._lock:
-            # A thread that was not counted is the only one that works.
+            # If no thread is counted, the calling one is the only one that works.
             free = max(0, min(most, self._n_jobs - max(1, self._busy)))
             self._busy += free
         return free
 
 
 def _shares(sizes: Sequence[int], count: int) -> list[list[int]]:
-    """Return numbers in shares of about the same size: the largest first, each to who has least."""
+    """Return the numbers in shares of about the same size: the largest first, each to the smallest share so far."""
     shares: list[list[int]] = [[] for _ in range(count)]
     loads = [0] * count
     for index in sorted(range(len(sizes)), key=lambda i: -sizes[i]):

@@ -17,9 +17,10 @@ Floats = NDArray[np.float64]
 
 _DEPENDENT = 1e-6
 _MARGIN = 3.0
-"""A direction that moves residuals less than errors of the derivatives do, thrice, is not stepped along; as for covariances."""
+"""Factor of the error of the derivatives below which the influence of a direction counts as zero, as for covariances; no step is
+taken along it."""
 _SHARES = (1.0, 0.3, 0.1, 0.03)
-"""Of a step, the largest that lowers the cost is taken: a straight line reaches less far than to numbers that are quite other."""
+"""Shares of a step; the largest that lowers the cost is taken, because the linearization may not hold for a whole step."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +30,13 @@ class RecordDerivatives:
     Attributes
     ----------
     residuals
-        Weighted, of all measured outputs one after the other, shape (n_measured * n_samples,).
+        Weighted residuals of all measured outputs one after the other, shape (n_measured * n_samples,).
     by_coordinate
         Their derivatives by the coordinates of the free parameters, shape (n, n_free).
     by_state
-        Their derivatives by the initial state of the record, offsets behind it, shape (n, n_states).
+        Their derivatives by the initial state of the record and then its offsets, shape (n, n_states).
     n_measured
-        Number of outputs that the record holds.
+        Number of outputs that the record contains.
     """
 
     residuals: Floats
@@ -46,7 +47,7 @@ class RecordDerivatives:
 
 @dataclass(frozen=True)
 class Derivatives:
-    """The same of all records of a fit.
+    """The same for all records of a fit.
 
     Attributes
     ----------
@@ -55,9 +56,9 @@ class Derivatives:
     place
         Their coordinates, shape (n_free,).
     records
-        One each.
+        Derivatives of each record.
     coordinates
-        Their way to the parameters.
+        Map from coordinates to parameters.
     error
         Relative error of the derivatives.
     """
@@ -79,7 +80,7 @@ def derivatives(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> Der
     fit
         Values, and the initial state of each of these records.
     free
-        Names of the parameters by which derivatives are taken.
+        Names of the parameters with respect to which derivatives are taken.
     """
     evaluated, theta = _at_end(problem, fit, free)
     return Derivatives(
@@ -96,14 +97,14 @@ def derivatives(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> Der
 
 @dataclass(frozen=True)
 class OwnDerivatives:
-    """Where one record alone leads.
+    """Estimate from one record alone, near the common values.
 
     Attributes
     ----------
     derivatives
-        There, with the residuals that the straight line through there has at the common values.
+        Derivatives at the record's own values, with residuals extrapolated linearly from there to the common values.
     fit
-        Its own values and initial state.
+        The record's own values and initial state.
     """
 
     derivatives: RecordDerivatives
@@ -113,7 +114,7 @@ class OwnDerivatives:
 def own_derivatives(
     problem: GreyBoxFit, fit: FitResult, free: Sequence[str], most_steps: int, worth_a_step: float
 ) -> OwnDerivatives | None:
-    """Return where some Gauss-Newton steps lead one record away from common values: derivatives there are not those here.
+    """Return values and derivatives of one record after some Gauss-Newton steps from the common values.
 
     Parameters
     ----------
@@ -124,13 +125,13 @@ def own_derivatives(
     free
         Names of the parameters.
     most_steps
-        Steps at the most; one of which no share lowers the cost is not taken.
+        Largest number of steps; a step is not taken if no share of it lowers the cost.
     worth_a_step
-        Share of the cost that a step must promise to take away.
+        Share of the cost by which a step must be expected to lower it.
 
     Returns
     -------
-    None where no step was taken.
+    The estimate; None if no step was taken.
     """
     evaluated, start = _at_end(problem, fit, free)
     n_free, coordinates, theta = len(free), evaluated.coordinates, start
@@ -173,11 +174,11 @@ def own_derivatives(
 
 
 def _at_end(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> tuple[Problem, Floats]:
-    """Return the problem with derivatives by these parameters, and where the fit ended in its coordinates."""
+    """Return the problem with derivatives by these parameters, and the end of the fit in its coordinates."""
     coordinates = Coordinates.of(problem.data.structure, free, fit.values, problem.scales)
     own = coordinates.from_values(fit.values)
     sizes = problem.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
-    # A state that cannot leave a range of zero has no place in it.
+    # The range of a limited state may be zero.
     units = np.where(sizes > 0.0, sizes, 1.0)
     theta = np.concatenate([own, *(state / units for state in fit.initial_states)])
     evaluated = Problem(problem.data, coordinates, sizes.size, np.full(theta.size, np.inf))

@@ -19,24 +19,25 @@ from rigsight.identify.fit.fit_problem import Evaluation, Problem
 from rigsight.simulate import simulate_outputs
 
 FINE_TOLERANCE = 1e-6
-"""A search that stops at larger changes of the cost is only a rough one, for which kinks do not matter."""
+"""Tolerance above which a search is only a rough one, for which kinks do not matter."""
 _SETTLED = 3e-3
-"""Length of a step, in standard errors, after which no more are made: with steps that halve, a hundredth is left at most."""
+"""Length of a step, in standard errors, at which the search ends: with steps that halve, at most a hundredth remains."""
 _MOST_STEPS = 20
-"""Five did where steps shrink by themselves; where two places answer each other, halved steps need about twice as many."""
+"""Five were enough if steps shrink by themselves; if the search alternates between two points, halved steps need about twice as
+many."""
 _LEAST_SHARE = 0.1
 _LESS, _MORE = 0.5, 1.5
-"""Factors of the share of a step that is taken, where it turns back and where it does not: the usual ones, not adjusted."""
+"""Factors on the share of a step that is taken, if the step reverses and if it does not: the usual values, not tuned."""
 _DEPENDENT = 1e-7
-"""Share of the largest influence below which a combination of coordinates has none: squares are known to 1e-16."""
+"""Share of the largest influence below which a combination of coordinates has none: squares are accurate to 1e-16."""
 _WIDEST = 0.1
-"""Share of a coordinate's range that a difference spans at most."""
+"""Largest share of a coordinate's range that a difference spans."""
 _EXACT = 1e-6
-"""Relative accuracy of the residuals: with integration steps whose number is chosen by a limit that rounding can cross the same
-records gave numbers that differed by a twentieth of a standard error. Derivatives need no such care."""
+"""Relative accuracy of the residuals. With a chosen number of integration steps, which rounding can change, estimates from the
+same records differed by a twentieth of a standard error. Derivatives need not be as accurate."""
 _WORST = 1.0
-"""By how many squared standard errors of white noise the cost may rise on the way to where differences vanish: they see no
-more than that."""
+"""Largest increase of the cost, in squared standard errors of white noise, on the way to the point where the differences vanish,
+which cannot resolve less."""
 
 
 def searched(
@@ -46,7 +47,7 @@ def searched(
     tolerance: float,
     max_evaluations: int,
 ) -> OptimizeResult:
-    """Return where the optimizer ends."""
+    """Return the result of the optimizer."""
     return least_squares(
         problem.residual,
         theta,
@@ -67,20 +68,20 @@ def off_kinks(
     bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
     n_samples: int,
 ) -> NDArray[np.float64] | None:
-    """Return the place near the end of a search where Gauss-Newton steps made of long differences vanish.
+    """Return the point near the end of a search where Gauss-Newton steps from long differences vanish.
 
     Parameters
     ----------
     problem
         The fit.
     theta, bounds
-        Where the search ended, and its bounds, shape (n,) each.
+        End of the search, and its bounds, shape (n,) each.
     n_samples
-        Measured samples, which tell the size of the noise.
+        Number of measured samples, from which the size of the noise follows.
 
     Returns
     -------
-    Shape (n,); None where the steps lead to a higher cost or come to no end.
+    Shape (n,); None if the steps lead to a higher cost or do not converge.
     """
     before = problem.at(theta)
     variance = before.cost / max(n_samples, 1)
@@ -101,7 +102,7 @@ def _settled(
     bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
     variance: float,
 ) -> NDArray[np.float64] | None:
-    """Return where the steps vanish; None if they do not, or at a higher cost."""
+    """Return the point where the steps vanish; None if they do not, or only at a higher cost."""
     place, share, last, first = theta, 1.0, np.zeros(theta.size), float("inf")
     for _ in range(_MOST_STEPS):
         evaluation = _evaluated(problem, place)
@@ -111,7 +112,7 @@ def _settled(
         step, length = _step(evaluation, bounds)
         if length <= _SETTLED * np.sqrt(variance):
             return place if evaluation.cost <= first + _WORST * variance else None
-        # Beside a kink each of two places may send the search to the other one.
+        # Near a kink the search may alternate between two points.
         returns = float((step / problem.steps) @ (last / problem.steps)) < 0.0
         share = max(_LESS * share, _LEAST_SHARE) if returns else min(_MORE * share, 1.0)
         place, last = place + share * step, step
@@ -122,7 +123,7 @@ def _settled(
 def _differences(
     evaluation: Evaluation, bounds: tuple[NDArray[np.float64], NDArray[np.float64]], variance: float
 ) -> NDArray[np.float64]:
-    """Return a standard error of each coordinate with all others held; one without influence keeps the derivative's step."""
+    """Return the standard error of each coordinate with all others held; a coordinate without influence keeps the small step."""
     curvature = np.diag(evaluation.normal)
     error = np.sqrt(variance / np.maximum(curvature, 1e-300))
     widest = np.maximum(_WIDEST * (bounds[1] - bounds[0]), STEP)
@@ -155,9 +156,9 @@ def _evaluated(problem: Problem, place: NDArray[np.float64]) -> Evaluation:
 def _step(
     evaluation: Evaluation, bounds: tuple[NDArray[np.float64], NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], float]:
-    """Return a Gauss-Newton step within the bounds and how much it changes the residuals, which bounds it in standard errors.
+    """Return a Gauss-Newton step within the bounds, and the change of the residuals, which bounds its size in standard errors.
 
-    Coordinates that it pushes against a bound are held.
+    Coordinates that the step would move beyond a bound are held.
     """
     place = evaluation.theta
     root, projection = evaluation.compressed

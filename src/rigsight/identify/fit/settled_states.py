@@ -1,4 +1,4 @@
-"""Initial state of a record: fitted from an estimate over longer and longer stretches up to the whole record.
+"""Initial state of a record: fitted from an estimate over increasingly long stretches up to the whole record.
 
 The effect of an initial state is simpler over a short stretch than over a long one, above all if the motion is unstable or
 chaotic: a descent on the whole record would fail from a slightly wrong estimate. If the effect of the initial state decays, the
@@ -19,39 +19,41 @@ from rigsight.simulate import parameter_vector, simulate_sets
 Floats = NDArray[np.float64]
 
 _FIRST_SAMPLES = 25
-"""Samples of the first stretch."""
+"""Number of samples of the first stretch."""
 _STEP = 1e-6
-"""Difference of a state in units of its size."""
+"""Difference step of a state in units of its size."""
 _STEPS = 4
 """Gauss-Newton steps on each stretch."""
 _SHORTER = (0.3, 0.1, 0.03)
-"""Shares of a step that are tried beside the whole one."""
+"""Shares of a step that are tried in addition to the whole one."""
 _WORTH_A_STEP = 0.1
-"""Share of the squared error that a step has to take for another one: the fit goes on from here."""
+"""Share of the squared error by which a step must lower it for another step; the fit itself continues from here."""
 _LONGER = 4
-"""Length of a stretch in units of the one before. With four instead of two all stretches together take two thirds of the time."""
+"""Length of a stretch relative to the previous one. With four instead of two, the stretches take two thirds of the time."""
 _PULL = 1e-3
-"""Weight of the guess against an error of size one: it decides what the stretch does not tell."""
+"""Weight of the first estimate against an error of size one: it determines only what the stretch does not."""
 _LARGEST = 1e9
-"""Error at which a motion has left the range of numbers, or may as well have."""
+"""Error above which a motion counts as diverged."""
 _SUBSTEPS = 4
 _FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
-"""Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
+"""Values of limited states that are tried at the beginning of a record, as shares of their range: a descent from a wrong end
+stays there."""
 _LOST = 2.0
-"""Growth of the error per sample at which a longer stretch is not followed: the parameters are not good enough for it."""
+"""Growth of the RMS error from one stretch to the next at which longer ones are not tried: the parameters are too inaccurate."""
 _STEADY = 0.5
-"""Share of the squared sensitivity in the second half of a stretch where what a state does neither grows nor dies away."""
+"""Share of the squared sensitivity in the second half of a stretch if the effect of a state neither grows nor decays."""
 
 
 def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
-    """Return each record's initial state; of several for states with a range, and of moving and resting, the best.
+    """Return an estimate of each record's initial state.
 
-    On a rig of more than one motion, and in a free motion, it is fitted to the beginning of the record.
+    With limited states it is the best of several, moving and at rest. For a rig with more than one motion, and for a free
+    motion, it is fitted to the beginning of the record.
 
     Parameters
     ----------
     data
-        What is fitted.
+        Structure and records of the fit.
     values
         Value of every parameter of the structure.
 
@@ -66,7 +68,7 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
 
     def settled(index: int) -> Floats:
         record = data.records[index]
-        # Where an input drives one mass, what it begins with is soon forgotten; a free motion has nothing else.
+        # If an input drives one mass, the initial state soon has no effect; a free motion depends on it alone.
         if data.structure.rig.has_one_motion and not moves_freely(data.structure.rig, record.record):
             return guesses[index]
         return settled_state(data, record, p, guesses[index])
@@ -77,7 +79,7 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
 def _placed(
     data: FitData, record: RecordData, guess: Floats, p: Floats, values: Mapping[str, float]
 ) -> Floats:
-    """Return the best of the guess and the state at rest with limited states at several places of their ranges."""
+    """Return the best of the estimate and the state at rest, with several values of limited states within their ranges."""
     own = record.parameters(p)
     ranges = np.where(data.limited, data.state_sizes(own[:, None])[:, 0], 0.0)
     at_rest = state_at_rest(data.structure, record.record, guess, values)
@@ -92,18 +94,18 @@ def _placed(
 
 
 def settled_state(data: FitData, record: RecordData, p: Floats, guess: Floats) -> Floats:
-    """Return the initial state that fits a record from its beginning on as far as the parameters can follow it.
+    """Return the initial state that fits a record from its beginning, as far as the parameters allow.
 
     Parameters
     ----------
     data
-        What is fitted.
+        Structure and records of the fit.
     record
         The record.
     p
         Parameters, shape (n_parameters,); the record's own constants replace those in it.
     guess
-        Shape (n_states,).
+        First estimate, shape (n_states,).
 
     Returns
     -------
@@ -143,7 +145,7 @@ def _fitted(
     for _ in range(_STEPS):
         cost, slopes = float(lanes[:, 0] @ lanes[:, 0]), (lanes[:, 1:] - lanes[:, :1]) / _STEP
         step = np.linalg.lstsq(slopes, -lanes[:, 0], rcond=None)[0]
-        # A whole step is mostly the best, and the next one needs the slopes there.
+        # A whole step is usually the best, so the slopes for the next step are computed with it.
         tried = np.column_stack([(place + step)[:, None] + around, place[:, None] + np.outer(step, _SHORTER)])
         ahead = errors(tried)
         costs = np.sum(ahead**2, axis=0)
@@ -160,15 +162,15 @@ def _fitted(
 
 
 def _dies_away(slopes: Floats, n_samples: int) -> bool:
-    """Return whether what any change of the state does is smaller in the second half of a stretch than in the first.
+    """Return True if the effect of any change of the state is smaller in the second half of a stretch than in the first.
 
     Parameters
     ----------
     slopes
-        Change of all errors with each state, the samples of one output after the other and the pull behind them, shape
-        (n_errors, n_states).
+        Change of all errors with each state, shape (n_errors, n_states): the samples of one output after the other, then the
+        rows of the first estimate's weight.
     n_samples
-        Samples of the stretch.
+        Number of samples of the stretch.
     """
     n_states = slopes.shape[1]
     if n_states == 0:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 def symmetric_eigen(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return eigenvalues in ascending order, shape (n,), and eigenvectors as columns, shape (n, n).
 
-    Divide and conquer is faster and has failed on a well-conditioned matrix of 90 rows; relatively robust representations
-    then serve.
+    Divide and conquer is faster but has failed on a well-conditioned matrix of 90 rows; relatively robust representations are
+    used then.
 
     Parameters
     ----------

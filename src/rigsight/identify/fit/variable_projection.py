@@ -1,7 +1,7 @@
 """Variable projection: only the parameters are coordinates, and the initial states of all records are refitted at each step.
 
-Windows of records have far more initial states than parameters, and if friction sticks or slips these depend on the parameters
-with jumps: a joint step in all coordinates would be rejected, a step followed by refitting each window is not.
+Windows of records have far more initial states than parameters, and with stick-slip friction these jump as the parameters change:
+a joint step in all coordinates would be rejected, a step followed by refitting each window is not.
 
 References
 ----------
@@ -22,15 +22,15 @@ from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
 from rigsight.simulate import simulate_sets
 
 _DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)
-"""Levenberg-Marquardt steps of an initial state that are tried side by side, in units of the normalized equations."""
+"""Dampings of the Levenberg-Marquardt steps of an initial state that are tried at once, in units of the normalized equations."""
 _ASIDE = (-0.3, 0.3)
-"""Shares of its range by which a limited state is moved beside them: its derivative is zero where it has slipped."""
+"""Shares of its range by which a limited state is moved in further trials: its derivative is zero after it has slipped."""
 _FEW_STEPS = 8
 _MANY_STEPS = 15
 _SETTLED = 1e-3
-"""Share of a record's cost below which another step is not worth its time."""
+"""Share of a record's cost below which no further step is made."""
 _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Where limited states are started from when the search pauses."""
+"""Start values of limited states between the rounds of a search, as shares of their range."""
 _DEPENDENT = 1e-9
 
 
@@ -40,7 +40,7 @@ class VariableProjection(Problem):
     Parameters
     ----------
     data
-        What is fitted.
+        Structure and records of the fit.
     coordinates
         Of the parameters.
     places
@@ -64,14 +64,14 @@ class VariableProjection(Problem):
         self._settled_at = self.places
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the derivatives that go with `residual`; where they are asked for, the search goes on from."""
+        """Return the derivatives of `residual`; the search continues from the point where they are requested."""
         evaluation = self.at(theta)
         self.places = self._settled_at
         root, _ = evaluation.compressed
         return np.vstack([root, np.zeros(theta.size)])
 
     def at(self, theta: NDArray[np.float64]) -> Evaluation:
-        """Settle the initial states, then evaluate with what they can make up for taken out of the derivatives."""
+        """Refit the initial states, then evaluate with their directions projected out of the derivatives."""
         if self._last is not None and np.array_equal(self._last.theta, theta):
             return self._last
         p = self.coordinates.to_parameters(theta)
@@ -92,7 +92,7 @@ class VariableProjection(Problem):
         return self._last
 
     def settle_anew(self, theta: NDArray[np.float64]) -> float:
-        """Let limited states try other places, and return the cost that is left."""
+        """Refit the initial states from several values of limited states, and return the cost."""
         self._last = None
         p = self.coordinates.to_parameters(theta)
 
@@ -112,7 +112,7 @@ class VariableProjection(Problem):
     def _settled(
         self, index: int, p: NDArray[np.float64], place: NDArray[np.float64], most: int
     ) -> tuple[NDArray[np.float64], float]:
-        """Return the best place near one, and its cost."""
+        """Return the best initial state near a given one, and its cost."""
         n, cost = self.n_states, float("inf")
         low, high = self._lower[index][:, None], self._upper[index][:, None]
         for _ in range(most):
@@ -140,7 +140,7 @@ class VariableProjection(Problem):
     def _candidates(
         self, place: NDArray[np.float64], derivative: NDArray[np.float64], residual: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return places to try, shape (n_states, n_lanes)."""
+        """Return initial states to try, shape (n_states, n_lanes)."""
         size = np.linalg.norm(derivative, axis=0)
         size[size == 0.0] = 1.0
         normal = (derivative / size).T @ (derivative / size)
@@ -175,7 +175,7 @@ class VariableProjection(Problem):
 def _projected(
     own: NDArray[np.float64], states: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return derivatives and residual without what the initial states can make up for."""
+    """Return derivatives and residual with the directions of the initial states projected out."""
     size = np.linalg.norm(states, axis=0)
     size[size == 0.0] = 1.0
     base, triangle = np.linalg.qr(states / size)

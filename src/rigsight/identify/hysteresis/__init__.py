@@ -22,8 +22,6 @@ __all__ = [
     "Minimum",
     "Peak",
     "SpectralRatio",
-    "SteadyResponse",
-    "SweptResponse",
     "break_frequency",
     "calibrate_to_records",
     "derived_quantities",

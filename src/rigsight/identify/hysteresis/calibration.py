@@ -10,19 +10,19 @@ from rigsight.identify.hysteresis.derived import DerivedQuantities
 RELEASE_GAIN = 1.01
 """Factor by which releasing a special value (an exponent of 1) must lower the cost for other starts to be tried."""
 BEYOND = 2.0
-"""Factor of the special value at which the other start lies."""
+"""Factor of the special value that gives the other start."""
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """One place where the refinement of a search ended.
+    """One local minimum, at which the refinement of a search ended.
 
     Attributes
     ----------
     values
         Value of every parameter.
     cost
-        Mean squared weighted residual there.
+        Mean squared weighted residual.
     """
 
     values: dict[str, float]
@@ -31,7 +31,7 @@ class Minimum:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """Hysteresis parameters with what follows from them.
+    """Hysteresis parameters, with quantities derived from them.
 
     Attributes
     ----------
@@ -40,10 +40,10 @@ class Calibration:
     derived
         Saturation, pair and loop areas, with intervals.
     minima
-        Where the refinements of the search's ends, and of the effects' own starts, arrived, best first, before special values
-        were released: several of like cost say that the data allow several sets.
+        Local minima reached from the ends of the search and from the effects' own starts, best first, before special values were
+        released. Several of similar cost show that the data allow several sets.
     n_simulated
-        Parameter sets that the search simulated.
+        Number of parameter sets that the search simulated.
     """
 
     fit: FitResult

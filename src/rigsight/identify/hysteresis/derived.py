@@ -33,16 +33,16 @@ _SUBSTEPS = 2
 
 @dataclass(frozen=True)
 class Derived:
-    """A number that follows from parameters.
+    """A quantity derived from parameters.
 
     Attributes
     ----------
     name, unit
-        What it is.
+        Name and unit.
     value
-        At the fitted parameters; infinite where it has no bound.
+        Value at the fitted parameters; infinite if it has no bound.
     lower, upper
-        Interval of confidence `LEVEL`; -inf to inf where the parameters are undetermined.
+        Interval of confidence `LEVEL`; -inf to inf if the parameters are undetermined.
     """
 
     name: str
@@ -62,17 +62,17 @@ class LoopArea:
 
 @dataclass(frozen=True)
 class DerivedQuantities:
-    """What hysteresis parameters mean.
+    """Quantities derived from hysteresis parameters.
 
     Attributes
     ----------
     pairs
-        Sum and difference of each pair that the effects search so, in this order.
+        Sum and difference, in this order, of each pair that is searched in this form.
     saturation
-        Where the state of a spring with memory comes to rest while it is loaded on and on, z_max = (A / (beta + gamma))^(1/n) of
-        a Bouc-Wen spring; None for effects without it.
+        Limit of the state of a spring with memory under increasing load, z_max = (A / (beta + gamma))^(1/n) for a Bouc-Wen
+        spring; None for effects without it.
     saturation_in_words
-        What the sign of the pair's sum (beta + gamma) says about the saturation; empty without one.
+        Statement on the saturation from the sign of the pair's sum (beta + gamma); empty without one.
     loop_areas
         Energy per cycle at each amplitude.
     """
@@ -95,9 +95,9 @@ def derived_quantities(
     Parameters
     ----------
     fit
-        With values and covariance.
+        Fit with values and covariance.
     amplitudes
-        Deflections at which loop areas are wished for, as those seen in records (`record_amplitudes`).
+        Deflections at which loop areas are computed, such as those reached in records (`record_amplitudes`).
     scales
         Size of each base quantity, as in the fit.
     rng
@@ -152,10 +152,10 @@ def parameter_draws(
 ) -> NDArray[np.float64]:
     """Return the fitted parameters and draws of their covariance, shape (n_parameters, 1 + n_draws).
 
-    The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear. From outside the
-    admissible range (an exponent below 1) they are moved to its nearest point by the metric of the fit, as the fit itself is: an
-    interval about a parameter at its bound would not hold the fitted value otherwise. Undetermined parameters stay where they
-    are.
+    The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear. Draws outside the
+    admissible range (an exponent below 1) are moved to its nearest point in the metric of the fit, as the fit itself is:
+    otherwise the interval of a parameter at its bound would not contain the fitted value. Undetermined parameters keep their
+    values.
     """
     structure = fit.structure
     center = np.array([fit.values[name] for name in structure.names])
@@ -167,7 +167,7 @@ def parameter_draws(
     known = np.where(np.isfinite(fit.covariance), fit.covariance, 0.0)
     back = np.linalg.pinv(coordinates.jacobian(theta) / _sizes(known)[:, None])
     covariance = back @ (known / np.outer(_sizes(known), _sizes(known))) @ back.T
-    # Coordinates differ by orders of magnitude: the root is taken of the correlation.
+    # Coordinates differ by orders of magnitude, so the root of the correlation is computed.
     size = _sizes(covariance)
     eigenvalues, vectors = symmetric_eigen(covariance / np.outer(size, size))
     root = size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
@@ -183,7 +183,7 @@ def _moved_inside(
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Move draws of shape (n_draws, n_free) to the bounds that they pass; the others follow by their correlation with it."""
+    """Move draws of shape (n_draws, n_free) to the bounds that they exceed; other coordinates follow by their correlation."""
     moved = drawn.copy()
     for i in range(lower.size):
         past = np.clip(moved[:, i], lower[i], upper[i]) - moved[:, i]
@@ -200,8 +200,8 @@ def _sizes(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 def loop_area(structure: Structure, p: NDArray[np.float64], amplitude: float) -> NDArray[np.float64]:
     """Return the energy per cycle of the spring for parameter sets of shape (n_parameters, n_sets), shape (n_sets,).
 
-    The effects that change the spring (its deflection or its torque) are put on a bench that moves them slowly and
-    sinusoidally; the last of four cycles counts. Damping and friction beside the spring are left out.
+    The effects that change the spring (its deflection or its torque) are simulated on a bench that moves them slowly and
+    sinusoidally; the last of four cycles is used. Damping and friction parallel to the spring are left out.
 
     Raises
     ------
@@ -225,7 +225,7 @@ def loop_area(structure: Structure, p: NDArray[np.float64], amplitude: float) ->
             name = structure.parameter_name(effect, parameter.name)
             row = bench.names.index(bench.parameter_name(effect, parameter.name))
             values[row] = known[name] if name in known else p[structure.names.index(name)]
-    # One radian per second: the laws are rate-independent, and what is not has no area of its own.
+    # One radian per second: the hysteresis laws are rate-independent, and rate-dependent parts have no area of their own.
     phase = 2.0 * np.pi * np.arange(_CYCLES * _SAMPLES_PER_CYCLE + 1) / _SAMPLES_PER_CYCLE
     dt = 2.0 * np.pi / _SAMPLES_PER_CYCLE
     velocity = amplitude * np.cos(phase)
@@ -240,7 +240,7 @@ def loop_area(structure: Structure, p: NDArray[np.float64], amplitude: float) ->
 def record_amplitudes(
     structure: Structure, records: Sequence[Record], values: Mapping[str, float]
 ) -> tuple[float, ...]:
-    """Return the deflection of the spring that each record reaches, increasing."""
+    """Return the largest deflection of the spring in each record, in increasing order."""
     rig = structure.rig
     name = rig.outputs[0].name if rig.is_driven else rig.inputs[0].name
     rest = float(rig.motion.rest.subs({s: values[s.name] for s in rig.motion.rest.free_symbols}))
@@ -248,7 +248,7 @@ def record_amplitudes(
 
 
 def _determined(fit: FitResult) -> bool:
-    """Return True if the records determine the spring and its effects; of other parameters no loop depends."""
+    """Return True if the records determine the spring and its effects; loops do not depend on other parameters."""
     structure = fit.structure
     own = {s.name for s in structure.rig.motion.stiffness.free_symbols}
     own |= {
@@ -262,15 +262,15 @@ def _pairs(structure: Structure) -> list[tuple[Effect, SumAndDifference]]:
 
 
 def saturation_level(effect: Effect) -> sp.Expr | None:
-    """Return where the state of a spring with memory rests while its deflection grows on and on, in terms of its parameters.
+    """Return the limit of the state of a spring with memory under increasing deflection, in terms of its parameters.
 
-    None for an effect without such a spring, of several states, or whose state has no such level (or several).
+    None for an effect without such a spring, with several states, or whose state has no such limit (or several).
     """
     if effect.spring is None or len(effect.states) != 1 or effect.states[0].limit is not None:
         return None
     (state,) = effect.states
     level = sp.Symbol("level", positive=True)
-    # Solved for positive parameters, of whose roots sympy knows the sign; the formula holds for others as far as it is real.
+    # Solved for positive parameters, so that sympy knows the signs of roots; the formula holds for others where it is real.
     own = {sp.Symbol(p.name, real=True): sp.Symbol(p.name, positive=True) for p in effect.parameters}
     loading = state.rate.xreplace({canonical.deflection_rate: sp.Integer(1), state.symbol: level, **own})
     roots = sp.solve(loading, level) if loading.has(level) else []
@@ -279,7 +279,7 @@ def saturation_level(effect: Effect) -> sp.Expr | None:
 
 
 def _saturation(level: sp.Expr, own: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the level for values of the parameters, infinite where there is none."""
+    """Return the limit for values of the parameters, infinite if there is none."""
     reached = sp.lambdify([sp.Symbol(name, real=True) for name in own], level, "numpy")
     with np.errstate(all="ignore"):
         found = np.asarray(reached(*own.values()), dtype=np.float64)
@@ -307,7 +307,7 @@ def _derived(name: str, unit: str, samples: NDArray[np.float64], determined: boo
     usable = samples[1:][~np.isnan(samples[1:])]
     if usable.size == 0:
         return Derived(name, unit, float(samples[0]), -np.inf, np.inf)
-    # Ordered draws, not interpolated ones: between a number and infinity there is nothing.
+    # Quantiles without interpolation, because draws may be infinite.
     low, high = np.quantile(usable, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0], method="inverted_cdf")
     return Derived(name, unit, float(samples[0]), float(low), float(high))
 

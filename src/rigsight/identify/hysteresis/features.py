@@ -18,11 +18,11 @@ class Peak:
     Attributes
     ----------
     omega
-        Where it is [rad/s].
+        Its angular frequency [rad/s].
     magnitude
-        How high, in the unit of the response.
+        Its magnitude, in the unit of the response.
     is_resonance
-        False if the highest point is the first or last of the band: then the response has no peak in it.
+        False if the highest point is the first or last of the band, so that the response has no peak in it.
     """
 
     omega: float
@@ -31,7 +31,7 @@ class Peak:
 
 
 def peak(response: FrequencyResponse) -> Peak:
-    """Return the highest point, by a parabola through the logarithms of three points where it lies inside the band."""
+    """Return the highest point, by a parabola through the logarithms of three points if it is inside the band."""
     level = np.log(np.maximum(response.magnitude, 1e-300))
     top = int(np.argmax(level))
     if not 0 < top < level.size - 1:
@@ -47,21 +47,21 @@ def peak(response: FrequencyResponse) -> Peak:
 
 
 def break_frequency(response: FrequencyResponse) -> float:
-    """Return the break frequency [rad/s]: where the phase first passes -90 degrees.
+    """Return the break frequency [rad/s], at which the phase first passes -90 degrees.
 
     The thesis defines omega_b by the PT2 (2.9), whose phase is "reaching -90 degrees at the break frequency" (section 2.2.2).
-    Chapter 6 speaks of the break frequency of hysteretic simulations without saying how it is read off a curve that is no
-    PT2; this reading reproduces its words: against the PT2 of Table 4.1 at 1 A, set B has the right break frequency (0.4 %)
-    and half the peak, set P breaks too low (10 %). Read off the magnitude, set B would break 4 % too high.
+    Chapter 6 gives the break frequency of hysteretic simulations without stating how it is determined for a curve that is not a
+    PT2. This definition reproduces its statements: compared with the PT2 of Table 4.1 at 1 A, set B has the right break frequency
+    (0.4 %) and half the peak, and that of set P is too low (10 %). From the magnitude, that of set B would be 4 % too high.
 
     Raises
     ------
     InputError
-        If it does not within the band.
+        If the phase does not pass -90 degrees within the band.
 
     See Also
     --------
-    fitted_break_frequency : reads the magnitude; to be used where delays or lags turn the phase.
+    fitted_break_frequency : uses the magnitude; for responses whose phase is changed by delays or lags.
     """
     phase = response.phase
     phase = phase - 2.0 * np.pi * np.round(phase[0] / (2.0 * np.pi))
@@ -79,9 +79,9 @@ def break_frequency(response: FrequencyResponse) -> float:
 
 
 def fitted_break_frequency(response: FrequencyResponse) -> float:
-    """Return omega_b [rad/s] of the PT2 that follows the magnitude best, with equal weights in dB as the eye has them.
+    """Return omega_b [rad/s] of the PT2 that fits the magnitude best, with equal weights in dB, as in a fit by eye.
 
-    That is the manual fit of section 4.4 of the thesis, which leaves the phase unread; delays and lags do not move it.
+    This is the manual fit of section 4.4 of the thesis, which does not use the phase; delays and lags do not affect it.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from rigsight.units import characteristic_value
 
 
 def free_parameters(structure: Structure, outputs: Collection[str]) -> tuple[str, ...]:
-    """Return what records of these outputs determine: no constants, nothing of an output that was not measured.
+    """Return the parameters that records of these outputs determine, without constants and those of unmeasured outputs.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def checked_free(structure: Structure, free: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        If one is unknown or there is none.
+        If one is unknown or the list is empty.
     """
     for name in free:
         check_option("A parameter to calibrate", name, structure.names)
@@ -66,14 +66,14 @@ def checked_free(structure: Structure, free: Sequence[str]) -> tuple[str, ...]:
 
 
 def special_structure(structure: Structure, free: Sequence[str]) -> tuple[Structure, tuple[str, ...]]:
-    """Write the special cases of the effects (an exponent of 1) into the equations: simulations are ten times faster then.
+    """Write the special values of the effects (an exponent of 1) into the equations, which makes simulations ten times faster.
 
     Returns
     -------
     structure
-        The same object if there is nothing to write.
+        The same object if there are none.
     free
-        What is left to move.
+        The remaining free parameters.
     """
     special = {
         structure.parameter_name(effect, name): value
@@ -88,14 +88,14 @@ def special_structure(structure: Structure, free: Sequence[str]) -> tuple[Struct
 
 
 def start_values(structure: Structure, start: Mapping[str, float]) -> dict[str, float]:
-    """Return a value for every parameter: the given one, else the default, else the middle of what its effect suggests.
+    """Return a value for every parameter: the given one, else the first start value of its effect, else the default.
 
-    Values of effects are placeholders where a search over the whole range follows.
+    Values of effects are placeholders if a search over the whole range follows.
 
     Raises
     ------
     InputError
-        Listing parameters of the rig that have neither.
+        If a parameter has none of these; the message lists all such parameters.
     """
     of_rig = {p.name for p in (*structure.rig.constants, *structure.rig.parameters)}
     values = {p.name: p.default for p in structure.parameters if p.default is not None}
@@ -110,7 +110,7 @@ def start_values(structure: Structure, start: Mapping[str, float]) -> dict[str, 
 def declared_starts(
     structure: Structure, begin: Mapping[str, float], scales: Mapping[str, float]
 ) -> list[dict[str, float]]:
-    """Return the sets from which the effects ask to be fitted, one effect at a time, where they depend on the rig alone.
+    """Return the start values that the effects declare, one effect at a time, for starts that depend on the rig alone.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def declared_starts(
 
 
 def neighbors(structure: Structure, values: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return the sets from which the effects ask to be fitted again, because a fit may have stopped beside the best one.
+    """Return the start values that the effects declare for another fit, because a fit may have ended in a nearby local minimum.
 
     Parameters
     ----------
@@ -167,10 +167,10 @@ def _moved(
     values: Mapping[str, float],
     sizes: Mapping[sp.Symbol, float],
 ) -> dict[str, float]:
-    """Return the parameters that a start of an effect moves, by their names in the structure."""
+    """Return the parameters that a declared start of an effect changes, by their names in the structure."""
     motion = structure.rig.motion
     known = dict(sizes)
-    # At a rig whose stiffness is made of several parameters, the effect's own are moved alone.
+    # If the stiffness of the rig depends on several parameters, only the effect's own ones are changed.
     for symbol, part in ((canonical.k, motion.stiffness), (canonical.m, motion.inertia)):
         if sizes and part is not None:
             known[symbol] = evaluated(part, values)

@@ -15,12 +15,12 @@ from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
 
 _APART = 0.1
-"""Distance in the unit cube from which two ends of a search count as different places."""
+"""Distance in the unit cube above which two ends of a search count as different."""
 
 _EVENLY = 0.1
 """Characteristic units up to which a range is spaced evenly."""
 _UNUSABLE = 1e100
-"""Cost of a set that cannot be simulated; its square is still a number."""
+"""Cost of a set that cannot be simulated; its square is still finite."""
 
 Cost = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -43,7 +43,7 @@ class SearchBox:
 
     @classmethod
     def around(cls, coordinates: Coordinates, center: NDArray[np.float64], spread: float) -> SearchBox:
-        """Take the declared range where a parameter has one; the others lie around `center`.
+        """Take the declared range of a parameter if it has one, else a range around `center`.
 
         Parameters
         ----------
@@ -52,7 +52,7 @@ class SearchBox:
         center
             Coordinates of a start, shape (n_free,).
         spread
-            Factor to either side of a positive parameter without a declared range; others move by as many of their size.
+            Factor to either side for a positive parameter without a declared range; for others, multiple of their size.
         """
         structure = coordinates.structure
         of_rig = {p.name for p in structure.rig.parameters}
@@ -64,14 +64,14 @@ class SearchBox:
             lower[i], upper[i] = max(lower[i], center[i] - reach), min(upper[i], center[i] + reach)
         split = coordinates.split
         if split is not None:
-            # Both are parts of one stiffness, which is what the start knows.
+            # Both are parts of one stiffness, and only the total is known from the start.
             whole = np.exp(center[split.stiffness]) + center[split.share]
             lower[split.stiffness], upper[split.stiffness] = np.log(whole / spread), np.log(whole * spread)
             lower[split.share], upper[split.share] = 0.0, whole * spread
         return cls(lower, upper)
 
     def coordinates(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the search coordinates of places in the unit cube, both of shape (..., n_free)."""
+        """Return the search coordinates of points in the unit cube, both of shape (..., n_free)."""
         low, high = np.arcsinh(self.lower / _EVENLY), np.arcsinh(self.upper / _EVENLY)
         return np.asarray(_EVENLY * np.sinh(low + places * (high - low)))
 
@@ -87,7 +87,7 @@ class Found:
     costs
         Shape (n_ends,).
     n_evaluations
-        Parameter sets simulated.
+        Number of simulated parameter sets.
     """
 
     coordinates: NDArray[np.float64]
@@ -121,22 +121,22 @@ def search(
     n_ends: int = 8,
     progress: Callable[[int], None] | None = None,
 ) -> Found:
-    """Look for the lowest cost over the whole box.
+    """Search the lowest cost over the whole box.
 
     Parameters
     ----------
     cost
-        Cost of coordinates of shape (n_sets, n_free), shape (n_sets,); not finite where a set cannot be simulated.
+        Cost of coordinates of shape (n_sets, n_free), shape (n_sets,); not finite for a set that cannot be simulated.
     box
         Range to search.
     rng
         Random numbers.
     n_generations
-        Most generations.
+        Largest number of generations.
     n_sets
         Sets per generation; the first ones are Sobol points.
     n_ends
-        Most different ends to return.
+        Largest number of different ends to return.
     progress
         Called with the number of finished generations.
     """
@@ -177,7 +177,7 @@ def search(
         vectorized=True,
         callback=count_generation,
     )
-    # The population ends in one basin, which the costs of a coarse simulation may mistake; others were seen on the way.
+    # The population ends in one basin, which may be wrong because the simulation is coarse; other basins were visited before.
     places, costs = np.concatenate(seen), np.concatenate(paid)
     kept = _different(places, costs, n_ends)
     return Found(box.coordinates(places[kept]), costs[kept], costs.size)
@@ -189,7 +189,7 @@ def _sobol(n_sets: int, n_free: int, rng: np.random.Generator) -> NDArray[np.flo
 
 
 def _different(places: NDArray[np.float64], costs: NDArray[np.float64], most: int) -> list[int]:
-    """Return the best places that lie apart from each other, best first."""
+    """Return the indices of the best points that differ from each other, best first."""
     kept: list[int] = []
     for i in np.argsort(costs):
         if all(np.max(np.abs(places[i] - places[j])) > _APART for j in kept):

@@ -13,15 +13,15 @@ from rigsight.frequency import FrequencyResponse, hold_response
 from rigsight.records.record import Record
 
 _NEAREST = 0.75
-"""Least width of the averaging in distances of two spectral lines."""
+"""Smallest width of the averaging, in distances between spectral lines."""
 
 
 @dataclass(frozen=True, eq=False)
 class SpectralRatio:
     """Cross spectrum over the source's spectrum, both averaged over neighboring lines with a Gaussian weight.
 
-    The width grows with the frequency, as suits a logarithmic sweep. Because the source is known before, all of it is one
-    matrix that is multiplied with the response: thousands of simulations cost nothing beside their integration.
+    The width grows with the frequency, as suits a logarithmic sweep. Because the source is known in advance, the estimator is one
+    matrix that is multiplied with the response: for thousands of simulations its cost is negligible.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class SpectralRatio:
     omega
         Frequencies [rad/s], increasing, shape (n_frequencies,).
     width
-        Standard deviation of the weight over the frequency.
+        Standard deviation of the weight, relative to the frequency.
     """
 
     source: str
@@ -44,9 +44,9 @@ class SpectralRatio:
         Raises
         ------
         InputError
-            If a frequency lies beyond the Nyquist frequency or the source has nothing there.
+            If a frequency lies beyond the Nyquist frequency or the source has no content there.
         """
-        # One record alone: the matrix of `rows` would take as long as a hundred of them.
+        # For a single record, the matrix of `rows` would take a hundred times as long.
         answer = np.fft.rfft(record[self.response])
         sums = [np.sum(weights * answer[near]) for near, weights in self._weights(record)]
         values = np.array(sums) / hold_response(self.omega, record.dt, record.hold)
@@ -62,7 +62,7 @@ class SpectralRatio:
         )
 
     def of_outputs(self, record: Record, outputs: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the responses, shape (n_frequencies, n_sets), of outputs of shape (n_samples, n_sets)."""
+        """Return the responses, shape (n_frequencies, n_sets), for outputs of shape (n_samples, n_sets)."""
         real, imaginary = np.split(self.rows(record) @ outputs, 2)
         return np.asarray(real + 1j * imaginary)
 
@@ -87,7 +87,7 @@ class SpectralRatio:
         spectrum = np.fft.rfft(record[self.source])
         for omega in self.omega:
             spread = max(self.width * omega, _NEAREST * lines[1])
-            # The line at zero holds the means, which are no response to a sweep.
+            # The line at zero contains the means, which are not a response to a sweep.
             near = np.flatnonzero((np.abs(lines - omega) < 2.0 * spread) & (lines > 0.0))
             weight = np.exp(-0.5 * ((lines[near] - omega) / spread) ** 2)
             power = float(np.sum(weight * np.abs(spectrum[near]) ** 2))

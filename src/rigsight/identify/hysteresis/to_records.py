@@ -34,7 +34,7 @@ _ROUGH_EVALUATIONS = 40
 _ROUGH_TOLERANCE = 1e-3
 _ROUGH_ACCURACY = 1e-3
 _HOPS = 4
-"""Fits begun beside the best one: stiff loops make the cost rugged within a few percent of the truth."""
+"""Number of fits started near the best one: with stiff loops the cost has many minima within a few percent of the truth."""
 _HOP = 0.1
 """Relative size of such a step."""
 
@@ -60,21 +60,21 @@ def calibrate_to_records(
     Parameters
     ----------
     structure
-        Rig and effects; a number written into its equations stays.
+        Rig and effects; values written into its equations as numbers are kept.
     records
         Records to fit.
     constants
         The rig's constants by name.
     rng
-        Random numbers of search and intervals.
+        Random numbers for search and intervals.
     start
-        Values of parameters that are known or of a simpler fit; the rig's are found from the spectra where missing. Effects
+        Start values of parameters, known or from a simpler fit; missing ones of the rig are estimated from the spectra. Effects
         need none: their whole declared range is searched.
     free
-        Parameters to move; default is all that the records can show.
+        Parameters to fit; default is all that the records can determine.
     output_noise
-        Standard deviation of the residuals of each output; default is 1 % of its size. Standard errors do not depend on it
-        where one output is fitted, because they follow from the residuals.
+        Standard deviation of the residuals of each output; default is 1 % of its size. If one output is fitted, standard errors
+        do not depend on it, because they follow from the residuals.
     spread
         Factor around the start in which the rig's own parameters are searched.
     n_generations, n_sets, n_ends
@@ -82,7 +82,7 @@ def calibrate_to_records(
     n_jobs
         Records simulated at the same time; the result does not depend on it.
     progress
-        Called with what has just been finished.
+        Called with a short text after each step.
 
     Raises
     ------
@@ -91,9 +91,9 @@ def calibrate_to_records(
 
     Notes
     -----
-    Stiff loops make the cost rugged, and a search can end in a wrong basin: on simulated records of one stiff set, 60
-    generations of 64 sets did so in one draw of eight, the default in none of fifteen draws of four sets. Hold the residuals
-    against the noise before the numbers are believed.
+    With stiff loops the cost has many local minima, and a search can end in a wrong basin: on simulated records of one stiff set,
+    60 generations of 64 sets did so in one of eight draws, the default in none of fifteen draws of four sets. Compare the
+    residuals with the noise before relying on the parameters.
     """
     if not records:
         raise InputError("A calibration needs at least one record, got none.")
@@ -160,7 +160,7 @@ def _refined(
     rng: np.random.Generator,
     threads: IdleThreads,
 ) -> FitResult:
-    """Fit to full precision: first with the special values, then released from them, then from beyond if that paid."""
+    """Fit to full precision: with the special values, then with these released, then from another start if that helped."""
     careful = GreyBoxFit(simple, records, scales, noise, threads=threads)
     settled = careful.fit(rough.values, rough.free, rough.initial_states)
     coordinates = Coordinates.of(simple, rough.free, rough.values, scales)
@@ -194,7 +194,7 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: NDArray[np.float6
             look.structure, data.held, data.parameters(p), states, data.record.n_samples, _SUBSTEPS
         )
         with np.errstate(invalid="ignore", over="ignore"):
-            # An offset is the refinement's business, not the search's.
+            # Offsets are left to the refinement.
             residual = (outputs[:, 0] - data.measured[:, :1]) * data.weights[0]
             return np.asarray(np.sum((residual - np.mean(residual, axis=0)) ** 2, axis=0))
 
@@ -202,7 +202,7 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: NDArray[np.float6
 
 
 def _shifts(structure: Structure) -> set[str]:
-    """Return parameters that move means or outputs behind the first alone: no matter for a search."""
+    """Return parameters that affect only means, or outputs other than the first; the search does not need them."""
     motion = structure.rig.motion
     own = {p.name for p in structure.rig.parameters}
     moved = {

@@ -1,8 +1,8 @@
-"""Parameters of a rig of any shape straight from its records, as start values of a grey-box fit.
+"""Parameters of any rig directly from its records, as start values of a grey-box fit.
 
-If sensors show all states, the error of the equations of motion is minimized (`weak_equations`); in any case also that of the
-linearization relative to the spectra (`linearized_responses`). Both search over decades and need no simulation. The best few
-minima are fitted roughly by simulation, and the one with the lowest error is the start.
+If sensors show all states, the error of the equations of motion is minimized (`weak_equations`); in any case also the error of
+the linearization relative to the spectra (`linearized_responses`). Both searches cover decades and need no simulation. The best
+few minima are fitted roughly by simulation, and the one with the lowest error is the start.
 """
 
 from __future__ import annotations
@@ -34,28 +34,28 @@ from rigsight.simulate.prescribed_motion import smooth_motion
 Floats = NDArray[np.float64]
 
 _SEED = 0
-"""The same records give the same start."""
+"""Fixed, so that the same records give the same start."""
 _LIKELY = 2
 """Minima of each search that are fitted by simulation."""
 _ROUGH_EVALUATIONS = 15
 _ROUGH_TOLERANCE = 1e-3
 _PIECES = (32, 16, 8, 4, 2)
-"""Into how many pieces each record is cut, in turn."""
+"""Numbers of pieces into which each record is cut, in turn."""
 _TOLD = 1.0
-"""Error that changing a parameter to its double must make, of size one for noise, for the records to tell it; else it is held."""
+"""Error in units of the noise due to doubling a parameter, above which the records determine the parameter; else it is held."""
 _LONG_PIECES = 8
-"""Pieces of a record that are long: free initial states make up for many a wrong number in shorter ones."""
+"""Number of pieces of a record up to which they count as long; in shorter ones, free initial states mask wrong parameters."""
 _GROWN = 2.0
-"""Ratio of the residuals of the whole and of long pieces up to which nothing is gained by a search elsewhere."""
+"""Ratio of the residuals of the whole and of long pieces up to which another minimum would not be better."""
 _MOST_PIECES = 16
 _MOST_SAMPLES = 10000
 """Samples of all records together that are simulated for a start."""
 _EXPLAINED = 2.0
-"""Residual over what is rough in the sensors at which nothing further is tried: a spline leaves half of the noise at least."""
+"""Residual over the rough part of the readings at which the search ends; a spline leaves at least half of the noise."""
 _HIGHEST = 0.9
-"""Share of the spectrum behind which it is taken for noise."""
+"""Share of the spectrum above which it counts as noise."""
 _LEAST_NOISE = 1e-4
-"""Noise of a sensor that shows none, relative to its size: a fit that comes so near has found its place."""
+"""Noise assumed for a sensor without visible noise, relative to its size: a fit with such a small residual has converged."""
 
 
 def any_rig_start(
@@ -72,12 +72,12 @@ def any_rig_start(
     constants
         The rig's constants by name.
     known
-        Parameters that keep their value.
+        Parameters that are held at their value.
 
     Raises
     ------
     InputError
-        If no record holds a sensor of the rig that moves.
+        If no record contains a sensor of the rig, or none that moves.
     """
     _check_moves(rig, records)
     sought = [p for p in rig.parameters if p.name not in known]
@@ -85,7 +85,7 @@ def any_rig_start(
         return dict(known)
     defaults = {p.name: p.default for p in sought if p.default is not None}
     if rig.mechanism.bodies_are_nonlinear and len(defaults) == len(sought):
-        # Another program evaluates these equations, so their error is as costly as simulations.
+        # Another simulator evaluates these equations, so their error is as costly as simulations.
         return {**known, **defaults}
     values = {**constants, **known}
     rough = _Rough(rig, records, values, [p.name for p in sought])
@@ -94,12 +94,12 @@ def any_rig_start(
         found = rough.whole(start)
         if is_close and np.isfinite(found.cost) and not rough.explains(found):
             if is_weak and rough.holds_at_any_length(found):
-                # Equations that agree with all states of the records, and errors that do not grow: the rig lacks something.
+                # The equations agree with all states of the records and errors do not grow: an effect is missing in the rig.
                 best = found
                 break
             pieces, whole = rough.lengthening(start)
             if pieces is not None and not rough.explains(whole):
-                # The motion is chaotic: no search finds values with which a simulation of the whole record is better.
+                # The motion is chaotic: there are no values with which a simulation of the whole record is better.
                 best = pieces
                 break
             found = min(found, whole, key=lambda fit: fit.cost)
@@ -113,9 +113,10 @@ def any_rig_start(
 def _minima(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float], sought: Sequence[Parameter]
 ) -> Iterator[tuple[bool, bool, dict[str, float]]]:
-    """Yield values from which simulations may start: whether the equations' own error led there, whether to look twice.
+    """Yield local minima as start values, each with two flags: from the error of the equations, and to be examined further.
 
-    That is where the lowest of an error is. They come from few searches first, from many if nothing explains the records.
+    The flag for further examination is set for the lowest minimum of the searches with few starts. They come first; searches with
+    many starts follow if none of their minima explains the records.
     """
     equations, names = equations_of(rig), [p.name for p in sought]
     rng = np.random.default_rng(_SEED)
@@ -146,7 +147,7 @@ def _minima(
 def _masses_positive(
     equations: RigEquations, sought: Sequence[Parameter], sizes: Mapping[str, float]
 ) -> list[Parameter]:
-    """Return the unknown parameters, those without which something has no mass above zero: a file need not bound them."""
+    """Return the unknown parameters, with zero as the lower bound of those without which the mass matrix is singular."""
     still = np.zeros((equations.n_states, 1)), np.zeros((3 * len(equations.rig.inputs), 1))
 
     def is_massless(without: str) -> bool:
@@ -158,7 +159,7 @@ def _masses_positive(
 
 
 class _Rough:
-    """Rough fits by simulation from one start after the other."""
+    """Rough fits by simulation from successive start values."""
 
     def __init__(
         self, rig: Rig, records: Sequence[Record], values: Mapping[str, float], free: Sequence[str]
@@ -169,15 +170,15 @@ class _Rough:
         self._noise = {signal.name: _noise(signal.name, records) for signal in rig.outputs}
 
     def explains(self, fit: FitResult) -> bool:
-        """Return True if a fit leaves not much more than noise."""
+        """Return True if the residual of a fit is not much larger than the noise."""
         return fit.cost <= _EXPLAINED**2 * fit.n_samples
 
     def whole(self, start: Mapping[str, float]) -> FitResult:
-        """Fit the records as they are."""
+        """Fit the whole records."""
         return self._fitted(1, start, scales_at_places(self._rig, self._records, start))
 
     def holds_at_any_length(self, whole: FitResult) -> bool:
-        """Return True if a fit of the whole is not much worse than one of pieces, each with a state of its own."""
+        """Return True if a fit of whole records is not much worse than one of pieces, each with its own initial state."""
         if not np.isfinite(whole.cost):
             return False
         scales = scales_at_places(self._rig, self._records, whole.values)
@@ -185,13 +186,13 @@ class _Rough:
         return whole.cost / whole.n_samples <= _GROWN**2 * pieces.cost / max(1, pieces.n_samples)
 
     def lengthening(self, start: Mapping[str, float]) -> tuple[FitResult | None, FitResult]:
-        """Fit pieces of the records, of double length each time, then the whole.
+        """Fit pieces of the records, of double length each time, then the whole records.
 
-        Over a short piece no motion is far from the one that was measured, however unstable or chaotic it is.
+        Over a short piece, even an unstable or chaotic motion stays close to the measured one.
 
         Returns
         -------
-        The fit of the longest pieces that it explains, None if they are short, and the one of the whole.
+        The fit of the longest pieces whose residual is explained by noise, None if only short ones are, and that of the whole.
         """
         explained: FitResult | None = None
         values, scales = start, scales_at_places(self._rig, self._records, start)
@@ -207,7 +208,7 @@ class _Rough:
         for record in self._records:
             edges = np.unique(np.linspace(0, record.n_samples, count + 1).astype(int))
             pieces += [record.slice(int(a), int(b)) for a, b in pairwise(edges)]
-        # Each has its own initial state: of many, some are sufficient.
+        # Each piece has its own initial state, so only some of many are used.
         if count > 1:
             pieces = pieces[:: max(1, -(-len(pieces) // _MOST_PIECES))]
         problem = GreyBoxFit(compose(self._rig), pieces, scales, self._noise)
@@ -216,7 +217,7 @@ class _Rough:
 
 
 def _told(information: Floats, free: Sequence[str]) -> list[str]:
-    """Return as many parameters as the records determine combinations; they are determined if the others are held."""
+    """Return as many parameters as combinations are determined by the records; they are determined if the others are held."""
     if not np.all(np.isfinite(information)):
         return list(free)
     values, vectors = np.linalg.eigh(information)
@@ -227,9 +228,9 @@ def _told(information: Floats, free: Sequence[str]) -> list[str]:
 
 
 def _noise(name: str, records: Sequence[Record]) -> float:
-    """Return the standard deviation of what is rough in a sensor: what a spline leaves, or the end of its spectrum.
+    """Return an estimate of a sensor's noise: from the residual of a spline, or from the end of its spectrum.
 
-    The larger of the two: fast motion leaves the spline little to smooth.
+    The larger of the two is used, because the spline smooths little if the motion is fast.
     """
     held = [record for record in records if name in record]
     if not held:
@@ -242,10 +243,10 @@ def _noise(name: str, records: Sequence[Record]) -> float:
 
 
 def _end_of_spectrum(signal: Floats) -> float:
-    """Return the standard deviation of white noise whose spectrum is that at the signal's highest frequencies."""
+    """Return the standard deviation of white noise with the spectrum of the signal's highest frequencies."""
     window = np.hanning(signal.size)
     power = np.abs(np.fft.rfft((signal - np.mean(signal)) * window)) ** 2
-    # The median of a line's power is log 2 of its mean.
+    # The median of a line's power is log 2 times its mean.
     highest = np.median(power[int(_HIGHEST * power.size) :]) / np.log(2.0)
     return float(np.sqrt(highest / max(float(window @ window), 1e-300)))
 

@@ -25,7 +25,7 @@ from rigsight.units import characteristic_value
 
 _GRID = 12
 _GRID_OF_TWO = 6
-"""Points of each of two inner parameters: 36 in all, three times as many as of one."""
+"""Grid points of each of two nonlinear parameters: 36 in all, three times as many as for one."""
 _SIGNALS = (canonical.x, canonical.v, canonical.u, canonical.position, canonical.load)
 _LOWEST_SHARE = 0.01
 
@@ -48,7 +48,7 @@ class EffectRegression:
     Parameters
     ----------
     rig
-        A rig whose input moves a mass.
+        A driven rig.
     records
         Estimation records.
     values
@@ -77,7 +77,7 @@ class EffectRegression:
             x, v = smooth_motion(record[response], record.dt)
             spectra = spectra_of(record, source, response)
             if spectra.omega.size == 0:
-                continue  # a stretch in which the input rests
+                continue  # the input is at rest in this stretch
             load = self._gain * record[source] + stiffness * (x - rest)
             self._motions.append(_Motion(spectra, x - rest, v, record[source], x, load))
         inertia, damping = self._number(rig.motion.inertia), self._number(rig.motion.damping)
@@ -89,12 +89,12 @@ class EffectRegression:
         return evaluated(expression, self._values)
 
     def start(self, effect: Effect) -> dict[str, float] | None:
-        """Return values of rig and effect parameters to start from, None where the effect has no signal of its own."""
+        """Return start values of rig and effect parameters, None if the effect is not a function of measured signals."""
         if effect.states or effect.spring is not None or not self._motions:
             return None
         if effect.torque is None and effect.deflection is None and effect.drive is None:
             return None
-        # A wave number has as many optima as there are waves in the motion; its start comes from elsewhere.
+        # The cost has as many minima over a wave number as there are waves in the motion; its start is found in another way.
         if (
             effect.wave_number is not None
             or effect.reads(canonical.t)

@@ -1,4 +1,4 @@
-"""Least squares on an equation of motion in the frequency domain, weighted so that its error becomes the output's.
+"""Least squares on an equation of motion in the frequency domain, weighted so that its error approaches the output error.
 
 The equation is linear in its coefficients, so it has no local minima and is suitable for start values. A polynomial per record
 accounts for the transients at its ends.
@@ -27,21 +27,23 @@ _USABLE_BAND = 0.8
 _MIN_LINES = 20
 
 Term = tuple[int, NDArray[np.complex128]]
-"""Power of j omega and the spectrum it multiplies."""
+"""Power of j omega and the spectrum that it multiplies."""
 
 
 @dataclass(frozen=True)
 class Spectra:
-    """Spectra of one record on the lines that say something.
+    """Spectra of one record on its informative lines, shape (n_lines,) each.
 
     Attributes
     ----------
     omega
-        Shape (n_lines,) [rad/s].
+        Angular frequencies [rad/s].
     lines
         Indices of the lines in the full spectrum.
+    hold
+        Frequency response of the hold.
     drive
-        Input, with what the hold does to it.
+        Input, multiplied by the response of the hold.
     response
         Output.
     """
@@ -60,14 +62,14 @@ class Spectra:
 
 @dataclass(frozen=True)
 class Solution:
-    """Coefficients of the terms and the weighted error that they leave."""
+    """Coefficients of the terms, and the remaining weighted error."""
 
     coefficients: NDArray[np.float64]
     error: float
 
 
 def spectra_of(record: Record, source: str, response: str) -> Spectra:
-    """Return the spectra of a record on the lines on which input and response stand out."""
+    """Return the spectra of a record on the lines on which input and response exceed the noise."""
     u = record[source] - np.mean(record[source])
     x = record[response] - np.mean(record[response])
     omega = 2.0 * np.pi * np.fft.rfftfreq(u.size, record.dt)[1:]
@@ -101,14 +103,14 @@ def solve_in_frequency(
     Parameters
     ----------
     blocks
-        Per record.
+        Spectra of each record.
     terms
-        Per record the terms, the same number in each.
+        Terms of each record, the same number for all.
     targets
-        Per record the right-hand side on its lines.
+        Right-hand side of each record on its lines.
     denominators
-        Per record what the equation error is divided by, shape (n_lines,); by default the polynomial of the solution's own
-        terms whose spectrum is the response, found by iteration.
+        Divisors of the equation error of each record, shape (n_lines,); by default the polynomial of the solution's terms whose
+        spectrum is the response, found by iteration.
     """
     top = max(float(np.max(block.omega)) for block in blocks)
     n_terms, n_transient = len(terms[0]), _TRANSIENT_ORDER + 1

@@ -1,8 +1,8 @@
-"""Linear parameters straight from the spectra of the records, as start values of a grey-box fit.
+"""Linear parameters directly from the spectra of the records, as start values of a grey-box fit.
 
-Of a rig of one motion that is driven; others start as `any_rig_start` says. Iterated linear least squares on the equation of
-motion in the frequency domain, weighted by the inverse of the current denominator so that the equation error approaches the
-output error; a polynomial per record takes up the transients. It has no local minimum, and needs no simulation.
+For a driven rig with one motion; for other rigs see `any_rig_start`. The method is iterated linear least squares on the equation
+of motion in the frequency domain, weighted by the inverse of the current denominator so that the equation error approaches the
+output error; a polynomial per record represents the transients. It has no local minima and needs no simulation.
 
 References
 ----------
@@ -30,7 +30,7 @@ from rigsight.simulate.prescribed_motion import smooth_motion
 _UNKNOWN = 1.0
 """Value of a parameter that the records do not determine."""
 _STILL = 1e-12
-"""Range of a signal relative to its size that is rounding."""
+"""Range of a signal relative to its size that counts as rounding error."""
 
 
 def linear_start(
@@ -47,7 +47,7 @@ def linear_start(
     constants
         The rig's constants by name.
     known
-        Parameters that keep their value.
+        Parameters that are held at their value.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def linear_start(
 
 
 def _one_offset(rig: Rig) -> dict[str, float]:
-    """Return no constant force where a rest position says the same."""
+    """Return zero for a constant force that is equivalent to a free rest position."""
     return dict.fromkeys(map(str, rig.motion.bias.free_symbols), 0.0) if rig.motion.rest.free_symbols else {}
 
 
@@ -123,7 +123,7 @@ def _offsets(follower: Follower) -> set[str]:
 
 
 def _solved(expression: sp.Expr, value: float, known: Mapping[str, float]) -> dict[str, float]:
-    """Return the one number that an expression lacks, so that it has a value; several are taken as equal."""
+    """Return the unknown parameter with which an expression has a given value; several unknown ones are assumed to be equal."""
     lacking = sorted(
         (symbol for symbol in expression.free_symbols if symbol.name not in known),
         key=lambda symbol: str(symbol.name),
@@ -170,7 +170,7 @@ def _check_moves(records: Sequence[Record], name: str) -> None:
 def second_order(
     records: Sequence[Record], source: str, response: str, gain: float, has_stiffness: bool = True
 ) -> tuple[float, float, float]:
-    """Return inertia, damping and stiffness of ``m x'' + d x' + k x = gain u`` that fit best.
+    """Return the best-fitting inertia, damping and stiffness of ``m x'' + d x' + k x = gain u``.
 
     Raises
     ------
@@ -188,8 +188,8 @@ def second_order(
 
 
 def first_order(records: Sequence[Record], source: str, response: str) -> tuple[float, float]:
-    """Return slope and rate of ``y' = slope x - rate y`` that fit best; x is measured too."""
-    # The hold tells of the rig's input; a measured output that drives a later stage is smooth between its samples.
+    """Return the best-fitting slope and rate of ``y' = slope x - rate y`` with a measured x."""
+    # The hold is that of the rig's input; a measured output that drives a later stage has no content above Nyquist.
     smooth = [replace(record, hold="band_limited") for record in records]
     tau, unity = _equation_error(smooth, source, response, (1, 0), 1.0)
     slope, rate = 1.0 / tau, unity / tau

@@ -1,7 +1,7 @@
 """Error of the linearization of a rig relative to the spectra of its records: frequency responses to all inputs, with transients.
 
-``j omega X = A X + B U + (x(0) - x(T))`` holds for the Fourier integrals over a record whatever its states do at its ends; the
-difference is solved for in each record by linear least squares. This needs no periodicity, no stability and no input: a free
+``j omega X = A X + B U + (x(0) - x(T))`` holds for the Fourier integrals over a record with any states at its ends; the
+difference is estimated for each record by linear least squares. This needs no periodicity, no stability and no input: a free
 decay consists of these end terms alone.
 
 References
@@ -29,15 +29,15 @@ Complexes = NDArray[np.complex128]
 _SIGNIFICANT_POWER = 25.0
 _USABLE_BAND = 0.8
 _MOST_LINES = 200
-"""Lines of all records together, evenly chosen among those that say something."""
+"""Number of lines of all records together, evenly chosen among the informative ones."""
 _RELATIVE_ERROR = 0.05
-"""Relative error of each line that a linearization may have: weak lines then count as much as strong ones, and a resonance that
-is not yet where it belongs does not outweigh all else."""
+"""Relative error of the linearization assumed for each line, so that weak lines count as much as strong ones and a resonance at a
+wrong frequency does not dominate."""
 
 
 @dataclass(frozen=True)
 class _Lines:
-    """Spectra of one record: of inputs (3 n_inputs, n_lines), of the sensors it holds (n_seen, n_lines), and their weights."""
+    """Spectra of one record: of inputs (3 n_inputs, n_lines), of its sensors (n_seen, n_lines), and their weights."""
 
     omega: Floats
     inputs: Complexes
@@ -54,13 +54,13 @@ class LinearizedResponses:
     Parameters
     ----------
     equations
-        The rig's.
+        Equations of the rig.
     records
         Estimation records.
     values
         Value of each known constant and parameter.
     free
-        Names of the parameters that are sought.
+        Names of the unknown parameters.
     middle
         States about which the rig moves in each record, shape (n_states,) each.
     """
@@ -116,7 +116,7 @@ class LinearizedResponses:
         return np.asarray(target - base @ (base.T @ target))
 
     def _matrices(self, z: Floats, u: Floats, p: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return A, B, C and D of the linearization; of the inputs and their derivatives."""
+        """Return A, B, C and D of the linearization, with the inputs and their derivatives as inputs."""
         equations = self._equations
         n, n_states, n_inputs = equations.n_coordinates, equations.n_states, u.size
         n_own, n_sensors = n_states - 2 * n, len(equations.sensor_names)

@@ -1,7 +1,7 @@
 """States of a rig that the sensors of a record measure: coordinates, rates and own states as signals, and their noise.
 
-A coordinate is measured by a sensor that reads it or, up to a constant, its rate. Sensors whose reading is not a sum of these
-with known factors are not used here.
+A coordinate is measured by a sensor that reads it or, up to a constant, its rate. Sensors whose reading is not a sum of such
+quantities with known factors are not used here.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ _RANK = 1e-9
 """Share of the largest singular value below which a combination of states is not shown."""
 
 _HIDDEN, _WAVES = 0.7, 20
-"""Size of a motion that no sensor shows, in terms of one that is shown, and how often it swings where there is none."""
+"""Size of an unmeasured motion relative to a measured one, and its number of periods if none is measured."""
 
 
 @dataclass(frozen=True)
 class MeasuredStates:
-    """States of a rig as sensors show them.
+    """States of a rig measured by its sensors.
 
     Attributes
     ----------
     z
-        Shape (n_states, n_samples), in the order of `RigEquations`; what sensors add to their readings is still in it.
+        Shape (n_states, n_samples), in the order of `RigEquations`; offsets of the readings are not removed.
     by_reading, by_integral
-        What each sensor contributes to each coordinate and own state as it is, and through its integral: shape
-        (n_coordinates + n_own, n_sensors), columns in the order of the rig's sensors.
+        Factors of each sensor's reading, and of its integral, in each coordinate and own state: shape (n_coordinates + n_own,
+        n_sensors), columns in the order of the rig's sensors.
     """
 
     z: Floats
@@ -47,7 +47,7 @@ class MeasuredStates:
 
     @property
     def is_integrated(self) -> bool:
-        """Whether a coordinate is known up to a constant only."""
+        """Whether a coordinate is known only up to a constant."""
         return bool(np.any(self.by_integral))
 
 
@@ -57,9 +57,9 @@ def sensor_factors(equations: RigEquations, free: frozenset[str]) -> dict[str, t
     Parameters
     ----------
     equations
-        The rig's.
+        Equations of the rig.
     free
-        Names of the parameters that are not known.
+        Names of the unknown parameters.
     """
     structure = equations.structure
     unknown = {
@@ -87,11 +87,11 @@ def measured_states(
     Parameters
     ----------
     equations
-        The rig's.
+        Equations of the rig.
     record
-        What was measured.
+        The measured record.
     p
-        Parameters in the order of the structure; unknown ones may be anything.
+        Parameters in the order of the structure; unknown ones may have any value.
     factors
         From `sensor_factors`.
     """
@@ -137,12 +137,12 @@ def measured_states(
 def supposed_states(
     equations: RigEquations, record: Record, p: Floats, factors: Mapping[str, Sequence[sp.Expr]]
 ) -> MeasuredStates:
-    """Return states of about the size that they may have, for want of sensors that show them: what others of their unit do.
+    """Return states of plausible size, if sensors do not show them all: derived from other states with the same unit.
 
     Parameters
     ----------
     equations, record, p, factors
-        As of `measured_states`.
+        As for `measured_states`.
     """
     mechanism, n = equations.rig.mechanism, equations.n_coordinates
     numbers = dict(zip(equations.structure.parameter_symbols, map(float, p), strict=True))
@@ -160,7 +160,7 @@ def supposed_states(
             elif index < n and row[n + index] != 0.0:
                 moved = cumulative_trapezoid(signal / row[n + index], dx=record.dt, initial=0)
                 own.setdefault(index, moved - np.mean(moved))
-    # Not quite the same as another: a joint between the two moves as well.
+    # Not equal to another state, so that a joint between the two moves as well.
     others = {units[index]: _HIDDEN * signal for index, signal in reversed(own.items())}
     wave = np.sin(2.0 * np.pi * _WAVES * np.arange(record.n_samples) / record.n_samples)
     signals = np.array([own.get(i, others.get(unit, wave)) for i, unit in enumerate(units)])

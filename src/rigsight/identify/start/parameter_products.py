@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import sympy as sp
 
 _MOST_FACTORS = 6
-"""Largest power that is multiplied out; energies hold squares, and potentials few more."""
+"""Largest power that is expanded; energies contain squares, and potentials somewhat higher powers."""
 
 
 class MixedError(ValueError):
@@ -21,21 +21,21 @@ class MixedError(ValueError):
 def parameter_products(
     expression: sp.Expr, unknown: frozenset[sp.Symbol], signals: frozenset[sp.Symbol]
 ) -> dict[sp.Expr, sp.Expr]:
-    """Return the products of unknown parameters in an expression, each with what multiplies it.
+    """Return the products of unknown parameters in an expression, each with its factor.
 
     Parameters
     ----------
     expression
-        Of parameters and signals.
+        Expression in parameters and signals.
     unknown
-        The parameters.
+        The unknown parameters.
     signals
-        What changes along a record.
+        Symbols that change along a record.
 
     Raises
     ------
     MixedError
-        If an unknown parameter stands in a function or a power with signals.
+        If an unknown parameter is in a function or a power together with signals.
     """
     found: dict[sp.Expr, dict[sp.Expr, sp.Expr]] = {}
 

@@ -21,23 +21,23 @@ Floats = NDArray[np.float64]
 _Signals = Mapping[str, list[Floats]]
 
 _LEAST_SHARE = 1e-3
-"""Share of what would matter as much as anything else in the equations, below which a value tells no size: it may as well be
-zero, and steps in its unit would be lost in rounding."""
+"""Share of the value at which a parameter is as important as any other term. A parameter below this share gets this size, because
+steps relative to its value would be lost in rounding."""
 _UNKNOWN = 1.0
-"""Size of what is zero everywhere."""
+"""Size of a quantity that is zero everywhere."""
 
 
 def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:
-    """Return the size of each base quantity at each place of a rig, and of each of its numbers.
+    """Return the size of each base quantity at each place of a rig, and of each of its parameters and states.
 
     Parameters
     ----------
     rig, records, values
-        As of `characteristic_scales`.
+        As for `characteristic_scales`.
 
     Returns
     -------
-    As of `characteristic_scales`.
+    As for `characteristic_scales`.
     """
     equations = equations_of(rig)
     signals: dict[str, list[Floats]] = {}
@@ -84,7 +84,7 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
 def _in_record(
     equations: RigEquations, record: Record, values: Mapping[str, float]
 ) -> tuple[dict[str, Floats], Floats]:
-    """Return what moves and pulls at each place in a record, and the size at which each parameter matters."""
+    """Return motions and forces at each place in a record, and the size at which each parameter matters."""
     motion, p = simulated_motion(equations, record, values), equations.parameters(values, record)
     z, u, n = motion.z, motion.u, equations.n_coordinates
     rates = equations.rates(z, u, p)
@@ -103,7 +103,7 @@ def _in_record(
 def _inertial(
     equations: RigEquations, z: Floats, u: Floats, p: Floats, dt: float, found: Mapping[str, Floats]
 ) -> dict[str, Floats]:
-    """Return the force of inertia along each joint, and the one there that would accelerate it as a drive does (``D>J``)."""
+    """Return the inertial force along each joint, and the force there with the same acceleration as each drive (``D>J``)."""
     mechanism, along = equations.rig.mechanism, equations.slopes_along(z, u, p)
     own: dict[str, Floats] = {}
     if equations.n_coordinates == 0 or z.shape[1] < 2:

@@ -15,15 +15,15 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _STRETCHES = 4
-"""Stretches that a record is long; each overlaps the next by half."""
+"""Length of a record in units of a stretch; stretches overlap by half."""
 _SHORTEST = 64
-"""Samples of a stretch at least."""
+"""Smallest number of samples of a stretch."""
 _SIGNIFICANT_POWER = 25.0
-"""Power over that of the noise from which a line of a sensor says something."""
+"""Power over that of the noise above which a line of a sensor is informative."""
 _USABLE_BAND = 0.5
-"""Share of the band below half the sampling rate in which sums stand for integrals."""
+"""Share of the band below half the sampling rate in which sums approximate the integrals."""
 _LEAST_NOISE = 1e-6
-"""Noise of a sensor that shows none, relative to its size."""
+"""Noise assumed for a sensor without visible noise, relative to its size."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,13 @@ class Projection:
     Attributes
     ----------
     omega
-        Shape (n_points,).
+        Angular frequencies [rad/s], shape (n_points,).
     stretch, line
-        Of each point.
+        Index of the stretch and of the line of each point, shape (n_points,).
     starts, length
-        Samples of the stretches.
+        First samples of the stretches, and their number of samples.
     dt
-        Sample time.
+        Sample time [s].
     """
 
     omega: Floats
@@ -54,7 +54,7 @@ class Projection:
         return self._lines(signal, np.sin(np.pi * np.arange(self.length) / self.length) ** 2)
 
     def of_rate(self, signal: Floats) -> Complexes:
-        """Return the integrals of the derivative of a signal, by parts."""
+        """Return the integrals of the derivative of a signal, by integration by parts."""
         phase, rate = 2.0 * np.pi * np.arange(self.length) / self.length, np.pi / (self.length * self.dt)
         return 1j * self.omega * self.of(signal) - self._lines(signal, rate * np.sin(phase))
 
@@ -66,18 +66,18 @@ class Projection:
 def projected(
     equations: RigEquations, record: Record, measured: MeasuredStates, most: int
 ) -> tuple[Projection, Floats]:
-    """Return the projection on lines that say something, and the power of each sensor's noise on a line, shape (n_sensors,).
+    """Return the projection on informative lines, and the power of each sensor's noise on a line, shape (n_sensors,).
 
     Parameters
     ----------
     equations
-        The rig's.
+        Equations of the rig.
     record
-        What was measured.
+        The measured record.
     measured
         Its states.
     most
-        Lines of all stretches together.
+        Largest number of lines of all stretches together.
     """
     n_samples = record.n_samples
     length = min(max(n_samples // _STRETCHES, _SHORTEST), n_samples)
@@ -96,7 +96,7 @@ def projected(
     for source in equations.rig.inputs:
         power = np.abs(every.of(record[source.name] - np.mean(record[source.name]))) ** 2
         says |= power > _SIGNIFICANT_POWER * _LEAST_NOISE * np.max(power)
-    # What is known up to a constant has no line zero, nor one beside it.
+    # The first two lines of a signal that is known only up to a constant are not used; the window spreads the constant over them.
     first = 2 if measured.is_integrated else 0
     kept = np.flatnonzero(says & (line >= first) & (omega < _USABLE_BAND * np.pi / record.dt))
     if kept.size == 0:

@@ -18,12 +18,12 @@ from rigsight.simulate import simulate_outputs
 Floats = NDArray[np.float64]
 
 _ACCURACY = 1e-4
-"""Relative accuracy of the simulation: sizes need less."""
+"""Relative accuracy of the simulation, more than sufficient for sizes."""
 _PIECES = (1, 20)
-"""Into how many pieces a record is cut, each of which starts anew where it was measured, until the motion can be computed and
-stays of the size that was measured: a rig that is unstable, or rolls away, leaves it sooner or later."""
+"""Numbers of pieces into which a record is cut, in turn, until the motion can be simulated and has about the measured size. Each
+piece starts from the measured state, because an unstable or drifting rig leaves the measured motion after some time."""
 _BEYOND = 3.0
-"""How many times as far as measured a motion may go: a guessed rig at its resonance stays below."""
+"""Largest ratio of simulated to measured motion; a rig with estimated parameters at its resonance stays below."""
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,14 @@ class RigMotion:
 
 
 def simulated_motion(equations: RigEquations, record: Record, values: Mapping[str, float]) -> RigMotion:
-    """Return how a rig moves in a record according to its equations.
+    """Return the motion of a rig in a record according to its equations.
 
     Parameters
     ----------
     equations
-        The rig's.
+        Equations of the rig.
     record
-        Its inputs; its first samples tell where the motion begins.
+        Gives the inputs, and the initial state by its first samples.
     values
         Constants and parameters by name.
     """
@@ -58,7 +58,7 @@ def simulated_motion(equations: RigEquations, record: Record, values: Mapping[st
         if _within_reach(equations, record, values, found, u):
             break
     if found is None:
-        # For want of a motion that can be computed.
+        # Used if the motion cannot be simulated.
         found = np.repeat(rig_state(equations, record, values)[:, None], record.n_samples, axis=1)
     return RigMotion(found, u)
 
@@ -74,7 +74,7 @@ def _states(equations: RigEquations, record: Record, values: Mapping[str, float]
 def _within_reach(
     equations: RigEquations, record: Record, values: Mapping[str, float], z: Floats, u: Floats
 ) -> bool:
-    """Return True if no sensor shows much more than it did."""
+    """Return True if no simulated reading has a much larger range than the measured one."""
     shown = equations.readings(z, u, equations.parameters(values, record))
     return all(
         np.ptp(reading) <= _BEYOND * np.ptp(record[name]) or np.ptp(record[name]) == 0.0

@@ -31,9 +31,9 @@ def characteristic_scales(
     Returns
     -------
     ``x`` displacement, ``input``, ``drive`` (force of the drive), ``force`` (of the spring), ``time`` [s] (reciprocal of the
-    angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 where there is none), each as it is and
-    at every joint, drive, sensor and state (``force@shaft``); for a rig of more than one motion also ``size@NAME`` for each of
-    its parameters, coordinates, rates (``size@d(NAME)``) and states.
+    angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 if there is none), each without a place
+    and at every joint, drive, sensor and state (``force@shaft``); for a rig with more than one motion also ``size@NAME`` for each
+    of its parameters, coordinates, rates (``size@d(NAME)``) and states.
     """
     if not rig.has_one_motion:
         return scales_at_places(rig, records, values)

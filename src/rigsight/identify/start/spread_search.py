@@ -14,42 +14,42 @@ from rigsight.parameters import Parameter
 Floats = NDArray[np.float64]
 
 _SPREADS = (1.5, 4.0)
-"""Standard deviations of the starts in natural logarithms, in turn: terms that matter as much as each other differ by less than a
-decade, what hardly matters or moves unseen by two."""
+"""Standard deviations of the starts in natural logarithms, in turn: parameters of comparable terms differ from their expected
+size by less than a decade, those of small terms or unmeasured motions by two."""
 _REACH = 16.0
-"""How far a logarithm may go from where it is expected, seven decades; beyond lies nothing that records tell."""
+"""Largest distance of a logarithm from its expected value, seven decades; records cannot determine a value beyond."""
 _TOLD = 1.0
-"""Change of all errors together, of size one each, that a step of one in a coordinate must make for the records to tell it."""
+"""Change of all errors together, of size one each, due to a unit step of a coordinate, above which the records determine it."""
 _MARGIN = 1e-9
 _DEFAULT = 30.0
-"""Weight of a default beside the wish that a term is as large as others."""
+"""Weight of a default relative to that of the balance of one term."""
 _BALANCINGS = 5
 _FARTHEST = 40.0
 """Largest logarithm of any size, in SI units."""
 _WITHIN = 2.3
-"""How far inside its bounds a logarithm is expected, a decade."""
+"""Expected distance of a logarithm from its bounds, a decade."""
 _PULL = 0.02
-"""Weight of the expected size beside one error of size one: it decides what records do not tell, and nothing else."""
+"""Weight of the expected size relative to an error of size one: it determines only what the records do not."""
 _SCREENED, _FOLLOWED, AGREEING = 300, 12, 3
-"""Starts of which the errors are computed, those from which a search goes on, and how many of these must lead to the lowest
-place for it to be taken as the lowest of all."""
+"""Number of starts of which the errors are computed, number of those from which a search continues, and number of searches that
+must end in the lowest minimum for it to count as the global one."""
 PERSISTENT = _FOLLOWED
-"""Number of agreeing searches for one that follows all its starts: where what was found does not explain the records."""
+"""Number of agreeing searches with which all starts are followed, used if no minimum explains the records."""
 _AS_LOW = 1.01
-"""Ratio of two costs below which two ends are as low: along what records do not tell they differ in nothing else."""
+"""Ratio of two costs below which two minima count as the same: they may differ along directions that records do not determine."""
 _MOST_EVALUATIONS = 60
 
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Coordinates of unknown parameters: logarithms of those that have one sign, others in units of their size.
+    """Coordinates of unknown parameters: logarithms of those with one sign, others in units of their size.
 
     Attributes
     ----------
     parameters
-        The unknown ones.
+        The unknown parameters.
     expected
-        The value that each has for want of better, the size of those that may have either sign.
+        The expected value of each, or the expected size of one that may have either sign, shape (n_parameters,).
     """
 
     parameters: tuple[Parameter, ...]
@@ -57,7 +57,7 @@ class SearchSpace:
 
     @property
     def logarithmic(self) -> NDArray[np.bool_]:
-        """Which parameters have one sign."""
+        """True for parameters with one sign."""
         return np.array([p.lower >= 0.0 or p.upper <= 0.0 for p in self.parameters], dtype=bool)
 
     def values(self, theta: Floats) -> Floats:
@@ -67,7 +67,7 @@ class SearchSpace:
         return np.clip(own, [p.lower for p in self.parameters], [p.upper for p in self.parameters])
 
     def bounds(self) -> tuple[Floats, Floats]:
-        """Return the lowest and highest coordinates, shape (n_parameters,) each: bounds of parameters, and what is too far."""
+        """Return the lowest and highest coordinates, shape (n_parameters,) each, from bounds and largest distances."""
         sign = np.array([-1.0 if p.upper <= 0.0 else 1.0 for p in self.parameters])
         ends = np.array([[p.lower, p.upper] for p in self.parameters]) / np.abs(self.expected)[:, None]
         ends = np.sort(np.where(self.logarithmic, sign, 1.0)[:, None] * ends, axis=1)
@@ -76,11 +76,11 @@ class SearchSpace:
         first = self.start()
         low = np.clip(ends[:, 0], first - _REACH, first)
         high = np.clip(ends[:, 1], first, first + _REACH)
-        # A start at a bound lies inside by as much as a search needs.
+        # A search needs a start strictly inside the bounds.
         return low - _MARGIN, high + _MARGIN
 
     def start(self) -> Floats:
-        """Return the coordinates of what is expected; a number that may have either sign is zero, or its default."""
+        """Return the coordinates of the expected values; a parameter that may have either sign is zero, or its default."""
         defaults = [p.default for p in self.parameters]
         of_others = [0.0 if d is None else d / e for d, e in zip(defaults, self.expected, strict=True)]
         return np.where(self.logarithmic, 0.0, of_others)
@@ -90,22 +90,22 @@ def balanced(
     parameters: Sequence[Parameter],
     terms: Callable[[Floats], Sequence[tuple[int, float, Floats]]],
 ) -> SearchSpace:
-    """Return a space about the values at which the terms of each equation are as large as each other, as far as that can be.
+    """Return a space about the values at which the terms of each equation have equal size, as far as that is possible.
 
     Parameters
     ----------
     parameters
-        The unknown ones.
+        The unknown parameters.
     terms
-        For values of them each term's equation, size and powers of the parameters in it.
+        Returns, for values of them, each term's equation, size and powers of the parameters in it.
     """
     prior = np.array([np.log(abs(p.default)) if p.default else 0.0 for p in parameters])
-    # A default counts more than any other term; without one the size 1 only decides what no equation does.
+    # A default has more weight than any term; without one, the size 1 determines only what no equation does.
     weight = np.array([_DEFAULT if p.default else 1e-3 for p in parameters])
     low = np.array([np.log(p.lower) + _WITHIN if p.lower > 0.0 else -np.inf for p in parameters])
     high = np.array([np.log(p.upper) - _WITHIN if 0.0 < p.upper < np.inf else np.inf for p in parameters])
     logs = prior.copy()
-    # Sums of parameters have powers that depend on their sizes, and a bound moves others with it.
+    # Repeated, because the powers in sums of parameters depend on their sizes, and a bound affects other parameters.
     for _ in range(_BALANCINGS):
         found = [term for term in terms(np.exp(logs)) if term[1] > 0.0 and np.isfinite(term[1])]
         equations = sorted({equation for equation, _, _ in found})
@@ -131,18 +131,18 @@ def ends_of_search(
     rng: np.random.Generator,
     agreeing: int = AGREEING,
 ) -> list[tuple[float, Floats]]:
-    """Return the local minima of a sum of squared errors that many starts lead to, lowest first: cost and parameter values.
+    """Return the local minima of a sum of squared errors reached from many starts, lowest first: cost and parameter values.
 
     Parameters
     ----------
     space
-        Where to look.
+        The search space.
     errors
-        Errors of size one where noise alone makes them, of parameter values.
+        Returns the errors for parameter values, of size one if due to noise alone.
     rng
         Source of the starts.
     agreeing
-        How many searches must lead to the lowest place for it to be taken as the lowest of all.
+        Number of searches that must end in the lowest minimum for it to count as the global one.
     """
     first = space.start()
     spreads = [_SPREADS[i % len(_SPREADS)] for i in range(_SCREENED)]
@@ -177,7 +177,7 @@ def _descent(
         ftol=1e-4,
         xtol=1e-4,
     )
-    # A descent ends where nothing is gained; what records do not tell is then still where it began.
+    # A descent does not change directions that records do not determine; along these, return to the expected values.
     own = np.asarray(found.jac)[: -start.size]
     _, sizes, directions = np.linalg.svd(own, full_matrices=False)
     untold = directions[sizes < _TOLD]
@@ -187,5 +187,5 @@ def _descent(
 
 
 def _cost(errors: Floats) -> float:
-    """Return a sum that a start far off does not make infinite and that still tells better from worse."""
+    """Return a sum that ranks starts and stays finite for a start that is far off."""
     return float(np.sum(np.log1p(errors**2)))

@@ -1,9 +1,10 @@
 """Error of the equations of a rig along the measured motion, in the weak form and weighted by its noise.
 
-``d/dt P = R`` for each coordinate (P its momentum, R all forces) and each own state, multiplied by ``w(t) e^{-j omega t}`` on
-overlapping stretches and integrated by parts, so that no second derivative of a measured signal is taken. Nothing is simulated:
-the error is a cheap sum and valid for large motion. Its covariance follows from the sensor noise through the linearized
-equations, so that this is an errors-in-variables estimate: a stiff shaft whose twist is below the noise is not estimated as soft.
+``d/dt P = R`` for each coordinate (P its momentum, R all forces) and each own state is multiplied by ``w(t) e^{-j omega t}`` on
+overlapping stretches and integrated by parts, so that no second derivative of a measured signal is needed. There is no
+simulation: the error is a cheap sum and valid for large motion. Its covariance follows from the sensor noise through the
+linearized equations, so that this is an errors-in-variables estimate: a stiff shaft whose twist is below the noise is not
+estimated as soft.
 
 References
 ----------
@@ -38,14 +39,14 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _MOST_POINTS = 400
-"""Lines of all records together that are looked at, evenly chosen; parameters are some ten."""
+"""Number of lines of all records together, evenly chosen, for some ten parameters."""
 _MODEL_ERROR = 3e-3
-"""Error of each term of an equation by itself, relative to it: rates from splines, and inputs between samples."""
+"""Relative error of each term of an equation, due to rates from splines and inputs between samples."""
 
 
 @dataclass(frozen=True)
 class _Term:
-    """``factor(p) * signal(z, u)``, part of the momentum (or the forces) of one equation; factors hold what is unknown."""
+    """``factor(p) * signal(z, u)``, part of the momentum (or the forces) of one equation; the unknowns are in the factor."""
 
     equation: int
     is_momentum: bool
@@ -55,12 +56,12 @@ class _Term:
 
 @dataclass(frozen=True)
 class _Block:
-    """One record: the terms on its lines, and how equations answer to noise of the states there.
+    """One record: the terms on its lines, and the response of the equations to noise of the states.
 
     Attributes
     ----------
     omega
-        Shape (n_points,).
+        Angular frequencies [rad/s], shape (n_points,).
     terms
         Projected signals of the terms, shape (n_terms, n_points).
     squares
@@ -71,8 +72,8 @@ class _Block:
         Square root of the covariance of coordinates and own states, shape (n_points, n_states', n_sensors).
     p
         The record's parameter vector with its own constants.
-    mixed
-        Signals and projection of what does not fall into terms.
+    measured, u, projection
+        States, inputs and projection, for terms in which signals and unknown parameters cannot be separated.
     """
 
     omega: Floats
@@ -92,18 +93,18 @@ class WeakEquations:
     Parameters
     ----------
     equations
-        The rig's.
+        Equations of the rig.
     records
         Estimation records; those that do not show all states are not used here.
     values
         Value of each known constant and parameter.
     free
-        Names of the parameters that are sought.
+        Names of the unknown parameters.
 
     Attributes
     ----------
     n_records
-        Records that show all states; with none only `term_sizes` means something.
+        Number of records that show all states; if zero, only `term_sizes` is meaningful.
     """
 
     def __init__(
@@ -126,7 +127,7 @@ class WeakEquations:
         self.n_records = len(shown)
         self._columns = [equations.structure.names.index(name) for name in free]
         if not shown:
-            # Sizes of terms can be told all the same.
+            # Sizes of terms can still be estimated.
             record = records[0]
             p = equations.parameters({**unknown, **values}, record)
             shown = [(record, p, supposed_states(equations, record, p, factors))]
@@ -140,7 +141,7 @@ class WeakEquations:
 
     @property
     def n_equations(self) -> int:
-        """Coordinates and own states."""
+        """Number of equations: one for each coordinate and own state."""
         return self._equations.n_states - self._equations.n_coordinates
 
     @property
@@ -149,7 +150,7 @@ class WeakEquations:
         return sum(2 * block.omega.size for block in self._blocks) * self.n_equations
 
     def errors(self, values: Floats) -> Floats:
-        """Return the weighted errors for values of the free parameters, shape (n_errors,): of size one if noise makes them."""
+        """Return the weighted errors for values of the free parameters, shape (n_errors,): of size one if due to noise."""
         found = []
         for block in self._blocks:
             p = block.p.copy()
@@ -160,7 +161,7 @@ class WeakEquations:
         return np.nan_to_num(np.concatenate(found), nan=1e6, posinf=1e6, neginf=-1e6)
 
     def term_sizes(self, values: Floats) -> list[tuple[int, float, Floats]]:
-        """Return of each term its equation, its size for these values, and its powers in them, shape (n_free,)."""
+        """Return for each term its equation, its size for these values, and its powers in them, shape (n_free,)."""
         found = []
         sizes = np.sqrt(np.mean(np.concatenate([np.abs(b.terms) ** 2 for b in self._blocks], axis=1), axis=1))
         p = self._blocks[0].p.copy()
@@ -207,7 +208,7 @@ class WeakEquations:
         return [_Term(i, m, factor, signal) for (i, m, signal), factor in terms.items()], mixed
 
     def _offsets(self, measured: MeasuredStates, known: set[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-        """Return what stands for each coordinate and own state where sensors add unknown numbers to their readings."""
+        """Return replacements of coordinates and own states that subtract the offsets of the sensors' readings."""
         equations = self._equations
         states = equations.structure.states
         n = equations.n_coordinates
@@ -226,7 +227,7 @@ class WeakEquations:
         return shift
 
     def _written(self) -> tuple[Any, Any, Any, Any, Any]:
-        """Return as functions: factors, signals, their derivatives, and of the mixed terms signals and derivatives."""
+        """Return functions for factors, signals and their derivatives, and for signals and derivatives of mixed terms."""
         arguments, states = self._equations.arguments, self._equations.structure.states
 
         def function(expressions: list[sp.Expr]) -> Any:
@@ -247,7 +248,7 @@ class WeakEquations:
         equations = self._equations
         u = equations.inputs_of(record)[1].copy()
         if record.hold == "zoh":
-            # Around a sample an input that is held is half the one before.
+            # At a sample, a held input is replaced by the mean of its values before and after it.
             u[0::3, 1:] = (u[0::3, 1:] + u[0::3, :-1]) / 2.0
         projection, floors = projected(equations, record, measured, most)
         arguments = [*measured.z, *u, 0.0, *p]
@@ -314,7 +315,7 @@ class WeakEquations:
         through = (response[0] + s * response[1] + s**2 * response[2]) @ block.noise
         covariance = through @ np.conj(np.swapaxes(through, 1, 2))
         covariance[:, np.arange(n), np.arange(n)] += _MODEL_ERROR**2 * spread + 1e-300
-        # Of one unit each, so that the root exists whatever the units of the equations are.
+        # Scaled to unit variances, so that the root exists for any units of the equations.
         size = np.sqrt(np.real(covariance[:, np.arange(n), np.arange(n)]))
         correlation = covariance / (size[:, :, None] * size[:, None, :])
         correlation[:, np.arange(n), np.arange(n)] += 1e-12
@@ -331,7 +332,7 @@ def _in_products(
     unknown: frozenset[sp.Symbol],
     signals: frozenset[sp.Symbol],
 ) -> tuple[list[_Term], list[_Term]]:
-    """Return terms and mixed ones of equations that are too long to be multiplied out: one for each product of unknowns."""
+    """Return terms and mixed terms of equations that are too long to be expanded: one for each product of unknowns."""
     terms: dict[tuple[int, bool, sp.Expr], list[sp.Expr]] = {}
     mixed: list[_Term] = []
     for is_momentum, side in zip((True, False), sides, strict=True):

@@ -1,1 +1,1 @@
-"""Transfer functions: PT1 or PT2 of a record, and the physical parameters that follow from it."""
+"""Transfer functions: PT1 or PT2 from a record, and the physical parameters that follow from it."""

@@ -23,7 +23,7 @@ def axis_parameters(fit: TransferFit, gain: float) -> PhysicalEstimates:
     Raises
     ------
     InputError
-        If the fit is no PT2, or its gain is not positive.
+        If the fit is not a PT2, or its gain is not positive.
     """
     check_fit(fit, "pt2", "axis", "x / u")
     method = f"gain, break frequency and damping of the {fit.method}"

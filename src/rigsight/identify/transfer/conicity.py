@@ -1,10 +1,10 @@
-"""What records can and cannot determine about the equivalent conicity delta_0.
+"""Equivalent conicity delta_0 from the creep factor, and the accuracy with which records can determine it.
 
-delta_0 enters the equations of the rig only inside the product v c_y, with ``c_y = cos^2 d - (2 r_0 / b) sin d cos d`` (thesis,
-2.12). So in every record, whatever drives it, the sensitivity to delta_0 is the sensitivity to ln c_y times ``(dc_y/dd) / c_y``,
-and the Cramer-Rao bound of delta_0 is that of c_y over ``|dc_y/dd|``, about 0.7 on this rig: an error of 1 % of c_y, of the speed
-v, or of the ratio of the two sensors' scales is one of 0.014 rad. No record or static relation avoids this; only the accuracy of
-c_y can be improved, see `creep_error_of_sine` and `lateral_parameters` with a known l_0.
+delta_0 enters the equations of the rig only in the product v c_y, with ``c_y = cos^2 d - (2 r_0 / b) sin d cos d`` (thesis,
+2.12). So in every record, for any input, the sensitivity to delta_0 is the sensitivity to ln c_y times ``(dc_y/dd) / c_y``, and
+the Cramer-Rao bound of delta_0 is that of c_y over ``|dc_y/dd|``, about 0.7 on this rig: an error of 1 % of c_y, of the speed v,
+or of the ratio of the two sensors' scales causes one of 0.014 rad. No record or static relation avoids this; only the accuracy
+of c_y can be improved, see `creep_error_of_sine` and `lateral_parameters` with a known l_0.
 """
 
 from __future__ import annotations
@@ -21,29 +21,30 @@ from rigsight.rigs import ROLLING, evaluated
 from rigsight.rigs.conicity import conicity_slope, creep_factor
 
 PLAUSIBLE = 0.3
-"""Conicities of profiled wheels [rad]; an interval that covers them all tells nothing. A choice, far above the thesis's 0.05."""
+"""Largest plausible conicity of profiled wheels [rad]; an interval that covers the whole range determines nothing. A choice, far
+above the thesis's 0.05."""
 
 
 @dataclass(frozen=True)
 class ConicityEstimate:
-    """Equivalent conicity with its interval and a plain statement.
+    """Equivalent conicity with its interval and a statement in words.
 
     Attributes
     ----------
     value
-        Estimate bounded to what (2.12) allows, 0 to where c_y vanishes [rad].
+        Estimate limited to the range of (2.12), from 0 to the conicity at which c_y is zero [rad].
     unbounded
-        Root of (2.12) without the bound [rad], as the thesis's -0.15; None where (2.12) has none.
+        Root of (2.12) without this limit [rad], such as the thesis's -0.15; None if (2.12) has none.
     standard_error
         Of the unbounded value [rad], by the delta method.
     interval
-        Confidence interval inside the bounds [rad]; None where no admissible conicity is compatible with c_y.
+        Confidence interval inside the limits [rad]; None if no admissible conicity is compatible with c_y.
     level
         Its confidence level.
     determined
-        True where the interval excludes zero and is narrower than the range of plausible conicities.
+        True if the interval excludes zero and is narrower than the range of plausible conicities.
     statement
-        What that means, one or two sentences.
+        The result in one or two sentences.
     """
 
     value: float
@@ -63,10 +64,10 @@ def estimate_conicity(
     level: float = LEVEL,
     plausible: float = PLAUSIBLE,
 ) -> ConicityEstimate:
-    """Return delta_0 from the creep factor, bounded to positive, with its interval.
+    """Return delta_0 from the creep factor, limited to positive values, with its interval.
 
-    The interval maps the normal interval of c_y through (2.12), which is monotonic between the bounds: near a bound it is exact
-    where the delta method is not.
+    The interval maps the normal interval of c_y through (2.12), which is monotonic between the limits: near a limit it is exact,
+    unlike the delta method.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def estimate_conicity(
     level
         Confidence level.
     plausible
-        Upper end of the conicities that make sense [rad].
+        Largest plausible conicity [rad].
 
     Raises
     ------
@@ -95,7 +96,7 @@ def estimate_conicity(
     value = _bounded(c_y, largest, r_0, b)
     unbounded = _unbounded(c_y, largest, r_0, b)
     slope = abs(conicity_slope(value if unbounded is None else unbounded, r_0, b))
-    # At its maximum c_y is flat in delta_0, and the delta method fails.
+    # At the maximum of c_y its derivative is zero, and the delta method fails.
     error = standard_error / slope if unbounded is not None and slope > 0.0 else math.inf
     percent = f"{100.0 * level:g} %"
     if low_c >= 1.0:
@@ -143,12 +144,12 @@ def creep_error_of_sine(
     l_0: float,
     omega_b: float,
 ) -> tuple[float, float]:
-    """Return the smallest relative standard errors of l_0 and of c_y that a sine record allows.
+    """Return the smallest possible relative standard errors of l_0 and of c_y from a sine record.
 
     Cramer-Rao bound for white noise on y and an exact psi. With ``G = 2 l_0 omega_b / (s + omega_b)`` and
     ``omega_b = v c_y / (2 l_0)``: ``dG/d ln c_y = 2 l_0 omega_b s / (s + omega_b)^2`` and
     ``dG/d ln l_0 = 2 l_0 omega_b^2 / (s + omega_b)^2``. They are 90 degrees apart at every frequency, so l_0 and c_y are
-    independent in every sine record, and the first is largest at the break frequency: that is the record for c_y.
+    independent in every sine record, and the first is largest at the break frequency, which is best for c_y.
 
     Parameters
     ----------
@@ -159,7 +160,7 @@ def creep_error_of_sine(
     y_noise
         Standard deviation of the noise of y [m].
     n_samples
-        Samples of the record, whole periods.
+        Number of samples of the record, which has whole periods.
     l_0, omega_b
         Distance [m] and break frequency [rad/s].
     """

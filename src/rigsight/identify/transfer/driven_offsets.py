@@ -1,7 +1,7 @@
 """Rest positions of a driven rig: offsets from the residuals of the fitted transfer functions of a sweep.
 
-A sweep is not noise about its offset, and the mean of its current moves the rig: (2.26) and (2.27) of the thesis apply to the
-record after the motion is subtracted.
+A sweep is not noise about its offset, and the mean of its current moves the rig: (2.26) and (2.27) of the thesis apply only after
+the motion has been subtracted from the record.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from rigsight.records.record import Hold, Record
 _LEAST_SAMPLES = 20
 _DIFFERENCE = 1e-4
 _NUMBERS = SMOOTHED - 1
-"""Real numbers behind the spectrum at frequency zero: lines below it mirror those above, and the offset takes its own."""
+"""Degrees of freedom of the spectrum at frequency zero: lines below it mirror those above, and the offset takes one."""
 
 
 def driven_offsets(
     record: Record, motion: TransferFit, lateral: TransferFit | None = None, name: str = "psi_off"
 ) -> PhysicalEstimates:
-    """Return the offsets of a driven record: the constant beside the motion that the fits explain.
+    """Return the offsets of a driven record: the constant parts that the motion of the fits does not explain.
 
-    Small errors of the fits, and motion that fades from before the record, are told from the offset. y is held against the
-    measured yaw angle, so a yaw motion that is no PT2 leaves y_off alone.
+    Small errors of the fits, and motion that decays from before the record, are separated from the offset. y is compared with
+    the measured yaw angle, so a yaw motion that is not a PT2 does not affect y_off.
 
     Parameters
     ----------
     record
-        With the sources and responses of the fits.
+        Contains the sources and responses of the fits.
     motion
-        From the input to the motion (u to psi).
+        Fit from the input to the motion (u to psi).
     lateral
-        From psi to y; None leaves y_off out.
+        Fit from psi to y; None leaves y_off out.
     name
         Name of the motion's offset.
 
     Returns
     -------
-    Offsets; their errors hold the colored noise that is left, and motion that no such transfer function explains.
+    Offsets; their errors include the remaining colored noise, and motion that such transfer functions do not explain.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def driven_offsets(
             f"Record '{record.name}': {record.n_samples} samples are too few to find an offset; at least {_LEAST_SAMPLES} are "
             f"needed."
         )
-    # psi is measured: it is smooth between its samples, whatever the current does.
+    # psi is measured, so it has no content above the Nyquist frequency, whatever the hold of the current.
     parts: list[tuple[str, TransferFit, Hold]] = [(name, motion, record.hold)]
     if lateral is not None:
         parts.append(("y_off", lateral, "band_limited"))
@@ -89,13 +89,13 @@ def driven_offsets(
 
 
 def _few_numbers() -> float:
-    """Return the factor by which the variance of an offset grows because so few numbers show the noise near frequency zero."""
+    """Return the factor on the variance of an offset for the few degrees of freedom of the noise near frequency zero."""
     share = 0.5 + 0.5 * LEVEL
     return float((t.ppf(share, _NUMBERS) / norm.ppf(share)) ** 2 * SMOOTHED / _NUMBERS)
 
 
 def _unexplained(record: Record, fit: TransferFit, found: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the response less what a form with these parameters makes of the source, shape (n_samples,)."""
+    """Return the response minus that of a form with these parameters to the source, shape (n_samples,)."""
     named = dict(zip(fit.form.names, found, strict=True))
     theta = fit.form.vector(named["omega_b"], named.get("zeta", 1.0), named.get("dead_time", 0.0))
     theta[0] = named["gain"]
@@ -105,7 +105,7 @@ def _unexplained(record: Record, fit: TransferFit, found: NDArray[np.float64]) -
 
 
 def _fading(fit: TransferFit, n_samples: int, dt: float) -> NDArray[np.float64]:
-    """Return shapes that span the form's motion without input, shape (n_samples, order)."""
+    """Return signals that span the form's free motion, shape (n_samples, order)."""
     omega_b = fit.values["omega_b"]
     inertia = [] if fit.form.order == "pt1" else [omega_b**-2]
     poles = np.roots([*inertia, 2.0 * fit.values.get("zeta", 0.5) / omega_b, 1.0])
@@ -117,7 +117,7 @@ def _fading(fit: TransferFit, n_samples: int, dt: float) -> NDArray[np.float64]:
 
 
 def _errors(record: Record, fit: TransferFit, found: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what small errors of each parameter leave, shape (n_samples, n_parameters)."""
+    """Return the residuals due to a small error of each parameter, shape (n_samples, n_parameters)."""
     columns = []
     for i, size in enumerate(found):
         step = np.zeros_like(found)

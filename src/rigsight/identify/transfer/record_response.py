@@ -27,16 +27,16 @@ Method = Literal["local_rational", "local_polynomial", "h1", "thesis"]
 METHODS: tuple[Method, ...] = ("local_rational", "local_polynomial", "h1", "thesis")
 
 _BAND_LINES = {"local_rational": 15, "local_polynomial": 13}
-"""Lines of one local band: its unknowns and six degrees of freedom more, to the next odd number."""
+"""Lines of one local band: its unknowns and six more degrees of freedom, up to the next odd number."""
 _LOCAL_VALUES = 3.0
 _HANN_LINES = 1.5
-"""Equivalent noise bandwidth of a Hann window."""
+"""Equivalent noise bandwidth of a Hann window, in lines."""
 _SEGMENTS = 8
-"""Half-overlapping segments of an averaged spectrum hold this share of the record: a compromise of bias and variance."""
+"""Length of a record in segments of an averaged spectrum, which overlap by half: a compromise between bias and variance."""
 _PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thesis": 2.0}
-"""Lines (or distances of averaged frequencies) that the half-power width of a peak must hold for a method to follow it."""
+"""Lines (or distances of averaged frequencies) that the half-power width of a peak must contain for a method to follow it."""
 _CLEAR = 100.0
-"""Power over variance (20 dB) from which a local model of a noisy response can be trusted."""
+"""Power over variance (20 dB) above which a local model of a noisy response can be trusted."""
 _MOSTLY, _LEAST_SHARE = 0.8, 0.05
 _THESIS_CUTS = {"pt2": 80.0, "pt1": 30.0}
 _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
@@ -44,23 +44,23 @@ _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 
 @dataclass(frozen=True, eq=False)
 class RecordResponse:
-    """A frequency response with what its reading needs.
+    """A frequency response with its resolution and coherence.
 
     Attributes
     ----------
     response
-        The frequency response in the band where it stands out.
+        The frequency response in the band in which it exceeds its uncertainty.
     lines_per_value
         Lines per independent value, by which a covariance that counts lines as independent is too small. A local model of degree
-        two has three numbers for the response in its band; a Hann window ties neighbors together.
+        two has three coefficients for the response in its band; a Hann window correlates neighbors.
     resolution
         Distance of its frequencies [rad/s].
     narrowest
         Half-power width of the narrowest peak that the method follows at this resolution [rad/s].
     coherence
-        H1 with its coherence from segments of the same record; None where it is not wanted or the record is too short for it.
+        H1 with its coherence from segments of the same record; None if it is not requested or the record is too short for it.
     unused_instrument
-        Why the instrument that was given was not used; empty where it was, or there is none.
+        Reason why the given instrument was not used; empty if it was used, or if there is none.
     """
 
     response: FrequencyResponse
@@ -91,35 +91,36 @@ def record_response(
     Parameters
     ----------
     record
-        A sweep, a multisine, or anything that drives a band. Whole periods of an input that repeats are averaged, without the
-        first, which holds the transient.
+        A sweep, a multisine, or another input that excites a band. Whole periods of a periodic input are averaged, without the
+        first, which contains the transient.
     source, response
         Names of the signals.
     order
-        What the response is believed to be; only the thesis's pipeline needs it.
+        Assumed order of the response; only the thesis's pipeline needs it.
     method
         ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
     resolution
-        Width wished for [rad/s]: of a local band, or between averaged frequencies. None takes what the record gives.
+        Requested width [rad/s] of a local band, or distance of averaged frequencies. None takes the default of the record.
     hold
-        How the source goes on between its samples, see `rigsight.frequency.hold_response`.
+        Hold of the source between its samples, see `rigsight.frequency.hold_response`.
     band
         Limits [rad/s] inside which the response is kept; None keeps all that the source excites.
     least_clearness
         Power over variance from which a line of a local method counts as clear; 0 keeps all lines.
     clear_alone
-        True to leave out other lines however few are clear: an error has no weights. A fit does, and takes all lines then.
+        True to leave out unclear lines even if few are clear, as needed for errors without weights. A fit has weights and takes
+        all lines in this case.
     with_coherence
         False if the coherence is not needed: it takes a third of the time of a local model.
     wanted
         Required frequencies [rad/s]; a local method skips other lines. None for all.
     instrument
-        The reference of a closed loop: a local method divides the responses to it, unless the source does not answer it.
+        The reference of a closed loop: a local method divides the responses to it, unless the source does not respond to it.
 
     Raises
     ------
     InputError
-        If the record is too short, or does not excite anything, or nothing is left inside the band.
+        If the record is too short or has no excitation, or no line is inside the band.
     """
     check_option("The method", method, METHODS)
     unused = ""
@@ -165,7 +166,7 @@ def _local(
     clear_alone: bool,
     instrument: str | None,
 ) -> tuple[FrequencyResponse, float, float]:
-    """Return what a local method shows, its resolution [rad/s] and its lines per independent value."""
+    """Return the response by a local method, its resolution [rad/s] and its lines per independent value."""
     periodic, note = _mean_period(record, instrument)
     line = _line(periodic)
     lines = max(_BAND_LINES[method], round((resolution or 0.0) / line))
@@ -189,7 +190,7 @@ def _noted(found: FrequencyResponse, note: str) -> FrequencyResponse:
 
 
 def _mean_period(record: Record, instrument: str | None) -> tuple[Record, str]:
-    """Return the mean of all periods but the first of a repeated instrument or input, or the record as it is."""
+    """Return the mean of all periods but the first, if the instrument or input is periodic, or the unchanged record."""
     drive = next(iter(record.signals.values())) if instrument is None else record[instrument]
     period = repeated_period(drive)
     count = record.n_samples // period if period else 1
@@ -216,15 +217,15 @@ def _thesis(record: Record, source: str, response: str, order: Order) -> Frequen
     power = np.abs(np.fft.rfft(record[source] - np.mean(record[source]))[1 : omega.size + 1]) ** 2
     smooth = np.convolve(power, np.full(15, 1.0 / 15.0), mode="same")
     heard = omega[excited(omega, smooth, None, f"Record '{record.name}': the source '{source}'")]
-    # The cuts are those of the thesis's rig: its resonance lies near 12 rad/s.
+    # The cuts are those of the thesis's rig, whose resonance is near 12 rad/s.
     upper = min(_THESIS_CUTS[order], float(heard[-1]))
     return thesis_response(record, source, response, _THESIS_DROPS[order], upper, float(heard[0]))
 
 
 def _clear(found: FrequencyResponse, lines: int, least: float, least_share: float) -> FrequencyResponse:
-    """Keep the lines between the outermost local bands in which most stand clearly out of their uncertainty.
+    """Keep the lines between the outermost local bands in which most lines clearly exceed their uncertainty.
 
-    Single lines seem clear by chance, most of all where the begin of a sweep cannot be told from a transient.
+    Single lines may do so by chance, above all where the beginning of a sweep cannot be distinguished from a transient.
     """
     assert found.variance is not None
     clear = np.abs(found.values) ** 2 > least * found.variance
@@ -242,7 +243,7 @@ def _clear(found: FrequencyResponse, lines: int, least: float, least_share: floa
 
 
 def driven_band(record: Record, source: str) -> tuple[float, float]:
-    """Return the band that holds 99 % of the power of a source [rad/s]."""
+    """Return the band with 99 % of the power of a source [rad/s]."""
     omega = line_frequencies(record.n_samples, record.dt)
     power = np.abs(np.fft.rfft(record[source] - np.mean(record[source]))[1 : omega.size + 1]) ** 2
     total = np.cumsum(power) / np.sum(power)

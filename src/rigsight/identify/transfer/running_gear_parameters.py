@@ -1,7 +1,7 @@
 """Physical parameters of the running gear from a PT2 and a PT1, with their uncertainty.
 
-Thesis, equations (2.21), (2.24), (2.26) and (2.27). The factor v is where (2.12) and the lateral equation put it,
-``c_y = 2 l_0 omega_b / v``; (2.25) prints it on the wrong side, which v = 1 m/s hides.
+Thesis, equations (2.21), (2.24), (2.26) and (2.27). The position of the factor v follows from (2.12) and the lateral equation,
+``c_y = 2 l_0 omega_b / v``; in (2.25) it is on the wrong side, which has no effect for v = 1 m/s.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rigsight.records.record import Record
 from rigsight.rigs import ROLLING, RUNNING_GEAR, Rig, evaluated, relative_slopes
 
 LEVEL = 0.95
-"""Confidence level of intervals where none is given."""
+"""Confidence level of intervals if none is given."""
 _POSITIVE = frozenset({"J_z", "k_c", "k_d", "l_0", "c_y"})
 _RESTS = 1e-3
 _LEAST_SAMPLES = 20
@@ -41,9 +41,9 @@ class PhysicalEstimates:
     covariance
         Shape (n_parameters, n_parameters).
     method
-        Equations and records they come from.
+        Equations and records from which they were computed.
     positive
-        Names of those that are positive by nature.
+        Names of those that are positive by definition.
     """
 
     names: tuple[str, ...]
@@ -54,13 +54,13 @@ class PhysicalEstimates:
 
     @property
     def standard_errors(self) -> dict[str, float]:
-        """Standard error by name; infinite where the records do not determine the parameter."""
+        """Standard error by name; infinite if the records do not determine the parameter."""
         return dict(zip(self.names, map(float, np.sqrt(np.diag(self.covariance))), strict=True))
 
     def interval(self, name: str, level: float = LEVEL) -> tuple[float, float]:
         """Return the confidence interval of a parameter.
 
-        Parameters that are positive by nature get an interval that is symmetric in their logarithm.
+        The interval of a parameter that is positive by definition is symmetric in its logarithm.
         """
         value, error = self.values[name], self.standard_errors[name]
         width = float(norm.ppf(0.5 + 0.5 * level))
@@ -91,7 +91,7 @@ def yaw_parameters(
     Raises
     ------
     InputError
-        If the fit is no PT2, or its gain is not positive.
+        If the fit is not a PT2, or its gain is not positive.
     """
     check_fit(fit, "pt2", "yaw", "psi / u")
     return motion_parameters(RUNNING_GEAR, fit, constants, constant_errors, f"(2.21) from the {fit.method}")
@@ -113,11 +113,11 @@ def motion_parameters(
     fit
         PT2 from its input to its displacement.
     constants
-        Those of its drive.
+        Constants of its drive.
     constant_errors
         Standard errors of constants, by name; missing ones count as exact.
     method
-        What the estimates are said to come from.
+        Description of the method in the result.
     """
     gain, omega_b, zeta = (fit.values[name] for name in ("gain", "omega_b", "zeta"))
     motion = rig.motion
@@ -147,8 +147,8 @@ def lateral_parameters(
 ) -> PhysicalEstimates:
     """Return l_0 [m] and c_y of a PT1 from yaw angle to lateral displacement, by (2.24) with v on the right side.
 
-    Gain and break frequency go in with their covariance: above the break frequency the PT1 is an integrator of slope v c_y, so
-    their errors largely cancel in c_y.
+    Gain and break frequency are used with their covariance: above the break frequency the PT1 is an integrator with slope v c_y,
+    so their errors largely cancel in c_y.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def lateral_parameters(
     Raises
     ------
     InputError
-        If the fit is no PT1, its gain is not positive, or the known length is not.
+        If the fit is not a PT1, or its gain or the known length is not positive.
     """
     check_fit(fit, "pt1", "lateral", "y / psi")
     gain, omega_b, speed = fit.values["gain"], fit.values["omega_b"], constants["v"]
@@ -199,16 +199,16 @@ def static_lateral(l_0: float) -> tuple[float, float]:
 
 
 def check_fit(fit: TransferFit, order: str, which: str, ratio: str) -> None:
-    """Refuse a fit of another order, or one whose gain says that a signal counts the other way round.
+    """Raise an error for a fit of another order, or with a negative gain, which shows that a signal has the opposite sign.
 
     Parameters
     ----------
     fit
         The fit.
     order
-        Order that is needed.
+        Required order.
     which, ratio
-        What is wanted of it, and of which signals, in words.
+        Parameters to be computed, and ratio of signals, for the message.
 
     Raises
     ------
@@ -257,11 +257,11 @@ def offsets(
     record
         With u, psi and y.
     l_0, l_0_error
-        Distance wheel carrier to middle frame and its standard error [m].
+        Distance from wheel carrier to middle frame and its standard error [m].
     static_gain
-        psi / u at rest [rad/A], to take out the mean of the input; None requires an input that is zero on the mean.
+        psi / u at rest [rad/A], to remove the effect of the mean input; None requires an input with zero mean.
     start, stop
-        The stretch [s], default the whole record: a rest, or a constant current. Of a sweep `driven_offsets` knows more.
+        The stretch [s], default the whole record: a rest, or a constant current. For a sweep use `driven_offsets`.
 
     Returns
     -------
@@ -292,7 +292,7 @@ def offsets(
     y_mean, y_error = _mean(record["y"][inside])
     pushed = u_mean * (static_gain or 0.0)
     psi_off = psi_mean - pushed
-    # (2.27) with the stationary yaw angle: what the current pushes moves y too.
+    # (2.27) with the stationary yaw angle, because the yaw angle due to the current moves y too.
     per_radian, per_length = static_lateral(l_0)
     y_off = y_mean - per_radian * psi_mean
     chain = np.array([[1.0, 0.0, 0.0], [-per_radian, 1.0, -per_length * psi_mean]])

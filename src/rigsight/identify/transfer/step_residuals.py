@@ -1,14 +1,14 @@
 """Autocorrelation of the residuals of a fitted step, and the resulting covariance of the parameters.
 
-An input disturbance rings in the response like the rig itself. In a short window a resonance is narrower than the lines of a
-spectrum, so a smoothed spectrum cannot show it; but its shape is known from the fit. Residuals are modelled as a low-pass
+An input disturbance causes oscillations at the resonance of the rig. In a short window a resonance is narrower than the distance
+of spectral lines, so a smoothed spectrum cannot show it; but its shape is known from the fit. Residuals are modeled as a low-pass
 disturbance filtered by the fitted transfer function plus white noise, with both sizes and the corner frequency from restricted
 maximum likelihood.
 
 References
 ----------
-D. A. Harville, J. American Statistical Association 72 (1977) 320, for restricted maximum likelihood: what fitting the parameters
-takes away from the residuals is accounted for.
+D. A. Harville, J. American Statistical Association 72 (1977) 320, for restricted maximum likelihood, which accounts for the part
+of the residuals that the fitted parameters remove.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ _PHASE_PER_BLOCK = 0.5
 _MOST_BLOCKS = 600
 _LEAST_BLOCKS = 40
 _LOG_RATIOS = (-6.0, 0.0, 2.0, 4.0, 6.0, 9.0)
-"""Logarithms of the disturbance's variance over that of the white noise that the search begins with."""
+"""Logarithms of the disturbance's variance over that of the white noise at the starts of the search."""
 _CORNERS = (0.2, 1.0, 5.0)
-"""Corners of the disturbance that the search begins with, over the break frequency."""
+"""Corner frequencies of the disturbance at the starts of the search, over the break frequency."""
 _CORNER_RANGE = (0.02, 50.0)
 _LOG_RATIO_RANGE = (-12.0, 25.0)
 
@@ -59,7 +59,7 @@ def step_covariance(
 
     Returns
     -------
-    Shape (n_parameters, n_parameters). Of a window so long that the lines of its spectrum show the resonance, that spectrum is
+    Shape (n_parameters, n_parameters). If the window is so long that its spectral lines resolve the resonance, its spectrum is
     used (`colored_covariance`).
     """
     per_block = max(math.floor(_PHASE_PER_BLOCK / (omega_b * dt)), 1)
@@ -96,7 +96,7 @@ def _noise(
         return np.asarray(toeplitz(matrix))
 
     def cost(x: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the negative logarithm of the restricted likelihood with the variance that is best, and this variance."""
+        """Return the negative logarithm of the restricted likelihood at the best variance, and this variance."""
         matrix = shape(x[0], math.exp(x[1]))
         factor = cho_factor(matrix, lower=True)
         weighted = cho_solve(factor, np.column_stack([basis, scaled]))
@@ -124,7 +124,7 @@ def _noise(
 def _autocovariance(
     count: int, dt: float, omega_b: float, zeta: float | None, corner: float
 ) -> NDArray[np.float64]:
-    """Return the autocovariance of low-passed white noise behind a PT1 or PT2 at multiples of `dt`, unit variance."""
+    """Return the autocovariance at multiples of `dt` of low-pass noise filtered by a PT1 or PT2, with unit variance."""
     if zeta is None:
         a = np.array([[-omega_b, omega_b], [0.0, -corner]])
     else:

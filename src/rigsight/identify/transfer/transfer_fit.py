@@ -24,21 +24,21 @@ class TransferFit:
         ``gain`` [unit], ``omega_b`` [rad/s], ``zeta`` (PT2), ``dead_time`` [s] (if fitted), ``offset`` (from steps: the response
         at rest, in its unit).
     values, standard_errors
-        By name; an error is infinite where the data do not determine the parameter.
+        By name; an error is infinite if the data do not determine the parameter.
     covariance
         In the order of `names`, shape (n_parameters, n_parameters).
     residuals
         Measured minus fitted, not weighted: complex or magnitudes per line, or samples, shape (n_data,).
     misfit
-        RMS of the residuals in units of their expected size; about 1 where noise explains them, NaN where no variances exist.
+        RMS of the residuals in units of their expected size; about 1 if noise explains them, NaN if there are no variances.
     success, message
-        Whether the fit can be used as it is, and what to know.
+        Whether the fit can be used, and notes on it.
     source, response, unit
         The signals, and the unit of the gain.
     method
-        How it was fitted.
+        Name of the method.
     records
-        Names of the records behind it.
+        Names of the fitted records.
     """
 
     form: TransferForm
@@ -58,7 +58,7 @@ class TransferFit:
 
     @property
     def residual_rms(self) -> float:
-        """RMS of the residuals, in the unit of what was fitted."""
+        """RMS of the residuals, in the unit of the fitted quantity."""
         return float(np.sqrt(np.mean(np.abs(self.residuals) ** 2)))
 
     def covariance_of(self, *names: str) -> NDArray[np.float64]:
@@ -91,13 +91,13 @@ class TransferFit:
         Parameters
         ----------
         pade_order
-            Order of the Pade approximation of the dead time. None returns the rational part alone: a transfer function has no
-            exact dead time.
+            Order of the Pade approximation of the dead time. None returns the rational part alone, because a rational transfer
+            function cannot represent a dead time exactly.
 
         Raises
         ------
         InputError
-            If the order is below 1, or if one is asked for and no dead time was fitted.
+            If the order is below 1, or if it is given although no dead time was fitted.
         """
         import control
 

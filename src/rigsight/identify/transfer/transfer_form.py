@@ -21,9 +21,9 @@ Order = Literal["pt1", "pt2"]
 
 @dataclass(frozen=True)
 class TransferForm:
-    """Which transfer function: its order, and whether a dead time belongs to it.
+    """Form of a transfer function: its order, and whether it has a dead time.
 
-    A vector of parameters holds gain, ln omega_b, ln zeta (PT2 only) and dead time [s] (where there is one).
+    A vector of parameters contains gain, ln omega_b, ln zeta (PT2 only) and dead time [s] (if there is one).
     """
 
     order: Order
@@ -89,9 +89,9 @@ class TransferForm:
     def over_time(
         self, u: NDArray[np.float64], dt: float, hold: Hold, theta: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the answer from rest to an input that is zero up to its first sample, shape (n_samples,).
+        """Return the response from rest to an input that is zero up to its first sample, shape (n_samples,).
 
-        Exact for ``"zoh"`` and ``"foh"``, also for a dead time between two samples; ``"band_limited"`` is taken as ``"foh"``.
+        Exact for ``"zoh"`` and ``"foh"``, also for a dead time between two samples; ``"band_limited"`` is treated as ``"foh"``.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class TransferForm:
         dt
             Sample time [s].
         hold
-            The input between samples.
+            Hold of the input between samples.
         theta
             Parameters, shape (n_parameters,).
         """
@@ -113,7 +113,7 @@ class TransferForm:
         phi, constant, ramp = _transition(a, b, dt)
         later = np.zeros_like(ramp) if hold == "zoh" else ramp / dt
         states = _states(phi, constant - later, later, u)
-        # The answer at t - T lies between two samples: one exact step from the sample before it.
+        # The response at t - T is between two samples: one exact step from the sample before it.
         whole = int(np.floor(dead_time / dt))
         phi, constant, ramp = _transition(a, b, dt - (dead_time - whole * dt))
         rise = np.zeros_like(u) if hold == "zoh" else np.append(np.diff(u), 0.0) / dt
@@ -126,7 +126,7 @@ class TransferForm:
 def _transition(
     a: NDArray[np.float64], b: NDArray[np.float64], time: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return what `time` makes of the state, of a constant input and of a ramp of slope one."""
+    """Return the effects after `time` of the state, of a constant input and of a ramp with slope one."""
     n = b.size
     augmented = np.zeros((n + 2, n + 2))
     augmented[:n, :n] = a

@@ -3,8 +3,8 @@
 References
 ----------
 R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapters 9 and 11, for the
-maximum likelihood cost and its covariance. G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, for the gain that is
-solved for at every point of the grid. W. K. Newey and K. D. West, Econometrica 55 (1987) 703, for dependent lines.
+maximum likelihood cost and its covariance. G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, for the optimal gain
+at every point of the grid. W. K. Newey and K. D. West, Econometrica 55 (1987) 703, for dependent lines.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ _MOST_GRID_LINES = 500
 _MOST_DEAD_TIMES = 80
 _STARTS = 5
 _BEYOND = 10.0
-"""A break frequency is looked for this factor beyond either end of the band."""
+"""Factor beyond either end of the band within which a break frequency is searched."""
 _DAMPING_RANGE = (1e-4, 1e3)
 _STANDS_OUT = 4.0
-"""Power of a line over its variance from which it tells something (two standard deviations)."""
+"""Power of a line over its variance above which it is informative (two standard deviations)."""
 _COHERENT = 0.05
 _MISFIT = 3.0
 
@@ -57,28 +57,28 @@ def fit_frequency_response(
     order
         ``"pt1"`` (thesis, 2.7) or ``"pt2"`` (2.9).
     longest_dead_time
-        Longest dead time to look for [s]; 0 fits none.
+        Longest dead time that is searched [s]; 0 fits none.
     magnitude_only
-        Fit the magnitudes and leave the phase unread, as the thesis's manual grid search (section 4.4). The sign of the gain is
-        then positive by convention.
+        Fit the magnitudes without the phase, as in the thesis's manual grid search (section 4.4). The sign of the gain is then
+        positive by convention.
     weighting
         ``"variance"`` (maximum likelihood for circular normal errors), ``"uniform"`` (absolute errors) or ``"relative"``.
-        Default: variances where they exist, else uniform.
+        Default: variances if there are any, else uniform.
     dependent_lines
-        Over how many neighbors the errors of a line reach, for a response that does not know it itself
-        (`FrequencyResponse.noise_shares`, as local models do); 0 for independent lines.
+        Number of neighbors with which the errors of a line are correlated, for a response without
+        `FrequencyResponse.noise_shares` (local models have them); 0 for independent lines.
 
     Returns
     -------
-    The fit. Standard errors follow from the variances, widened by the misfit where that is above 1; without variances the
-    residuals give their size. ``success`` is False, with the reason as ``message``, where the optimizer did not converge or the
-    band does not show the break frequency.
+    The fit. Standard errors follow from the variances, widened by the misfit if that is above 1; without variances they follow
+    from the residuals. ``success`` is False, with the reason as ``message``, if the optimizer did not converge or the band does
+    not show the break frequency.
 
     Raises
     ------
     InputError
-        If there are too few lines, no line stands out of its uncertainty, the weighting needs variances that do not exist, or a
-        dead time is asked of magnitudes.
+        If there are too few lines, too few exceed their uncertainty, the weighting needs variances that do not exist, or a dead
+        time is requested with magnitudes only.
     """
     problem = _problem(measured, order, longest_dead_time, magnitude_only, weighting)
     lower, upper = problem.bounds()
@@ -171,13 +171,13 @@ class _Problem:
         return sandwich_covariance(bread, size**2 * bread)
 
     def _shared_filling(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance of J^T r from what each independent line of noise has in all values."""
+        """Return the covariance of J^T r from the shares of each independent line of noise in all values."""
         shares, lines = self.measured.noise_shares, self.measured.noise_lines
         assert shares is not None
         assert lines is not None
         slopes: NDArray[np.complex128] = self.form.derivatives(self.omega, theta).conj()
         if self.magnitude_only:
-            # A magnitude reads the part of an error that lies along the fitted value.
+            # The error of a magnitude is the component of the complex error along the fitted value.
             fitted = self.form.response(self.omega, theta)
             along = fitted.conj() / np.maximum(np.abs(fitted), np.finfo(np.float64).tiny)
             slopes = np.real(along[:, None] * slopes.conj()) * along[:, None]
@@ -199,7 +199,7 @@ class _Problem:
         return float(positive[0] / _BEYOND), float(positive[-1] * _BEYOND)
 
     def starts(self) -> list[NDArray[np.float64]]:
-        """Return the best points of the grid, each with the gain that fits best there."""
+        """Return the best points of the grid, each with its best gain."""
         thin = slice(None, None, -(-self.omega.size // _MOST_GRID_LINES))
         omega, weights = self.omega[thin], self.weights[thin]
         measured: NDArray[np.complex128] = self.values[thin]
@@ -210,7 +210,7 @@ class _Problem:
         delays = np.linspace(0.0, self.longest_dead_time, min(2 * turns, _MOST_DEAD_TIMES))
         if self.longest_dead_time == 0.0:
             delays = np.zeros(1)
-        # Turning the measured phase forward by a dead time stands for turning the shape backward.
+        # Advancing the measured phase by a dead time is equivalent to delaying the form.
         forward = np.exp(1j * np.outer(delays, omega))
         found = []
         for omega_b, zeta in itertools.product(np.geomspace(low, high, _GRID_FREQUENCIES), dampings):
@@ -284,7 +284,7 @@ def _check_informative(measured: FrequencyResponse, form: TransferForm) -> None:
         telling &= size**2 > _STANDS_OUT * measured.variance
     if measured.coherence is not None:
         telling &= measured.coherence > _COHERENT
-    # Of pure noise, exp(-4) of the lines seem to stand out.
+    # In pure noise, a share of exp(-4) of the lines exceeds the limit by chance.
     needed = max(least, int(np.ceil(0.05 * size.size)))
     if np.count_nonzero(telling) < needed:
         raise InputError(
@@ -317,7 +317,7 @@ def _reading_notes(magnitude_only: bool, misfit: float) -> list[str]:
 def _components(
     values: NDArray[np.complex128] | NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return real and imaginary part of each row next to each other, so that a line stays together."""
+    """Return real and imaginary part of each row next to each other, so that the parts of a line are adjacent."""
     if not np.iscomplexobj(values):
         return np.asarray(values, dtype=np.float64)
     parts = np.stack([values.real, values.imag], axis=1)
@@ -325,11 +325,11 @@ def _components(
 
 
 def _scattered_weights(freedom: float) -> float:
-    """Return what covariances gain by weights that scatter themselves.
+    """Return the factor on covariances for weights that are estimates themselves.
 
-    Lines whose variance was estimated too small weigh too much and claim to be good at once. For a chi-squared variance x of
-    n = 2 freedom degrees the noise of the sum is E[1/x^2], the claim E[1/x], and the misfit sees E[1/x]:
-    ``E[1/x^2] / E[1/x]^2 = (n - 2) / (n - 4)``.
+    A line whose variance was estimated too small gets too much weight, and its error is underestimated as well. For a chi-squared
+    variance x with n = 2 freedom degrees of freedom, the variance of the sum is E[1/x^2], the stated one E[1/x], and the misfit
+    contains E[1/x]: ``E[1/x^2] / E[1/x]^2 = (n - 2) / (n - 4)``.
     """
     if not np.isfinite(freedom):
         return 1.0

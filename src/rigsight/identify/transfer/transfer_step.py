@@ -42,30 +42,31 @@ def fit_step(
     stop: float | None = None,
     longest_dead_time: float = 0.0,
 ) -> TransferFit:
-    """Fit a PT1 or PT2 and an offset to the recorded answer to a step.
+    """Fit a PT1 or PT2 and an offset to the recorded response to a step.
 
     Parameters
     ----------
     record
-        Measured record. The input need not be an ideal step: the samples are simulated as they are, with the record's hold.
+        Measured record. The input need not be an ideal step: its samples are simulated with the record's hold.
     source, response
         Names of the input and of the output.
     order
         ``"pt1"`` (thesis, 2.7) or ``"pt2"`` (2.9).
     start, stop
-        Window [s] in the record's time, default the whole record. The rig rests at its start; it may be the time of the step.
+        Window [s] in the record's time, default the whole record. The rig must be at rest at its start, which may be the time of
+        the step.
     longest_dead_time
-        Longest dead time to look for [s]; 0 fits none.
+        Longest dead time that is searched [s]; 0 fits none.
 
     Returns
     -------
-    The fit, ``offset`` (the response at rest) among its parameters; standard errors allow for colored residuals. ``success`` is
-    False, with the reason as ``message``, where a parameter stays undetermined.
+    The fit, with ``offset`` (the response at rest) among its parameters; standard errors allow for colored residuals. ``success``
+    is False, with the reason as ``message``, if a parameter is not determined or the optimizer did not converge.
 
     Raises
     ------
     InputError
-        If the window holds no step, or too few samples after it, or the order or the dead time is not allowed.
+        If the window contains no step or too few samples after it, or the order or the dead time is not allowed.
     """
     check_option("order", order, ("pt1", "pt2"))
     if not (np.isfinite(longest_dead_time) and longest_dead_time >= 0.0):
@@ -125,7 +126,7 @@ class _Problem:
 
     form: TransferForm
     u: NDArray[np.float64]
-    """Input less its value at rest, one sample before the window to its end, shape (1 + n_samples,)."""
+    """Input minus its value at rest, from one sample before the window to its end, shape (1 + n_samples,)."""
     measured: NDArray[np.float64]
     dt: float
     hold: Hold
@@ -151,7 +152,7 @@ class _Problem:
         return np.column_stack(columns)
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what the parameters may be."""
+        """Return the lower and upper bounds of the parameters, shape (n_parameters,) each."""
         low, high = self._reach()
         longest = max(self.longest_dead_time, 1e-12)
         lower = np.append(self.form.vector(low, _DAMPING_RANGE[0], 0.0), -np.inf)
@@ -163,7 +164,7 @@ class _Problem:
         return 0.3 / (self.dt * self.measured.size), 0.8 * np.pi / self.dt
 
     def starts(self) -> list[NDArray[np.float64]]:
-        """Return the best points of the grid, each with gain and offset that fit best there."""
+        """Return the best points of the grid, each with its best gain and offset."""
         low, high = self._reach()
         dampings = _GRID_DAMPINGS if self.form.order == "pt2" else np.ones(1)
         delays = (
@@ -208,7 +209,7 @@ def _problem(
     first, last = int(inside[0]), int(inside[-1]) + 1
     before = max(first - 1, 0)
     u = record[source][before:last]
-    # A record that begins with the window rested at its first sample.
+    # If the record begins with the window, the first sample is taken as the value at rest.
     u = np.concatenate([u[:1], u]) if first == before else u
     scatter = float(np.median(np.abs(np.diff(u))))
     if np.ptp(u) <= max(_STEP_OVER_NOISE * scatter, 1e-12 * float(np.max(np.abs(u)))):

@@ -1,1 +1,1 @@
-"""Equations to machine code: C text, compiler, cache, kernels as functions of arrays."""
+"""Equations -> machine code: C text, compiler, cache, kernels as functions of arrays."""

@@ -1,4 +1,4 @@
-"""Expressions -> bodies of C functions, and the fixed parts of a kernel with places for them."""
+"""Expressions -> bodies of C functions, and the templates of a kernel into which they are inserted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigsight.simulate.straight_line import StraightLine, needed_steps
 
 _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 
-# Each is written where it is called: some compilers warn of those that are not.
+# Only functions that are called are written: some compilers warn of unused ones.
 FUNCTIONS = {
     "sign_of": "static inline double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }",
     "positive": "static inline double positive(double value) { return value > 0.0 ? value : 0.0; }",
@@ -24,7 +24,7 @@ FUNCTIONS = {
 
 
 def template(name: str) -> str:
-    """Return the text of one of the fixed parts of a kernel."""
+    """Return the text of one of the templates of a kernel."""
     return files("rigsight.simulate").joinpath("templates", name).read_text("utf-8")
 
 
@@ -36,17 +36,17 @@ def filled(text: str, fragments: Mapping[str, str]) -> str:
 
 
 def real(name: str) -> sp.Symbol:
-    """Return a symbol that is C already."""
+    """Return a symbol whose name is C code already."""
     return sp.Symbol(name, real=True)
 
 
 def symbols(array: str, count: int) -> list[sp.Symbol]:
-    """Return the elements of an array of C as symbols."""
+    """Return the elements of a C array as symbols."""
     return [real(element) for element in elements(array, count)]
 
 
 def elements(array: str, count: int) -> list[str]:
-    """Return the elements of an array of C."""
+    """Return the elements of a C array as text."""
     return [f"{array}[{i}]" for i in range(count)]
 
 
@@ -59,7 +59,7 @@ def function_body(
     lanes: bool = False,
     steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
 ) -> str:
-    """Return the body of a function; arguments that its equations happen not to read are marked for the compiler."""
+    """Return the body of a function; arguments that its equations do not use are marked as unused for the compiler."""
     needed = needed_steps(expressions, steps)
     read = set().union(*(e.free_symbols for e in (*expressions, *needed.values())))
     for symbol in sorted(read - set(needed) - set(names), key=str):
@@ -71,7 +71,7 @@ def function_body(
 
 
 def lane_body(targets: Sequence[str], line: StraightLine, names: Mapping[sp.Symbol, str]) -> str:
-    """Return the body of a function of lanes that computes expressions in parts."""
+    """Return the body of a function of vector lanes that computes expressions in parts."""
     return _marked((), C_LANES.written(targets, line, names), ())
 
 

@@ -1,4 +1,4 @@
-"""Derivatives of accelerations that are found by elimination.
+"""Derivatives of accelerations that are computed by elimination.
 
 The linear system is differentiated instead of the elimination: ``mass @ da = d(loads) - d(mass) @ a``, which is solved with the
 existing factors.
@@ -18,18 +18,18 @@ from rigsight.simulate.straight_line import straight_line
 
 @dataclass(frozen=True)
 class EliminatedForms:
-    """Changes of expressions that hold accelerations.
+    """Changes of expressions that contain accelerations.
 
     Attributes
     ----------
     factors
-        Symbol -> the derivative or part of the elimination that it stands for; they are the same for all changes.
+        Symbol -> the derivative or part of the elimination that it denotes; they are the same for all changes.
     parts
-        Symbols in the factors -> what they are, in any order.
+        Symbols in the factors -> their expressions, in any order.
     steps
-        Symbols in the sums -> what they are, of factors, constants and changes: the changes of the accelerations.
+        Symbols in the sums -> their expressions in factors, constants and changes: the changes of the accelerations.
     sums
-        Change of each expression, of factors, constants, changes and steps.
+        Change of each expression, in terms of factors, constants, changes and steps.
     """
 
     factors: Mapping[sp.Symbol, sp.Expr]
@@ -45,18 +45,18 @@ def eliminated_forms(
     elimination: Elimination,
     steps: Mapping[sp.Symbol, sp.Expr],
 ) -> EliminatedForms:
-    """Return how expressions of accelerations change with what they and these hold, their signs held.
+    """Return the changes of expressions with accelerations due to changes of symbols, with all signs held constant.
 
     Parameters
     ----------
     expressions
-        What changes.
+        The expressions.
     changes
         Symbol -> its change.
     constants
-        Symbols that may stand in the sums as they are.
+        Symbols that may appear in the sums themselves.
     elimination
-        How the accelerations are found.
+        The elimination that gives the accelerations.
     steps
         Masses, loads and the steps of the elimination.
     """

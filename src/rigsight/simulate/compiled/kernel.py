@@ -1,4 +1,4 @@
-"""Compiled kernels as functions of arrays. While one runs, other threads of Python run too."""
+"""Compiled kernels as functions of arrays. While one runs, other Python threads can run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LONG, _DOUBLE, _INT = ctypes.c_long, ctypes.c_double, ctypes.c_int
 
 
 class _FittedRecord(ctypes.Structure):
-    """``fitted_record`` of the kernel."""
+    """The C structure ``fitted_record`` of the kernel."""
 
     _fields_ = (
         ("c", _DOUBLES), ("n_pieces", _LONG), ("length", _DOUBLE), ("per_sample", _LONG), ("substeps", _INTS),
@@ -42,13 +42,13 @@ class FittedRecord:
     measured
         Outputs, shape (n_samples, n_outputs).
     weights
-        By which residuals are multiplied, shape (n_outputs,); 0 where an output was not measured.
+        Factors of the residuals, shape (n_outputs,); 0 for an output that was not measured.
     """
 
     def __init__(
         self, held: HeldInput, substeps: NDArray[np.intc], measured: Floats, weights: Floats
     ) -> None:
-        # The kernel reads these where they are: they have to live as long as their addresses.
+        # The kernel reads these arrays by their addresses, so they must be kept as long as this object.
         self._arrays = (_doubles(held.coefficients), substeps, _doubles(measured), _doubles(weights))
         c, steps, values, factors = self._arrays
         self.as_c = _FittedRecord(
@@ -65,7 +65,7 @@ class Kernel:
     path
         Shared library.
     structure
-        What it was compiled from.
+        The structure that was compiled.
 
     Raises
     ------
@@ -92,7 +92,7 @@ class Kernel:
             _DOUBLES, _LONG, _DOUBLE, _LONG, _INT, _DOUBLE, _DOUBLES, _DOUBLES, _DOUBLE, _DOUBLES, _LONG, _INTS,
         ]  # fmt: skip
         self.carries_tangents = hasattr(loaded, "tangent_equations")
-        """Whether `tangent_equations` and `simulate_tangents` can be called, or else `normal_equations`."""
+        """True if `tangent_equations` and `simulate_tangents` are available, False if `normal_equations` is."""
         if structure.histories:
             return
         self._lanes = loaded.simulate_lanes
@@ -135,14 +135,14 @@ class Kernel:
         n_samples
             Samples of the input.
         steps
-            Where to write how many steps each piece of the input took, shape (n_pieces,).
+            Array for the number of steps taken in each piece of the input, shape (n_pieces,).
 
         Returns
         -------
         status
-            0, or why it stopped: 1 for too many steps, 2 for a diverging motion, 3 for lack of memory.
+            0 for success; 1 too many steps, 2 diverging motion, 3 not enough memory.
         out
-            What is computed at each sample, shape (n_samples, n_computed).
+            Computed outputs at each sample, shape (n_samples, n_computed).
         state
             States at the end, shape (n_states,).
         """
@@ -178,7 +178,7 @@ class Kernel:
 
         Returns
         -------
-        Shape (n_samples, n_computed, n_sets); a set that diverges holds NaN or infinity.
+        Shape (n_samples, n_computed, n_sets); NaN or infinity for a set that diverges.
         """
         c, p = _doubles(held.coefficients), _doubles(p)
         n_sets = p.shape[1]
@@ -193,12 +193,12 @@ class Kernel:
         return out
 
     def normal_equations(self, records: Sequence[FittedRecord], p: Floats, states: Floats) -> Floats:
-        """Simulate parameter sets on records, and return the products of what least squares needs of them.
+        """Simulate parameter sets on records, and return the products that least squares needs.
 
         Parameters
         ----------
         records
-            What is fitted.
+            The fitted records.
         p
             Parameters, shape (n_parameters, n_sets).
         states
@@ -207,7 +207,7 @@ class Kernel:
         Returns
         -------
         Shape (n_records, n_sets, n_sets): products, summed over outputs and samples, of the weighted residual of the first set
-        and of the weighted outputs of the first set minus those of each other one; NaN or infinity where a set diverges.
+        and of the weighted outputs of the first set minus those of each other one; NaN or infinity for a set that diverges.
 
         Raises
         ------
@@ -237,11 +237,11 @@ class Kernel:
         Parameters
         ----------
         records
-            What is fitted.
+            The fitted records.
         p
             Parameters, shape (n_parameters,).
         dp
-            Their derivatives by each direction, shape (n_parameters, n_directions).
+            Their derivatives along each direction, shape (n_parameters, n_directions).
         states
             States at the start, shape (n_records, n_states).
         dstates
@@ -250,7 +250,7 @@ class Kernel:
         Returns
         -------
         Shape (n_records, 1 + n_directions, 1 + n_directions): products, summed over outputs and samples, of the weighted
-        residual and its derivatives; NaN or infinity where the simulation diverges.
+        residual and its derivatives; NaN or infinity if the simulation diverges.
 
         Raises
         ------
@@ -273,7 +273,7 @@ class Kernel:
         held
             Input between its samples.
         p, dp
-            As of `tangent_equations`.
+            As for `tangent_equations`.
         state, dstate
             States at the start, shape (n_states,), and their derivatives, shape (n_states, n_directions).
         substeps
@@ -283,7 +283,7 @@ class Kernel:
 
         Returns
         -------
-        Shape (n_samples, n_computed, 1 + n_directions): what is computed at each sample, and its derivatives.
+        Shape (n_samples, n_computed, 1 + n_directions): computed outputs at each sample, and their derivatives.
 
         Raises
         ------
@@ -296,7 +296,7 @@ class Kernel:
         return out
 
     def _check_bodies(self) -> None:
-        """Raise what another program reported while the kernel asked it."""
+        """Raise the error that another simulator reported while the kernel called it."""
         if self._bodies is not None:
             self._bodies.program.check()
 

@@ -14,10 +14,10 @@ from rigsight.simulate.structure import Structure
 _kernels: dict[str, Kernel] = {}
 _by_identity: dict[int, tuple[Structure, str]] = {}
 _texts: dict[int, tuple[Structure, str]] = {}
-"""C texts of structures that were asked for and have no kernel here yet: printing one takes some 20 ms."""
+"""C texts of structures whose kernel is not loaded yet; printing a text takes some 20 ms."""
 _lock = threading.Lock()
 _made: dict[str, threading.Lock] = {}
-"""Who makes a kernel; another one may be compiled at the same time."""
+"""A lock for each kernel, so that it is compiled only once while others may be compiled at the same time."""
 
 
 def kernel_of(structure: Structure) -> Kernel:
@@ -37,7 +37,7 @@ def kernel_of(structure: Structure) -> Kernel:
         known = _loaded(structure)
         if known is not None:
             return known
-        # Threads write texts one after the other, which takes no longer: this is all Python. Compilers run side by side.
+        # Threads write texts one after the other, which is no slower in pure Python. The compilers run in parallel.
         text = _text(structure)
         key = hashlib.sha256(text.encode()).hexdigest()
         own = _made.setdefault(key, threading.Lock())
@@ -55,7 +55,7 @@ def _loaded(structure: Structure) -> Kernel | None:
 
 
 def compiled(structure: Structure) -> bool:
-    """Return True if this machine holds the machine code of a structure's kernels already."""
+    """Return True if the machine code of a structure's kernels is loaded or in the cache."""
     if _loaded(structure) is not None:
         return True
     text = _text(structure)

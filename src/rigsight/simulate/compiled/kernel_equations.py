@@ -54,14 +54,14 @@ class KernelEquations:
         self.limits = dict(zip(limited_states, self._groups["limits"], strict=True))
 
     def text(self, parameters: str, parameter_names: Sequence[str]) -> str:
-        """Return the part of a C file that holds the equations.
+        """Return the part of a C file that contains the equations.
 
         Parameters
         ----------
         parameters
-            How a function declares the parameters, ``const double *p``.
+            Declaration of the parameters in a function, ``const double *p``.
         parameter_names
-            How each is written there, ``p[0]``.
+            Name of each parameter in the code, ``p[0]``.
         """
         structure, frictions = self.structure, self.frozen.frictions
         single, dependent = self.frozen.single_friction, self.frozen.dependent_modes
@@ -189,7 +189,7 @@ class KernelEquations:
 
     @cached_property
     def lane_names(self) -> dict[sp.Symbol, str]:
-        """How C calls each symbol where sets are side by side."""
+        """Name in C of each symbol, for sets side by side."""
         signs = {
             FrozenStructure.friction_sign(i): f"friction_sign[{i}]"
             if self.has_several_frictions
@@ -200,7 +200,7 @@ class KernelEquations:
 
     @property
     def outputs(self) -> list[sp.Expr]:
-        """The outputs, of states, inputs and constants."""
+        """The outputs, in terms of states, inputs and constants."""
         return self._groups["outputs"]
 
     @property
@@ -210,13 +210,13 @@ class KernelEquations:
 
     @cached_property
     def lane_rates(self) -> list[sp.Expr]:
-        """The rates where sets are side by side."""
+        """The rates for sets side by side."""
         rates = self._groups["live_rates"]
         return [sp.Integer(0) if i in self._followed else rate for i, rate in enumerate(rates)]
 
     @cached_property
     def lane_steps(self) -> dict[sp.Symbol, sp.Expr]:
-        """What is computed before rates and outputs where sets are side by side, as `Structure.steps`."""
+        """Intermediate values computed before rates and outputs for sets side by side, as `Structure.steps`."""
         return dict(zip(self.frozen.steps, self._groups["live_steps"], strict=True))
 
     def _put_back(self, array: str, limits: Mapping[int, sp.Expr]) -> tuple[list[str], list[sp.Expr]]:
@@ -250,7 +250,7 @@ class KernelEquations:
 
     @staticmethod
     def _plus_own(names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Expr]) -> dict[sp.Symbol, str]:
-        """Let symbols that are C already stand for themselves."""
+        """Add symbols whose names are C code already."""
         own = {s for e in expressions for s in e.free_symbols if s not in names}
         return {**names, **{s: s.name for s in own}}
 
@@ -264,7 +264,7 @@ class KernelEquations:
 
     @property
     def reads_late(self) -> str:
-        """For each signal that acts late which of them it reads itself, as an array of C."""
+        """A C array with, for each delayed signal, the flags of the delayed signals that it depends on."""
         histories = self.structure.histories
         rows = [
             ", ".join(str(int(other.symbol in own.signal.free_symbols)) for other in histories)
@@ -273,7 +273,7 @@ class KernelEquations:
         return ", ".join(f"{{{row}}}" for row in rows)
 
     def _slope(self, expression: sp.Expr) -> sp.Expr:
-        """Return the total derivative of an expression by time, between events."""
+        """Return the total derivative of an expression with respect to time, between events."""
         along = {
             **dict(zip(self.structure.states, self._rate_symbols, strict=True)),
             TIME: sp.Integer(1),
@@ -289,25 +289,26 @@ class KernelEquations:
 
     @property
     def friction_is_shown(self) -> bool:
-        """Whether an output holds the sign of a velocity that dry friction can hold: then it shows what it holds with."""
+        """Whether an output contains the sign of a velocity that dry friction can hold, and so shows the holding force."""
         signs = {self.frozen.modes[own.mode] for own in self.frozen.frictions}
         return any(output.free_symbols & signs for output in self.frozen.outputs)
 
     @property
     def has_several_frictions(self) -> bool:
-        """Whether dry friction is more than one that holds one velocity, of which nothing else needs to know."""
+        """Whether dry friction is more than a single one that holds one velocity and affects no other velocity or output."""
         frozen = self.frozen
         return bool(frozen.frictions) and (frozen.single_friction is None or self.friction_is_shown)
 
     def _live_rates(self) -> list[sp.Expr]:
-        """Return the rates with signs as they come, for steps that are not cut at events."""
+        """Return the rates with the current signs, for steps that are not divided at events."""
         return [self._live(equation.rate) for equation in self.structure.remembering_equations]
 
     def _live(self, expression: sp.Expr) -> sp.Expr:
-        """Return a part of the equations with signs as they come.
+        """Return a part of the equations with the current signs.
 
-        What cannot leave a range is seen at its end there: the state itself runs on within a substep and is put back at its end,
-        exact as long as its rate keeps its sign. The sign of a velocity that dry friction can hold is an argument.
+        A state with a limited range enters the equations with its limited value. The state itself is integrated without the limit
+        within a substep and limited at its end, which is exact as long as its rate keeps its sign. The sign of a velocity that
+        dry friction can hold is an argument.
         """
         held = {
             e.symbol: limited(e.symbol, e.limit)
@@ -318,7 +319,7 @@ class KernelEquations:
 
     @cached_property
     def _followed(self) -> dict[int, tuple[str, str]]:
-        """States with a range whose rate is that of a motion: how C writes the motion before and after."""
+        """States with a limited range that follow a motion, with the names in C of that motion before and after a substep."""
         motions: dict[sp.Expr, tuple[str, str]] = {
             input_symbols(i)[1]: (f"from->u[{i}]", f"now->u[{i}]") for i in range(self.structure.n_inputs)
         }

@@ -11,7 +11,7 @@ import sympy as sp
 from rigsight.simulate.kinks import absolute
 
 _TINY = sp.Float(1e-300)
-"""Beside a magnitude that is divided by or of which a logarithm is taken: at zero it is then multiplied by zero."""
+"""Added to a magnitude in a divisor or a logarithm: where the magnitude is zero, the finite result is multiplied by zero."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class LinearForms:
     Attributes
     ----------
     factors
-        Symbol -> the derivative it stands for; they are the same for all changes.
+        Symbol -> the derivative that it denotes; they are the same for all changes.
     sums
-        Change of each expression, of factors, constants and changes.
+        Change of each expression, in terms of factors, constants and changes.
     """
 
     factors: Mapping[sp.Symbol, sp.Expr]
@@ -33,16 +33,16 @@ class LinearForms:
 def linear_forms(
     expressions: Sequence[sp.Expr], changes: Mapping[sp.Symbol, sp.Expr], constants: set[sp.Symbol]
 ) -> LinearForms:
-    """Return how expressions change with what they hold, their signs held.
+    """Return the changes of expressions due to changes of their symbols, with all signs held constant.
 
     Parameters
     ----------
     expressions
-        What changes.
+        The expressions.
     changes
         Symbol -> its change.
     constants
-        Symbols that may stand in the sums as they are.
+        Symbols that may appear in the sums themselves.
     """
     factors: dict[sp.Expr, sp.Symbol] = {}
 
@@ -61,8 +61,8 @@ def linear_forms(
 
 @lru_cache(maxsize=16_384)
 def slope(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Return a derivative that is finite where a magnitude is zero; the jump of a sign is an event, or none."""
-    # Term by term: sympy takes as long for a derivative that is zero as for another one.
+    """Return a derivative that is finite where a magnitude is zero; the derivative of a sign is taken as zero."""
+    # Term by term, because sympy takes as long for a derivative that is zero as for another one.
     terms = [term for term in sp.Add.make_args(expression) if symbol in term.free_symbols]
     total = sp.Add(*(_of_term(term, symbol) for term in terms))
     if total.is_Atom:
@@ -76,7 +76,7 @@ def _of_term(term: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     if term.is_Mul and symbol in term.args:
         others = [factor for factor in term.args if factor != symbol]
         if not any(symbol in factor.free_symbols for factor in others):
-            # What most parts of long expressions are; sympy takes ten times as long.
+            # Most parts of long expressions have this form, for which sympy takes ten times as long.
             return sp.Mul(*others)
     return sp.diff(term, symbol)
 
@@ -93,5 +93,5 @@ def _guarded(part: sp.Expr) -> sp.Expr:
     if isinstance(part, sp.log):
         return sp.log(part.args[0] + _TINY)
     whole = part.exp + 1
-    # The power itself is there already: another logarithm and exponential would cost as much as all else.
+    # The power itself is computed anyway: another logarithm and exponential would cost as much as all other operations.
     return part.base**whole / (part.base + _TINY) if whole.free_symbols else (part.base + _TINY) ** part.exp

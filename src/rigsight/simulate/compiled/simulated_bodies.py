@@ -1,4 +1,4 @@
-"""Quantities computed by another program, as C functions that the equations call."""
+"""Quantities computed by another simulator, as C functions that the equations call."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rigsight.simulators.bodies import template
 
 
 def bodies_text(structure: Structure) -> str:
-    """Return the C text of a structure's simulated bodies; nothing where there are none."""
+    """Return the C text of a structure's simulated bodies; empty if there are none."""
     bodies = structure.rig.mechanism.bodies
     return "" if bodies is None else bodies.c_text
 
@@ -28,7 +28,7 @@ def include_folders(structure: Structure) -> tuple[str, ...]:
 
 
 def connect(structure: Structure, library: ctypes.CDLL) -> None:
-    """Give a loaded kernel what it asks another program with."""
+    """Give a loaded kernel the functions by which it calls another simulator."""
     bodies = structure.rig.mechanism.bodies
     if bodies is not None:
         bodies.program.connect(library)

@@ -20,14 +20,15 @@ _EARLIER = sp.Symbol("earlier input", real=True)
 
 
 def carries_tangents(equations: KernelEquations) -> bool:
-    """Return whether derivatives are carried along with the motion, instead of taken as differences of sets side by side.
+    """Return True if derivatives are integrated with the motion, False if they are differences of sets side by side.
 
-    Carried along they cost two thirds more where all is sums and products, because a difference needs no derivatives by the
-    constants, and half as much where functions are costly, because these are computed once. Under dry friction they cost
-    the same, and a difference would need a long step: reversals are located to a tolerance. Where states have ends the
-    derivative at one place tells little of the next, however exact it is. Joints that stick and let go together take differences:
-    how one lets go changes when the next does. Where a force jumps at a place, as that of a damper behind a play, derivatives
-    along the motion do not know that another motion gets there sooner.
+    Integrated derivatives cost two thirds more if the equations are sums and products, because differences need no derivatives
+    by the constants, and half as much if functions are costly, because these are computed once. With dry friction both cost the
+    same, but differences would need a long step, because reversals are located to a tolerance. Differences are used in these
+    cases: for states with a limited range, because an exact derivative is valid only in a small neighborhood; for several joints
+    that stick and slip, because the release of one changes the instant at which the next is released; for a force that jumps at a
+    position, such as that of a damper behind a play, because integrated derivatives do not account for a changed motion reaching
+    the position sooner; for delayed sensors, whose readings are computed after the simulation.
     """
     structure = equations.structure
     if (
@@ -44,9 +45,9 @@ def carries_tangents(equations: KernelEquations) -> bool:
 
 
 def tangent_fragments(equations: KernelEquations) -> dict[str, str]:
-    """Return how the equations change with states and constants, by key in the template.
+    """Return the changes of the equations with states and constants, by key in the template.
 
-    Of each group of equations there are factors, the same for all directions, and changes: sums of products with them.
+    Each group of equations has factors, which are the same for all directions, and changes: sums of products with them.
     """
     structure, n = equations.structure, len(equations.structure.states)
     of_states = dict(zip(structure.states, symbols("z", n), strict=True))
@@ -92,7 +93,7 @@ def _forms(
 
 
 def _prepare_changes(equations: KernelEquations) -> str:
-    """Return how constants change with parameters: each common part with its change behind it."""
+    """Return the changes of constants with parameters: each common part, followed by its change."""
     parts = (sp.Symbol(f"part{i}", real=True) for i in range(10_000))
     shared, reduced = sp.cse(list(equations.constants.values()), symbols=parts, optimizations=None)
     names = {symbol: f"p[{i}]" for i, symbol in enumerate(equations.structure.parameter_symbols)}

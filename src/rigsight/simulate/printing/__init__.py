@@ -1,1 +1,1 @@
-"""How are the equations of a structure written in each language? One file per language, and what they share."""
+"""Printing of the equations of a structure in each language: one file per language, and common parts."""

@@ -1,4 +1,4 @@
-"""How is a symbolic expression written in C: for one parameter set, and for several side by side?"""
+"""Printing of symbolic expressions in C: for one parameter set, and for several side by side."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from sympy.printing.c import C99CodePrinter
 from rigsight.simulate.printing.language import Language, PowersAsProducts
 
 _LONGEST_CHAIN = 3
-"""Terms that are added one after the other."""
+"""Number of terms up to which a sum is added one after the other."""
 
 
 class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
-    """First argument, kept within plus and minus the second: two instructions, where `clamp` would print six."""
+    """First argument, limited to plus and minus the second: two instructions, where `clamp` would need six."""
 
     is_real = True
 
 
 class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
-    """C99 with products for small powers; ``sign_of``, ``positive`` and ``within`` are functions of the file."""
+    """C99 with products for small powers; ``sign_of``, ``positive`` and ``within`` are functions in the generated file."""
 
     def _print_Rational(self, expr: sp.Rational) -> str:  # noqa: N802
         return repr(float(expr))
 
     def _print_Integer(self, expr: sp.Integer) -> str:  # noqa: N802
-        # Integers beyond those of C would overflow; a double holds them.
+        # Integers beyond the range of C would overflow; a double can represent them.
         return f"{int(expr)}.0" if abs(int(expr)) < 10**15 else repr(float(expr))
 
     def _print_NumberSymbol(self, expr: sp.Expr) -> str:  # noqa: N802
@@ -33,7 +33,7 @@ class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
     _print_Pi = _print_Exp1 = _print_NumberSymbol  # noqa: N815
 
     def _print_Add(self, expr: sp.Add, order: str | None = None) -> str:  # noqa: N802
-        # A compiler may not reorder a sum: each term of a long one would wait for all before it.
+        # A compiler may not reorder a sum, so each term of a long one would wait for all earlier ones.
         terms = self._as_ordered_terms(expr, order)
         if len(terms) <= _LONGEST_CHAIN:
             return str(super()._print_Add(expr, order))
@@ -64,7 +64,7 @@ class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
 
 
 class LanePrinter(CPrinter):
-    """The same for vectors: every function is the vector's own, with a ``v_`` in front, and takes vectors alone."""
+    """The same for vectors: every function has a prefix ``v_`` and takes only vectors."""
 
     def doprint(self, expr: sp.Expr, assign_to: str | None = None) -> str:
         """Return an expression as a vector."""
@@ -82,10 +82,10 @@ class LanePrinter(CPrinter):
         return self._call(type(expr).__name__, *expr.args)
 
     def _print_Add(self, expr: sp.Add, order: str | None = None) -> str:  # noqa: N802
-        # Vectors of many sets hide the wait.
+        # The vectors of many sets hide this latency.
         return str(C99CodePrinter._print_Add(self, expr, order))
 
-    # sympy's C printer knows these by name, and would print the scalar function.
+    # sympy's C printer has methods for these, which would print the scalar function.
     _print_sin = _print_cos = _print_tan = _print_asin = _print_acos = _print_atan = _print_atan2 = (
         _print_Function
     )

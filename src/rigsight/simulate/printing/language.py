@@ -15,7 +15,7 @@ _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 
 
 class PowersAsProducts:
-    """Small powers as products: `pow` is slow and, in a loop of controls, of no known duration."""
+    """Small powers as products, because `pow` is slow and, in a control loop, has no guaranteed duration."""
 
     def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: ARG002, N802
         printer: Any = self
@@ -27,7 +27,7 @@ class PowersAsProducts:
 
 @dataclass(frozen=True)
 class Language:
-    """How statements look: the printer, a fresh variable and an assignment."""
+    """Syntax of a language: its printer, and the forms of a declaration and of an assignment."""
 
     printer: Any
     declared: str
@@ -55,7 +55,7 @@ class Language:
         names
             Name in the code of each symbol.
         steps
-            Symbols without a name -> what they are; those that the expressions read are computed first.
+            Symbols without a name -> their expressions; those that are needed are computed first.
         """
         if needed_steps(expressions, steps):
             return self.written(targets, straight_line(expressions, steps), names)
@@ -80,7 +80,7 @@ class Language:
         line
             Right-hand sides.
         names
-            Name in the code of each symbol that is no part.
+            Name in the code of each symbol that is not a part.
         """
         own = {part: part_name(part) for part in line.parts}
         every = {**names, **own}
@@ -92,13 +92,13 @@ class Language:
 
 
 def part_name(part: sp.Symbol) -> str:
-    """Return how code calls a part of an expression; in exports no name of a rig or an effect is like that."""
+    """Return the name in code of a part of an expression; in exports it differs from all names of rigs and effects."""
     return f"part_{part.name.replace(' ', '_')}"
 
 
 @lru_cache(maxsize=16_384)
 def _printed(printer: Any, expression: sp.Expr) -> str:
-    """Return a part as code; those of a rig are the same whatever effects act on it."""
+    """Return a part as code, cached because those of a rig do not depend on its effects."""
     return str(printer.doprint(_plain(expression)))
 
 

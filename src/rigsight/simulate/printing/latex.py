@@ -1,4 +1,4 @@
-"""How are equations written as LaTeX?"""
+"""Printing of equations as LaTeX."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rigsight.simulate.printing.reading_order import ReadingOrder
 from rigsight.simulate.printing.shown import ShownEquation
 
 _DIGITS = 6
-"""Of numbers that stand in an effect's equation; those of parameters stand beside it."""
+"""Significant digits of numbers in an effect's equation; values of parameters are given separately."""
 _JOINED = {"": "", "+": " + ", "-": " - "}
 _WITHIN = r",\quad \left|%s\right| \leq %s"
 _ACCENTS = ("", r"\dot", r"\ddot")
 
 
 def latex_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]) -> tuple[str, str]:
-    """Return both sides of an equation as LaTeX of mathematics.
+    """Return both sides of an equation as LaTeX for math mode.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def latex_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]
 
 
 def latex_name(name: ShownName) -> str:
-    r"""Return a name as LaTeX of mathematics: ``k_{c}``, ``\dot{\psi}``."""
+    r"""Return a name as LaTeX for math mode: ``k_{c}``, ``\dot{\psi}``."""
     letter = name.letter
     if letter in GREEK:
         letter = f"\\{letter}"
@@ -47,13 +47,13 @@ def latex_name(name: ShownName) -> str:
 
 
 def latex_text(text: str, *, math: bool = False) -> str:
-    """Return text with the characters escaped that LaTeX reads itself; in mathematics ``^`` stays a power."""
+    """Return text with the special characters of LaTeX escaped; in math mode ``^`` remains a power."""
     special = r"([&%$#_{}])" if math else r"([&%$#_{}^])"
     return re.sub(special, r"\\\1", text.replace("\\", "/")).replace("\\^", r"\^{}")
 
 
 class LatexPrinter(ReadingOrder, SympyLatexPrinter):  # type: ignore[misc]
-    """sympy's LaTeX with the names that people read.
+    """sympy's LaTeX with the displayed names.
 
     Parameters
     ----------

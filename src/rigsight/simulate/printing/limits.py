@@ -1,4 +1,4 @@
-"""Sums of positive parts that represent `min`, `max` and `clip`, which are shown instead."""
+"""Sums of positive parts that represent `min`, `max` and `clip`, which are displayed instead."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from rigsight.effects.symbols import positive_part
 
 _MIN, _MAX, _CLIP = map(sp.Function, ("min", "max", "clip"))
 SHOWN_LIMITS = ("min", "max", "clip")
-"""Names of the functions that stand for them: of two numbers, of two, and of a number and the ends of its range."""
+"""Names of the displayed functions: `min` and `max` of two values, `clip` of a value and the ends of its range."""
 
 
 def with_limits(expression: sp.Expr) -> sp.Expr:
-    """Return an expression with its limits by name.
+    """Return an expression with its limits as named functions.
 
     Parameters
     ----------
     expression
-        Any expression; `positive_part` is how the equations hold a limit.
+        Any expression; limits in the equations are sums of `positive_part`.
     """
     if not expression.has(positive_part):
         return expression
@@ -29,12 +29,12 @@ def with_limits(expression: sp.Expr) -> sp.Expr:
 
 
 def _clamped(total: sp.Expr) -> sp.Expr | None:
-    """Read ``x - positive_part(x - high) + positive_part(low - x)``."""
+    """Recognize ``x - positive_part(x - high) + positive_part(low - x)``."""
     for down in _parts(total, -1):
         for up in _parts(total, 1):
             x = total + down - up
             high, low = x - down.args[0], x + up.args[0]
-            # With its ends the wrong way round the sum is another number.
+            # If the lower end is above the upper one, the sum differs from a clip.
             ordered = low == -high or (high - low).is_nonnegative
             if ordered and _bounds(high, x) and _bounds(low, x):
                 return _CLIP(with_limits(x), low, high)
@@ -42,7 +42,7 @@ def _clamped(total: sp.Expr) -> sp.Expr | None:
 
 
 def _smaller(total: sp.Expr) -> sp.Expr | None:
-    """Read ``a - positive_part(a - high)``."""
+    """Recognize ``a - positive_part(a - high)``."""
     for part in _parts(total, -1):
         a = total + part
         high = a - part.args[0]
@@ -55,7 +55,7 @@ def _smaller(total: sp.Expr) -> sp.Expr | None:
 
 
 def _larger(total: sp.Expr) -> sp.Expr | None:
-    """Read ``low + positive_part(a - low)``."""
+    """Recognize ``low + positive_part(a - low)``."""
     for part in _parts(total, 1):
         low = total - part
         a = low + part.args[0]
@@ -69,5 +69,5 @@ def _parts(total: sp.Expr, sign: int) -> list[sp.Expr]:
 
 
 def _bounds(bound: sp.Expr, x: sp.Expr) -> bool:
-    """Return True for what may be an end of the range of x: it has nothing of x in it."""
+    """Return True if an expression can be an end of the range of x: it has no symbol in common with x."""
     return x != 0 and not bound.has(positive_part) and not bound.free_symbols & x.free_symbols

@@ -1,4 +1,4 @@
-"""How are equations written as MathML, which browsers draw and read aloud?"""
+"""Printing of equations as MathML, which browsers display and read aloud."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def mathml_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName
 
 
 class MathMLPrinter(ReadingOrder, MathMLPresentationPrinter):  # type: ignore[misc]
-    """sympy's MathML with the names that people read.
+    """sympy's MathML with the displayed names.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How is an expression written in MATLAB, so that Octave runs it too?"""
+"""Printing of expressions in MATLAB, in a form that Octave can run, too."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rigsight.simulate.printing.language import Language
 
 
 class MatlabPrinter(OctaveCodePrinter):  # type: ignore[misc]
-    """MATLAB, of scalars, so that no operator needs its dot."""
+    """MATLAB for scalars, so that operators need no dot."""
 
     def _print_Mul(self, expr: sp.Mul) -> str:  # noqa: N802
         return str(super()._print_Mul(expr)).replace(".*", "*").replace("./", "/")

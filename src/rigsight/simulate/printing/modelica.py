@@ -1,4 +1,4 @@
-"""How is an expression written in Modelica?"""
+"""Printing of expressions in Modelica."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rigsight.simulate.printing.language import Language
 
 
 class ModelicaPrinter(C99CodePrinter):  # type: ignore[misc]
-    """Modelica: ``^`` for powers; ``abs``, ``sign`` and ``max`` are its own and find their events by themselves."""
+    """Modelica: ``^`` for powers; ``abs``, ``sign`` and ``max`` are built in and generate their own events."""
 
     def _print_Pow(self, expr: sp.Pow) -> str:  # noqa: N802
         if expr.exp == -1:

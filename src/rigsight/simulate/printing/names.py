@@ -17,7 +17,7 @@ GREEK = frozenset({
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "rho", "sigma",
     "tau", "phi", "chi", "psi", "omega",
 })  # fmt: skip
-"""Names that are letters; a language writes them as such."""
+"""Names of Greek letters, which are printed as letters."""
 _LETTERS = {
     Kind.SPRING: ("T", "spring"),
     Kind.TORQUE: ("T",),
@@ -29,14 +29,14 @@ _LETTERS = {
 
 @dataclass(frozen=True)
 class ShownName:
-    """A name as people read it.
+    """A displayed name.
 
     Attributes
     ----------
     letter
-        What stands on the line: a letter, the name of a Greek one, or a word.
+        The name without subscript: a letter, the name of a Greek letter, or a word.
     below
-        Marks and words below it.
+        Words of the subscript.
     dots
         Number of derivatives with respect to time.
     """
@@ -47,7 +47,7 @@ class ShownName:
 
     @property
     def plain(self) -> str:
-        """The name on one line; no two names share it, and it sorts like the declared one."""
+        """The name on one line; it is unique and sorts like the declared name."""
         return "_".join((self.letter, *self.below)) + "'" * self.dots
 
     def dotted(self) -> ShownName:
@@ -55,12 +55,12 @@ class ShownName:
         return replace(self, dots=self.dots + 1)
 
     def beside(self, word: str) -> ShownName:
-        """Return the name with one more word below."""
+        """Return the name with one more word in the subscript."""
         return replace(self, below=(*self.below, word))
 
 
 def named(expression: sp.Expr, names: Mapping[sp.Symbol, ShownName]) -> sp.Expr:
-    """Return an expression whose symbols are called as people read them, so that a printer puts them in that order."""
+    """Return an expression whose symbols have their displayed names, so that a printer sorts by these names."""
     return expression.xreplace({s: sp.Symbol(name.plain, real=True) for s, name in names.items()})
 
 
@@ -70,7 +70,7 @@ def in_words(name: str) -> str:
 
 
 def declared_name(name: str) -> ShownName:
-    """Return a declared name as people read it: ``k_c`` is k with c below, ``z0`` is z with 0 below."""
+    """Return the displayed form of a declared name: ``k_c`` is k with subscript c, ``z0`` is z with subscript 0."""
     letter, _, below = name.partition("_")
     if match := re.fullmatch(r"([A-Za-z])(\d+)", letter):
         return ShownName(match[1], tuple(filter(None, (match[2], below.replace("_", " ")))))
@@ -78,7 +78,7 @@ def declared_name(name: str) -> ShownName:
 
 
 def rate_symbol(symbol: sp.Symbol) -> sp.Symbol:
-    """Return the symbol that stands for the rate of a state."""
+    """Return the symbol of the rate of a state."""
     return sp.Symbol(f"d({symbol.name})", real=True)
 
 
@@ -90,12 +90,12 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
     structure
         Rig and effects.
     label
-        An effect's name for people.
+        Returns the displayed form of an effect's name.
 
     Notes
     -----
-    Where two effects, or an effect and the rig, call something the same, those of effects carry their effect's name below. A
-    prescribed motion bears the name of the input that it follows.
+    If two effects, or an effect and the rig, use the same name, that of an effect gets the effect's name as a subscript. A
+    prescribed motion has the name of the input that it follows.
     """
     rig, tree = structure.rig, structure.tree
     names = {TIME: ShownName("t"), **_input_names(rig)}
@@ -117,7 +117,7 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
             letter, *words = _LETTERS[definition.kind]
             names[definition.symbol] = ShownName(letter, (*words, label(definition.owner)))
         else:
-            # The place is that of the signal; it is said where two effects change signals of one name.
+            # The signal's name implies the place, which is added only if two effects change signals of the same name.
             before, kind = signals[definition.owner], label(kind_of(definition.owner))
             short = before.beside(kind)
             names[definition.symbol] = (
@@ -143,7 +143,7 @@ def _input_names(rig: Rig) -> dict[sp.Symbol, ShownName]:
 
 
 def _owned(structure: Structure) -> list[tuple[sp.Symbol, str, str | None]]:
-    """Return parameters and states beside the motion: symbol, own name, and the effect that it belongs to."""
+    """Return parameters, and states other than the motion: symbol, own name, and the effect to which it belongs."""
     of_effects = {
         structure.parameter_name(effect, parameter.name): (parameter.name, effect.name)
         for effect in structure.effects
@@ -155,7 +155,7 @@ def _owned(structure: Structure) -> list[tuple[sp.Symbol, str, str | None]]:
 
 
 def _of_elimination(structure: Structure, taken: Iterable[ShownName]) -> dict[sp.Symbol, ShownName]:
-    """Return the names of masses and generalized forces where equations of motion are too long without them."""
+    """Return the names of masses and generalized forces, if the equations of motion are too long without them."""
     if structure.elimination is None:
         return {}
     masses = structure.elimination.mass.items()
@@ -167,7 +167,7 @@ def _of_elimination(structure: Structure, taken: Iterable[ShownName]) -> dict[sp
 
 
 def _of_bodies(structure: Structure) -> dict[sp.Symbol, ShownName]:
-    """Return the names of the masses and forces that another program gives."""
+    """Return the names of the masses and forces computed by another simulator."""
     bodies, n = structure.rig.mechanism.bodies, len(structure.tree.motion.coordinates)
     if bodies is None:
         return {}
@@ -177,16 +177,16 @@ def _of_bodies(structure: Structure) -> dict[sp.Symbol, ShownName]:
 
 
 def simulated_symbol(place: tuple[int, ...]) -> sp.Symbol:
-    """Return the symbol that stands for what another program gives: row and column of a mass, or the row of a force."""
+    """Return the symbol of a value computed by another simulator, by row and column of a mass, or row of a force."""
     return sp.Symbol(" ".join(("simulated", *map(str, place))), real=True)
 
 
 def _signal_names(structure: Structure) -> dict[str, ShownName]:
-    """Return, by effect, the name of the drive's or the sensor's signal that it changes."""
+    """Return, by effect, the name of the signal of the drive or sensor that it changes."""
     mechanism = structure.rig.mechanism
     shown = {sensor.name: sensor.name for sensor in mechanism.sensors}
     for drive in mechanism.drives:
-        # A drive that is told one signal is shown by it: u, and what an effect makes of u.
+        # A drive with a single signal is displayed by the name of that signal, such as u.
         one = drive.signal.is_Symbol and drive.signal.name.isidentifier()
         shown[drive.name] = drive.signal.name if one else drive.name
     places = {effect.name: structure.rig.acts_at(effect) for effect in structure.effects}
@@ -194,17 +194,17 @@ def _signal_names(structure: Structure) -> dict[str, ShownName]:
 
 
 def _free(name: ShownName, names: Mapping[sp.Symbol, ShownName]) -> ShownName:
-    """Return a name for what is measured: the coordinate of the same name may be another number."""
+    """Return a name for a measured quantity, different from that of a coordinate, whose value may differ."""
     return name.beside("measured") if name in names.values() else name
 
 
 def output_symbol(name: str) -> sp.Symbol:
-    """Return the symbol that stands for an output where it is more than a state."""
+    """Return the symbol of an output that is not just a state."""
     return sp.Symbol(f"output {name}", real=True)
 
 
 def kinematic_states(structure: Structure) -> dict[sp.Symbol, sp.Symbol]:
-    """Return the states whose rate is another state of the same effect, with that state: a dot says it all."""
+    """Return the states whose rate is another state of the same effect, with that state; a dot replaces the equation."""
     found: dict[sp.Symbol, sp.Symbol] = {}
     states = {state.symbol: state for state in structure.tree.states}
     for symbol, state in states.items():

@@ -1,4 +1,4 @@
-"""How is an expression written in Python, of floats and the module `math`?"""
+"""Printing of expressions in Python, with floats and the module `math`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rigsight.simulate.printing.language import Language, PowersAsProducts
 
 
 class PythonPrinter(PowersAsProducts, PythonCodePrinter):  # type: ignore[misc]
-    """Python; ``sign_of`` is a function of the file."""
+    """Python; ``sign_of`` is a function in the generated file."""
 
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": True, "strict": False})

@@ -8,7 +8,7 @@ import sympy as sp
 
 
 class ReadingOrder:
-    """A printer of sympy whose sums begin with what is added."""
+    """A sympy printer whose sums begin with the positive terms."""
 
     def _as_ordered_terms(self, expr: sp.Expr, order: str | None = None) -> list[sp.Expr]:
         printer: Any = super()

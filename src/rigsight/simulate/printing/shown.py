@@ -1,4 +1,4 @@
-"""Displayed equations: those of the tree in reading order, in any language."""
+"""Displayed equations: those of the tree in display order, in any language."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rigsight.simulators import place_of, simulated
 
 
 class moved(sp.Function):  # type: ignore[misc]  # noqa: N801
-    """A mass and the acceleration it is multiplied by, in this order."""
+    """A mass and the acceleration by which it is multiplied, in this order."""
 
     is_real = True
 
@@ -36,15 +36,15 @@ class ShownEquation:
     Attributes
     ----------
     owner
-        Name of the effect that it belongs to; None for the rig.
+        Name of the effect to which it belongs; None for the rig.
     left
         A symbol, or masses times accelerations.
     terms
-        What it is, in the order of reading.
+        Terms of the right-hand side, in display order.
     limit
-        A state and the half-width of the range that it cannot leave: it rests at the end it is driven against.
+        A state and the half-width of the range that it cannot leave.
     inertia
-        The masses with their accelerations that `left` is the sum of, in the order of reading.
+        The masses with their accelerations whose sum is `left`, in display order.
     """
 
     owner: str | None
@@ -55,7 +55,7 @@ class ShownEquation:
 
     @property
     def signed_terms(self) -> tuple[tuple[str, sp.Expr], ...]:
-        """The terms, each with what joins it to the one before: ``+``, ``-``, or nothing at the head."""
+        """The terms, each with its sign: ``+``, ``-``, or empty for a positive first term."""
         if len(self.terms) == 1:
             return (("", self.terms[0]),)
         return _signed(part for term in self.terms for part in sp.Add.make_args(term))
@@ -68,11 +68,11 @@ class ShownEquation:
         Parameters
         ----------
         expression
-            Writes an expression.
+            Prints an expression.
         joined
-            How the language writes what joins a term to the one before: ``+``, ``-``, or nothing at the head.
+            Form of the sign of a term in the language, by ``+``, ``-``, or empty for a positive first term.
         within
-            How it writes that a state stays within a half-width, with a ``%s`` for each of the two.
+            Form of the statement that a state stays within a half-width, with a ``%s`` for each of the two.
         """
 
         def summed(signed: Iterable[tuple[str, sp.Expr]]) -> str:
@@ -116,20 +116,20 @@ class ShownEquations:
 
     @property
     def of_owners(self) -> dict[str | None, tuple[ShownEquation, ...]]:
-        """The equations of the rig (None), then those of each effect by its name, in the order of the signal path."""
+        """The equations of the rig (key None), then those of each effect by its name, in the order of the signal path."""
         owners = dict.fromkeys(equation.owner for equation in self.equations)
         return {owner: tuple(e for e in self.equations if e.owner == owner) for owner in owners}
 
 
 def shown_equations(structure: Structure, label: Callable[[str], str] = in_words) -> ShownEquations:
-    """Return the equations of a structure as people are shown them.
+    """Return the equations of a structure in the form in which they are displayed.
 
     Parameters
     ----------
     structure
         Rig and effects.
     label
-        An effect's name for people.
+        Returns the displayed form of an effect's name.
     """
     tree = structure.tree
     names = shown_names(structure, label)
@@ -151,7 +151,7 @@ def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -
     structure
         Rig and effects.
     numbers
-        Parameters that stand as numbers.
+        Parameters that are written as numbers, with their values.
     """
     tree = structure.tree
     values: dict[sp.Symbol, sp.Expr] = {}
@@ -181,7 +181,7 @@ def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -
 
 
 def _by_name(equation: ShownEquation) -> ShownEquation:
-    """Return an equation with quantities from another program replaced by names, because their content is unknown."""
+    """Return an equation with names for quantities from another simulator, because their formulas are unknown."""
 
     def named(expression: sp.Expr) -> sp.Expr:
         leaves = expression.atoms(simulated)
@@ -207,7 +207,7 @@ def _motion(structure: Structure) -> list[ShownEquation]:
 
 
 def _motion_in_parts(structure: Structure) -> list[ShownEquation]:
-    """Return the equations of motion with long masses and forces by names, and then what these are."""
+    """Return the equations of motion with names for long masses and forces, followed by the equations of these."""
     motion, elimination = structure.tree.motion, structure.elimination
     assert elimination is not None
     rates = dict(zip(elimination.accelerations, map(rate_symbol, motion.velocities), strict=True))
@@ -240,7 +240,7 @@ def _states(structure: Structure) -> list[ShownEquation]:
 
 
 def _outputs(structure: Structure, names: Mapping[sp.Symbol, ShownName]) -> list[ShownEquation]:
-    """Return what is recorded, but for what bears the column's name already."""
+    """Return the equations of the outputs, except those whose expression already has the name of the output."""
     return [
         ShownEquation(None, output_symbol(output.name), output.terms)
         for output in structure.tree.outputs

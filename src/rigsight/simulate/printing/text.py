@@ -1,4 +1,4 @@
-"""How is an expression written as plain text, for comments and terminals?"""
+"""Printing of expressions and equations as plain text, for comments and terminals."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class TextPrinter(StrPrinter):  # type: ignore[misc]
 
 
 class EquationPrinter(ReadingOrder, TextPrinter):
-    """Text as equations are read: factors side by side, bars for absolute values."""
+    """Text in the form of equations: products without a sign, bars for absolute values."""
 
     def _print_Mul(self, expr: sp.Expr) -> str:  # noqa: N802
         return str(super()._print_Mul(expr)).replace("*", " ")
@@ -47,7 +47,7 @@ class EquationPrinter(ReadingOrder, TextPrinter):
 
 
 class TermPrinter(EquationPrinter):
-    """A single term as short as it can be read: no spaces in powers."""
+    """A single term in a short form, without spaces in powers."""
 
     def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
         return super()._print_Pow(expr, rational=rational).replace(" ", "")
