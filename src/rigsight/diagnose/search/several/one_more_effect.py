@@ -7,7 +7,7 @@ model added. Otherwise the effect found first could hide a strong effect with me
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
-from rigsight.diagnose.search.places import Search, search_places
+from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.screening import structures_of_lineup
 from rigsight.diagnose.search.single_effects import followed
 from rigsight.effects import Effect
@@ -29,6 +29,7 @@ def with_one_more(
     singles: Sequence[Scored],
     prepare: Prepare | None = None,
     least_share: float = 0.0,
+    enough: float = float("inf"),
 ) -> list[Scored]:
     """Return a model with each effect added that lowers its cost clearly, fitted and scored.
 
@@ -48,6 +49,8 @@ def with_one_more(
         Called with the structures that are about to be looked at, to compile them side by side.
     least_share
         Share of the squared residual that the pushes of one of the effects must explain for any of them to be tried.
+    enough
+        Error, in units of the noise floor, above which the effects that the screening puts last are tried, too.
     """
     open_ones = [
         effect
@@ -59,7 +62,11 @@ def with_one_more(
     search = search_places(context, parent, open_ones)
     if search.most < least_share:
         return []
-    return _fitted_beside(context, parent, search, singles, prepare)
+    found = _fitted_beside(context, parent, search.effects, search.starts, singles, prepare)
+    if search.others and min((model.error_over_noise for model in found), default=float("inf")) > enough:
+        # A push cannot move from its start: a resonance far from it explains little until it is fitted.
+        found += _fitted_beside(context, parent, search.others, search.starts, singles, prepare)
+    return found
 
 
 def is_among(models: Sequence[Scored], names: AbstractSet[str]) -> bool:
@@ -70,13 +77,14 @@ def is_among(models: Sequence[Scored], names: AbstractSet[str]) -> bool:
 def _fitted_beside(
     context: FitContext,
     parent: Scored,
-    search: Search,
+    effects: Sequence[Effect],
+    starts: Mapping[str, Mapping[str, float]],
     singles: Sequence[Scored],
     prepare: Prepare | None,
 ) -> list[Scored]:
     base = parent.fit
     if prepare is not None:
-        prepare([context.simplest((*parent.effects, effect)) for effect in search.effects])
+        prepare([context.simplest((*parent.effects, effect)) for effect in effects])
 
     alone = {model.names[0]: model.fit for model in singles}
 
@@ -90,10 +98,10 @@ def _fitted_beside(
         )
 
     def one(effect: Effect) -> FirstLook:
-        pushed = [search.starts[effect.name]] if effect.name in search.starts else []
+        pushed = [starts[effect.name]] if effect.name in starts else []
         return look_at(context, (*parent.effects, effect), base, {}, pushed, substeps=steps(effect))
 
-    looks = list(context.threads.side_by_side(one, search.effects))
+    looks = list(context.threads.side_by_side(one, effects))
     near = min((look.nearest for look in looks), default=float("inf"))
 
     def wide(look: FirstLook) -> list[FirstLook]:

@@ -91,7 +91,9 @@ def grown(
     for parent, enough in parents:
         if parent not in tried and min((pair.error_over_noise for pair in pairs), default=np.inf) > enough:
             tried.append(parent)
-            pairs += with_one_more(context, parent, forms.partners(parent, effects), pairs, usable, prepare)
+            pairs += with_one_more(
+                context, parent, forms.partners(parent, effects), pairs, usable, prepare, enough=at_floor
+            )
     best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
     if best_pair is not None and best_pair.error_over_noise <= allowed:
         # The second effect may be right and the first only similar to the right one: another equally good single effect may be
@@ -105,7 +107,8 @@ def grown(
                 )
     for _ in range(SEARCH.most_swaps):
         best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
-        if best_pair is None or not VERDICT.exact < best_pair.error_over_noise <= allowed:
+        # Of two close forms of a law the simpler was extended first; it may explain too little beside the second effect.
+        if best_pair is None or best_pair.error_over_noise <= VERDICT.exact:
             break
         pairs += _more_general(context, best_pair, usable, effects, pairs, prepare)
     best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
