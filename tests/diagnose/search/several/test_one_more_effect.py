@@ -1,0 +1,48 @@
+"""Which effects are tried beside a model: those that the screening suggests, and the others where these do not suffice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.search.places import search_places
+from rigsight.diagnose.search.several.one_more_effect import with_one_more
+from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.effects import effect_named
+from rigsight.excitation import linear_sweep
+from rigsight.identify import characteristic_scales
+from rigsight.records import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+
+VALUES = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+HIDDEN = {"c_2": 5.0, "m_a": 0.1, "w_a": 7.0, "zeta_a": 0.02}
+"""A mass on a spring, with a natural frequency far below the starts that its effect declares."""
+NOISE = 2e-5
+
+
+def measured(role: str, amplitude: float, rng: np.random.Generator) -> Record:
+    effects = [effect_named("quadratic_damping"), effect_named("flexible_mode")]
+    t = 0.01 * np.arange(2000)
+    record = Record(role, 0.01, {"u": linear_sweep(t, amplitude, 1.0, 30.0)}, {}, role=role, hold="zoh")
+    clean = simulate(compose(AXIS, effects), VALUES | HIDDEN, record)
+    return clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size))
+
+
+def test_an_effect_that_the_screening_puts_last_is_tried_where_the_first_ones_explain_too_little() -> None:
+    rng = np.random.default_rng(0)
+    fitted = (measured("estimation", 0.4, rng), measured("estimation", 1.0, rng))
+    scored = (measured("validation", 0.7, rng),)
+    scales = characteristic_scales(AXIS, fitted, VALUES)
+    context = FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
+    (damped,) = fit_candidates(context, reidentify(context, VALUES), [effect_named("quadratic_damping")])
+    tried = [effect_named("maxwell_branch"), effect_named("flexible_mode")]
+    assert [effect.name for effect in search_places(context, damped, tried).effects] == ["maxwell_branch"]
+
+    suggested = with_one_more(context, damped, tried, [], [damped])
+    assert all(model.names[-1] == "maxwell_branch" for model in suggested)
+    everything = with_one_more(context, damped, tried, [], [damped], enough=VERDICT.at_floor)
+    best = min(everything, key=lambda model: model.error_over_noise)
+    assert best.names == ("quadratic_damping", "flexible_mode")
+    assert best.error_over_noise < VERDICT.at_floor
