@@ -158,6 +158,16 @@ class SearchNumbers:
         "budget",
         "Number of the most promising pairs that are also tried from the fit of the second effect.",
     )
+    joint_beam: int = number(
+        200,
+        "budget",
+        "Number of pairs, in the screening of several effects together, that are extended to triples.",
+    )
+    joint_sets: int = number(
+        6,
+        "budget",
+        "Number of pairs, and of triples, that are fitted because they explain most together in the screening.",
+    )
     joint_starts: int = number(
         18,
         "budget",

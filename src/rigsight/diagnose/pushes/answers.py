@@ -9,7 +9,7 @@ its residual.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -218,6 +218,34 @@ class Answers:
         for i, (record, signal) in enumerate(zip(self.records, signals, strict=True)):
             out = self._outputs(i, record.with_signals(**{push(place): size * signal}))
             changes.append((out - self.calm_outputs[i])[:, : self._n_outputs] / size)
+        return self.stacked(changes)
+
+    def to_effect(self, effect: Effect, own: Mapping[str, float]) -> Floats:
+        """Return the change of all readings, weighted and stacked, with one more effect in the equations.
+
+        Parameters
+        ----------
+        effect
+            The effect; its states begin at zero.
+        own
+            Values of all its parameters, by their own names.
+        """
+        structure = compose(
+            with_probes(self.context.rig),
+            (*self.structure.effects, effect),
+            observed=observed_sensors(self.records),
+        )
+        named = {structure.parameter_name(effect, name): value for name, value in own.items()}
+        values, states = {**self.values, **named}, self.structure.states
+        changes = []
+        for i, record in enumerate(self.records):
+            p = parameter_vector(structure, {**values, **record_values(structure, {}, record)})[:, None]
+            known = dict(zip(states, self.initial_states[i], strict=True))
+            x0 = np.array([[known.get(state, 0.0)] for state in structure.states])
+            held = record_input(structure, record)
+            with np.errstate(all="ignore"):
+                out = simulate_sets(structure, held, p, x0, record.n_samples, self.fit.substeps[i])[:, :, 0]
+            changes.append((out - self.calm_outputs[i])[:, : self._n_outputs])
         return self.stacked(changes)
 
     def to_parameter(self, name: str) -> list[Floats]:

@@ -13,6 +13,7 @@ residual.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -68,6 +69,25 @@ class Suspect:
     values: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Response:
+    """Change of all readings with an effect, to first order.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    values
+        Values of its own parameters.
+    column
+        Change of the readings, weighted and stacked, after projecting out parameters and initial states, shape (n,).
+    """
+
+    effect: Effect
+    values: Mapping[str, float]
+    column: Floats
+
+
 class Lineup:
     """The re-identified equations along the records, and their responses to pushes at every place.
 
@@ -102,19 +122,60 @@ class Lineup:
         """Return the share that each effect explains, in their order."""
         return list(self._context.threads.side_by_side(self._suspect, list(effects)))
 
+    @property
+    def left(self) -> Floats:
+        """Residual of the equations, weighted and stacked, after projecting out parameters and initial states, shape (n,)."""
+        return self._answers.left
+
+    def responses(self, effects: Sequence[Effect]) -> list[Response]:
+        """Return the response to each effect from each of its starts; those that are not finite or zero are left out."""
+
+        def of_effect(effect: Effect) -> list[Response]:
+            if effect.lateral is not None:
+                formed, columns = self._starts(effect), self._in_the_equations(effect)
+            else:
+                signals, columns = self._pushed_columns(effect)
+                formed = [own for own, _ in signals]
+            return [
+                Response(effect, own, column)
+                for own, column in zip(formed, columns.T, strict=True)
+                if np.all(np.isfinite(column)) and np.any(column)
+            ]
+
+        found = self._context.threads.side_by_side(of_effect, list(effects))
+        return list(itertools.chain.from_iterable(found))
+
+    def _in_the_equations(self, effect: Effect) -> Floats:
+        """Return the response to an effect that no push represents, from each of its starts, shape (n, n_starts)."""
+        answers = []
+        for own in self._starts(effect):
+            small = {
+                p.name: own[p.name] if p.null is None else sized(own[p.name], p.null, _SMALL)
+                for p in effect.parameters
+            }
+            answers.append(self._answers.to_effect(effect, small) / _SMALL)
+        return self._answers.without_free(np.column_stack(answers))
+
+    def _pushed_columns(self, effect: Effect) -> tuple[list[tuple[dict[str, float], list[Floats]]], Floats]:
+        """Return the pushes of an effect from its starts, and the responses to them, shape (n, n_starts)."""
+        place = self._context.rig.acts_at(effect)
+        formed = [
+            (own, [self._signed(place, signal) for signal in signals])
+            for own, signals in self._signals(effect)
+        ]
+        answers = [self._answers.to_push(place, signals, _SMALL) for _, signals in formed]
+        return formed, self._answers.without_free(np.column_stack(answers)) if answers else np.zeros((1, 0))
+
     def _suspect(self, effect: Effect) -> Suspect:
         place = self._context.rig.acts_at(effect)
-        formed = self._signals(effect)
-        pushes = [[self._signed(place, signal) for signal in signals] for _, signals in formed]
-        answers = [self._answers.to_push(place, signals, _SMALL) for signals in pushes]
-        columns = self._answers.without_free(np.column_stack(answers)) if answers else np.zeros((1, 0))
+        formed, columns = self._pushed_columns(effect)
         size = np.einsum("ij,ij->j", columns, columns)
         usable = np.flatnonzero(np.isfinite(size) & (size > 0.0))
         along = {int(i): float(columns[:, i] @ self._answers.left) for i in usable}
         best = sorted(along, key=lambda i: -(along[i] ** 2) / size[i])[: SEARCH.fitted_pushes]
-        found = [(*self._fitted_share(place, pushes[i], along[i] / size[i]), formed[i][0]) for i in best]
+        found = [(*self._fitted_share(place, formed[i][1], along[i] / size[i]), formed[i][0]) for i in best]
         share, factor, own = max(found, key=lambda one: one[0], default=(0.0, 0.0, {}))
-        return Suspect(effect, share, _sized(effect, own, factor))
+        return Suspect(effect, share, scaled(effect, own, factor) or _fitted_values(effect, own))
 
     def _fitted_share(self, place: str, signals: Sequence[Floats], push_size: float) -> tuple[float, float]:
         """Return the reduction of the cost when a push of this form, the parameters and the initial states are fitted.
@@ -221,20 +282,33 @@ class Lineup:
         return -signal if place in motion_columns(self._context.rig) else signal
 
 
-def _sized(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str, float]:
-    """Return own values of an effect with a push scaled by a factor; unchanged if the effect cannot have that size.
+def scaled(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str, float]:
+    """Return own values of an effect with a push scaled by a factor; empty if the effect cannot have that size.
 
     Where an effect is absent at a value of a parameter, its force grows with the distance from there. A push the other way is the
     same effect only where its parameters may have that sign: a spring may soften, a friction cannot drive.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    own
+        Values of its parameters by their own names, for a factor of one.
+    factor
+        Factor on its force.
     """
-    fitted = [p for p in effect.parameters if p.fitted and p.name in own]
-    values = {p.name: own[p.name] for p in fitted}
     if factor == 0.0:
-        return values
+        return {}
+    values = _fitted_values(effect, own)
+    fitted = [p for p in effect.parameters if p.name in values]
     grown = {
         p.name: values[p.name] if p.null is None else sized(values[p.name], p.null, factor) for p in fitted
     }
-    return grown if all(p.lower <= grown[p.name] <= p.upper for p in fitted) else values
+    return grown if all(p.lower <= grown[p.name] <= p.upper for p in fitted) else {}
+
+
+def _fitted_values(effect: Effect, own: Mapping[str, float]) -> dict[str, float]:
+    return {p.name: own[p.name] for p in effect.parameters if p.fitted and p.name in own}
 
 
 def structures_of_lineup(

@@ -15,6 +15,7 @@ from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several import pairs as pair_search
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.pairs import grown, refit_singles
+from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
@@ -117,6 +118,7 @@ def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
         VERDICT.at_floor,
         reidentified.error_over_noise,
         OtherForms(context, lower_bound=False),
+        Together(context, reidentified, [spring, lag]),
     )
     assert [pair.names for pair in pairs] == [("cubic_stiffness", "actuator_lag")]
 
@@ -131,14 +133,15 @@ def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
     ]
     beside: list[str] = []
 
-    def tried(_: FitContext, parent: Scored, *rest: object) -> list[Scored]:
+    def tried(_: FitContext, parent: Scored, *rest: object, **options: object) -> list[Scored]:
         beside.extend(parent.names)
         return []
 
     monkeypatch.setattr(pair_search, "with_one_more", tried)
     monkeypatch.setattr(pair_search, "refine", lambda _, pairs: pairs)
     forms = SimpleNamespace(partners=lambda parent, effects: effects)
-    pair_search.grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms)
+    together = SimpleNamespace(fitted=lambda size: [])
+    pair_search.grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms, together)
     assert beside == ["power_law_stiffness"]
 
 

@@ -22,6 +22,7 @@ from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.one_more_effect import is_among, with_one_more
 from rigsight.diagnose.search.several.third_effect import with_a_third, with_relatives
+from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over
@@ -34,6 +35,7 @@ def grown(
     at_floor: float,
     worthwhile: float,
     forms: OtherForms,
+    together: Together,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
     """Return fitted models of two and three effects that close at least half of the error of the best with one less.
@@ -52,6 +54,8 @@ def grown(
         Held-out error up to which an effect is believed to explain anything.
     forms
         Says which effects are worth trying beside another.
+    together
+        Models whose effects explain most together.
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
 
@@ -65,8 +69,56 @@ def grown(
     )
     if not usable or usable[0].error_over_noise <= at_floor:
         return []
-    # Beside an effect that explains nothing a second one does what it does alone.
-    explaining = [model for model in usable if model.error_over_noise <= worthwhile] or usable
+    allowed = _half_closed(usable[0].error_over_noise)
+    pairs = refine(context, together.fitted(2))
+    triples = refine(context, together.fitted(3)) if _lowest(pairs) > at_floor else []
+    by_triples = _lowest(triples) <= VERDICT.exact < _lowest(pairs)
+    tried: list[Scored] = []
+    if not by_triples:
+        explaining = [model for model in usable if model.error_over_noise <= worthwhile] or usable
+        tried, pairs = _beside_singles(
+            context, explaining, usable, effects, at_floor, allowed, forms, pairs, prepare
+        )
+        pairs = _with_similar(context, pairs, singles, usable, effects, allowed, forms, tried, prepare)
+        pairs = _with_other_forms(context, pairs, usable, effects, allowed, prepare)
+    pairs.sort(key=lambda pair: pair.error_over_noise)
+    # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
+    last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
+    n_finished = sum(pair.error_over_noise <= SEARCH.alike_pairs * last for pair in pairs)
+    pairs = [*(finished(context, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
+    pairs = refine(context, pairs)
+    if _lowest(triples) > at_floor:
+        triples += with_a_third(context, usable, pairs, effects, forms, prepare)
+    nearest = _lowest(pairs)
+    triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
+    if triples and nearest > at_floor:
+        triples, pairs = with_relatives(context, triples, pairs, usable, effects, prepare)
+    else:
+        triples = []
+    of_triples = [set(triple.names) for triple in triples]
+    pairs = [
+        pair
+        for pair in pairs
+        if pair.error_over_noise <= allowed or any(set(pair.names) < own for own in of_triples)
+    ]
+    return larger_first(without_repeated_equations(context, [*pairs, *triples]), singles)
+
+
+def _beside_singles(
+    context: FitContext,
+    explaining: Sequence[Scored],
+    usable: Sequence[Scored],
+    effects: Sequence[Effect],
+    at_floor: float,
+    allowed: float,
+    forms: OtherForms,
+    known: Sequence[Scored],
+    prepare: Prepare | None,
+) -> tuple[list[Scored], list[Scored]]:
+    """Return the single effects that were extended, and the known pairs with those that extend them: until one explains all.
+
+    Beside an effect that explains nothing a second one does what it does alone, so those that explain something are extended.
+    """
     close = [
         model for model in explaining if model.error_over_noise <= SEARCH.beam * usable[0].error_over_noise
     ]
@@ -76,62 +128,77 @@ def grown(
     first = _plainest([model for model in close if model.n_free == best.n_free], best, effects)
     others = [model for model in close if model is not first and not _alike(first, model)]
     others = [model for model in others if max(model.fit.substeps) <= SEARCH.finest_steps]
-    allowed = _half_closed(usable[0].error_over_noise)
-    # An effect that was left out of the singles because another is equivalent may still be part of a pair.
-    alone = {effect.name: np.inf for effect in effects} | {
-        model.names[0]: model.error_over_noise for model in singles
-    }
-    pairs: list[Scored] = []
     parents = [(first, VERDICT.exact)]
     if others:
         parents.append((_plainest(others, others[0], effects), VERDICT.exact))
         # Fitted by itself, an effect may stand far off for what a second one does to it: one more where no pair competes.
         parents.append((min(others, key=lambda model: (model.n_free, model.error_over_noise)), allowed))
     tried: list[Scored] = []
+    pairs = list(known)
     for parent, enough in parents:
-        if parent not in tried and min((pair.error_over_noise for pair in pairs), default=np.inf) > enough:
+        if parent not in tried and _lowest(pairs) > enough:
             tried.append(parent)
             pairs += with_one_more(
                 context, parent, forms.partners(parent, effects), pairs, usable, prepare, enough=at_floor
             )
-    best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
-    if best_pair is not None and best_pair.error_over_noise <= allowed:
-        # The second effect may be right and the first only similar to the right one: another equally good single effect may be
-        # better in its place.
-        for second in (model for model in usable if model not in tried):
-            if second.effects[0] in best_pair.effects:
-                (name,) = set(best_pair.names) - set(second.names)
-                instead = [e for e in effects if alone[e.name] <= VERDICT.comparable * alone[name]]
-                pairs += with_one_more(
-                    context, second, forms.partners(second, instead), pairs, usable, prepare
-                )
+    return tried, pairs
+
+
+def _with_similar(
+    context: FitContext,
+    pairs: Sequence[Scored],
+    singles: Sequence[Scored],
+    usable: Sequence[Scored],
+    effects: Sequence[Effect],
+    allowed: float,
+    forms: OtherForms,
+    tried: Sequence[Scored],
+    prepare: Prepare | None,
+) -> list[Scored]:
+    """Return the pairs with those in which an effect that alone explains as much stands for one of the best pair.
+
+    One of the two may be right and the other only similar to the right one.
+    """
+    found = list(pairs)
+    best = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
+    if best is None or best.error_over_noise > allowed:
+        return found
+    # An effect that was left out of the singles because another is equivalent may still be part of a pair.
+    alone = {effect.name: np.inf for effect in effects} | {
+        model.names[0]: model.error_over_noise for model in singles
+    }
+    for kept in (model for model in usable if model not in tried):
+        if kept.effects[0] in best.effects:
+            (name,) = set(best.names) - set(kept.names)
+            instead = [e for e in effects if alone[e.name] <= VERDICT.comparable * alone[name]]
+            found += with_one_more(context, kept, forms.partners(kept, instead), found, usable, prepare)
+    return found
+
+
+def _with_other_forms(
+    context: FitContext,
+    pairs: Sequence[Scored],
+    usable: Sequence[Scored],
+    effects: Sequence[Effect],
+    allowed: float,
+    prepare: Prepare | None,
+) -> list[Scored]:
+    """Return the pairs with those in which a more general form of an effect, or a simpler one, stands for it."""
+    found = list(pairs)
     for _ in range(SEARCH.most_swaps):
-        best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
+        best = min(found, key=lambda pair: pair.error_over_noise, default=None)
         # Of two close forms of a law the simpler was extended first; it may explain too little beside the second effect.
-        if best_pair is None or best_pair.error_over_noise <= VERDICT.exact:
+        if best is None or best.error_over_noise <= VERDICT.exact:
             break
-        pairs += _more_general(context, best_pair, usable, effects, pairs, prepare)
-    best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
-    if best_pair is not None and best_pair.error_over_noise <= allowed:
-        pairs += _plainer(context, best_pair, usable, effects, pairs, prepare)
-    pairs.sort(key=lambda pair: pair.error_over_noise)
-    # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
-    last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
-    n_finished = sum(pair.error_over_noise <= SEARCH.alike_pairs * last for pair in pairs)
-    pairs = [*(finished(context, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
-    pairs = refine(context, pairs)
-    triples = with_a_third(context, usable, pairs, effects, forms, prepare)
-    nearest = min((pair.error_over_noise for pair in pairs), default=np.inf)
-    triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
-    if triples:
-        triples, pairs = with_relatives(context, triples, pairs, usable, effects, prepare)
-    of_triples = [set(triple.names) for triple in triples]
-    pairs = [
-        pair
-        for pair in pairs
-        if pair.error_over_noise <= allowed or any(set(pair.names) < own for own in of_triples)
-    ]
-    return larger_first(without_repeated_equations(context, [*pairs, *triples]), singles)
+        found += _more_general(context, best, usable, effects, found, prepare)
+    best = min(found, key=lambda pair: pair.error_over_noise, default=None)
+    if best is not None and best.error_over_noise <= allowed:
+        found += _plainer(context, best, usable, effects, found, prepare)
+    return found
+
+
+def _lowest(models: Sequence[Scored]) -> float:
+    return min((model.error_over_noise for model in models), default=np.inf)
 
 
 def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Scored]:

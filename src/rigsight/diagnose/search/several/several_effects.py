@@ -11,6 +11,7 @@ from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.joint_starts import with_joint_starts
 from rigsight.diagnose.search.several.pairs import grown
+from rigsight.diagnose.search.several.together import Together
 from rigsight.effects import Effect
 
 
@@ -62,6 +63,7 @@ def several_effects(
     if is_near and not checks.is_adequate(best):
         at_floor = VERDICT.exact
     worthwhile = reidentified.error_over_noise / VERDICT.worthwhile
-    pairs = grown(context, singles, effects, at_floor, worthwhile, forms, prepare)
+    together = Together(context, reidentified, effects, prepare)
+    pairs = grown(context, singles, effects, at_floor, worthwhile, forms, together, prepare)
     pairs = with_joint_starts(context, reidentified, pairs, singles, effects, checks.is_adequate, prepare)
     return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]
