@@ -50,7 +50,8 @@ def with_one_more(
     least_share
         Share of the squared residual that the pushes of one of the effects must explain for any of them to be tried.
     enough
-        Error, in units of the noise floor, above which the effects that the screening puts last are tried, too.
+        Error, in units of the noise floor, above which effects that the screening puts last are tried, too, if a parameter
+        changes the shape of their force.
     """
     open_ones = [
         effect
@@ -63,9 +64,10 @@ def with_one_more(
     if search.most < least_share:
         return []
     found = _fitted_beside(context, parent, search.effects, search.starts, singles, prepare)
-    if search.others and min((model.error_over_noise for model in found), default=float("inf")) > enough:
+    movable = [effect for effect in search.others if _has_a_shape(effect)]
+    if movable and min((model.error_over_noise for model in found), default=float("inf")) > enough:
         # A push cannot move from its start: a resonance far from it explains little until it is fitted.
-        found += _fitted_beside(context, parent, search.others, search.starts, singles, prepare)
+        found += _fitted_beside(context, parent, movable, search.starts, singles, prepare)
     return found
 
 
@@ -128,6 +130,11 @@ def _fitted_beside(
         return followed(context, found, promising=True, finish=False)
 
     return list(context.threads.side_by_side(follow, promising[: SEARCH.most_followed]))
+
+
+def _has_a_shape(effect: Effect) -> bool:
+    """Return True if a fit changes the shape of the force, and not only its size as a fit of a push does."""
+    return any(p.fitted and p.null is None for p in effect.parameters)
 
 
 def _cost(found: FirstLook) -> float:

@@ -137,10 +137,10 @@ def _beside_singles(
     pairs = list(known)
     for parent, enough in parents:
         if parent not in tried and _lowest(pairs) > enough:
+            partners = forms.partners(parent, effects)
+            widely = np.inf if tried else at_floor
             tried.append(parent)
-            pairs += with_one_more(
-                context, parent, forms.partners(parent, effects), pairs, usable, prepare, enough=at_floor
-            )
+            pairs += with_one_more(context, parent, partners, pairs, usable, prepare, enough=widely)
     return tried, pairs
 
 
