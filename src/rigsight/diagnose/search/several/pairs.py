@@ -21,7 +21,7 @@ from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
 from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.one_more_effect import is_among, with_one_more
-from rigsight.diagnose.search.several.third_effect import with_a_third, with_relatives
+from rigsight.diagnose.search.several.third_effect import finished_best, with_a_third, with_relatives
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.effects import Effect
@@ -70,8 +70,8 @@ def grown(
     if not usable or usable[0].error_over_noise <= at_floor:
         return []
     allowed = _half_closed(usable[0].error_over_noise)
-    pairs = refine(context, together.fitted(2))
-    triples = refine(context, together.fitted(3)) if _lowest(pairs) > at_floor else []
+    pairs = together.fitted(2)
+    triples = together.fitted(3) if _lowest(pairs) > at_floor else []
     by_triples = _lowest(triples) <= VERDICT.exact < _lowest(pairs)
     tried: list[Scored] = []
     if not by_triples:
@@ -92,6 +92,7 @@ def grown(
     nearest = _lowest(pairs)
     triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
     if triples and nearest > at_floor:
+        triples = finished_best(context, triples)
         triples, pairs = with_relatives(context, triples, pairs, usable, effects, prepare)
     else:
         triples = []

@@ -55,8 +55,7 @@ def with_a_third(
     ):
         return []
     least = max(VERDICT.larger_part, forms.share(best))
-    found = with_one_more(context, best, effects, [], singles, prepare, least_share=least)
-    return _finished(context, found)
+    return with_one_more(context, best, effects, [], singles, prepare, least_share=least)
 
 
 def with_relatives(
@@ -108,12 +107,21 @@ def with_relatives(
             instead = [effect for effect in effects if is_tried(replaced, effect)]
             if instead and pair.residuals:
                 new += with_one_more(context, pair, instead, [*found, *new], singles, prepare)
-        found += _finished(context, new)
+        found += finished_best(context, new)
     known += _parts_of(context, min(found, key=lambda model: model.error_over_noise), known)
     return found, known
 
 
-def _finished(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+def finished_best(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+    """Return the models, the best two fitted to convergence and those near them to full precision.
+
+    Parameters
+    ----------
+    context
+        Records, scales and noise.
+    models
+        Fitted and scored.
+    """
     ordered = sorted(models, key=lambda model: model.error_over_noise)
     best = [finished(context, model) for model in ordered[: SEARCH.most_finished]]
     return refine(context, [*best, *ordered[SEARCH.most_finished :]])
