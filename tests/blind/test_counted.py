@@ -28,6 +28,7 @@ COUNTED: dict[str, tuple[int, str]] = {
     "rigs": (76, "d573271337b8f019"),
     "laboratory": (60, "7f94995c624573fd"),
     "handwritten": (96, "4bc82b384ab675e0"),
+    "several": (48, "5a839a7f07559e46"),
 }
 """Trials of one pass, and the hash of what those of seed 1 hide.
 

@@ -196,19 +196,15 @@ def _at_its_place(name: str) -> Effect:
 
 def fed(structure: Structure, record: Record) -> tuple[NDArray[np.float64], ...]:
     """Return what an export is fed: inputs, and the rates of those that prescribe a motion."""
-    coefficients = record_input(structure, record).coefficients.reshape(record.n_samples, -1, 4)[1:]
+    at_samples = record_input(structure, record).at_samples(record.n_samples)
     prescribing = {coordinate.prescribed_by for coordinate in structure.rig.mechanism.prescribed}
     columns: list[NDArray[np.float64]] = []
     for i, source in enumerate(structure.rig.inputs):
         if source.name not in prescribing:
             columns.append(record[source.name])
             continue
-        pieces = coefficients[:, i]
-        end = pieces[-1]
-        columns += [
-            np.append(pieces[:, 0], np.polyval(end[::-1], DT)),
-            np.append(pieces[:, 1], end[1] + DT * (2.0 * end[2] + 3.0 * DT * end[3])),
-        ]
+        value, rate = at_samples[3 * i : 3 * i + 2]
+        columns += [value, rate]
     return tuple(columns)
 
 
