@@ -66,3 +66,9 @@ def test_starts_that_differ_in_size_only_count_once() -> None:
     found = best_sets(responses, residual, 2)
     assert [one.names for one in found] == [{"coulomb_friction", "cubic_stiffness"}] * 2
     assert found[0].share > 0.99 > found[1].share
+
+
+def test_without_responses_there_are_no_sets() -> None:
+    assert best_sets([], COLUMNS[0], 2) == []
+    assert best_sets([response("coulomb_friction", 0.1, COLUMNS[0])], COLUMNS[1], 2) == []
+    assert best_sets([response("coulomb_friction", 0.1, COLUMNS[0])], np.zeros(500), 2) == []

@@ -69,11 +69,13 @@ def best_sets(responses: Sequence[Response], residual: Floats, size: int) -> lis
     -------
     Several starts of the same effects are separate sets. Sets in which an effect had a size that it cannot have are left out.
     """
+    total = float(residual @ residual)
+    if not responses or not total > 0.0:
+        return []
     columns = _Columns.of(responses, residual)
     chosen, shares = np.arange(len(columns.responses))[:, None], columns.along**2
     for _ in range(size - 1):
         chosen, shares = columns.extended(chosen)
-    total = float(residual @ residual)
     found = (columns.effect_set(own, square / total) for own, square in zip(chosen, shares, strict=True))
     return [effect_set for effect_set in found if all(effect_set.values)]
 
