@@ -21,9 +21,3 @@ def test_it_has_a_row_on_the_page_of_exports(target: str) -> None:
     assert any(f"`{target}`" in row for row in rows), (
         f"Add a row for {target} to the table in docs/exports.md."
     )
-
-
-@pytest.mark.parametrize("target", ALL)
-def test_it_is_named_on_the_page_of_commands(target: str) -> None:
-    (row,) = re.findall(r"^\| `rigsight export .*$", (DOCS / "commands.md").read_text("utf-8"), re.MULTILINE)
-    assert f"`{target}`" in row, f"Name {target} in the row of rigsight export in docs/commands.md."
