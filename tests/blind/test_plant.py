@@ -75,6 +75,17 @@ def test_the_plant_agrees_with_the_simulation_of_a_finely_sampled_input(names: t
         assert np.sqrt(np.mean((moved[:, i] - expected) ** 2)) < 1e-5 * np.std(expected)
 
 
+def test_a_reading_that_is_recorded_early_shows_the_motion_ahead() -> None:
+    plant, values, state = gear_with("time_shift")
+    sizes = np.array([characteristic_value(d, SCALES) for d in plant.structure.state_dimensions])
+    plant = Plant(plant.structure, values | {"T_x": -3.0 * DT}, sizes)
+    on_time, _, _ = gear_with()
+    shifted = plant.respond(SWEEP, quiet, state, 0.0, DT, N_SAMPLES)
+    exact = on_time.respond(SWEEP, quiet, state, 0.0, DT, N_SAMPLES + 3)
+    np.testing.assert_allclose(shifted[:, 0], exact[3:, 0], atol=1e-9)
+    np.testing.assert_allclose(shifted[:, 1], exact[:-3, 1], atol=1e-9)
+
+
 def test_a_linear_axis_answers_a_step_as_its_exact_solution() -> None:
     mass, damping, stiffness, force = 2.0, 3.0, 250.0, 40.0
     values = {"gain": force, "m": mass, "d": damping, "k": stiffness, "x_off": 0.01, "force_off": 0.0}

@@ -122,15 +122,16 @@ class Plant:
         grid = dt * np.arange(n_samples, dtype=np.float64)
         n_states = initial_state.size
         wanted = [_Samples(grid, np.full((n_samples, n_states), np.nan))]
-        if late > 0.0:
+        if late != 0.0:
             wanted.append(_Samples(np.maximum(grid - late, start), np.full((n_samples, n_states), np.nan)))
         run = _Run(self._equations, self._sizes, waveform, disturbance)
         try:
-            run.integrate(initial_state, start, float(grid[-1]), wanted)
+            # A reading that is recorded early shows the motion after the end of the record.
+            run.integrate(initial_state, start, float(grid[-1]) + max(-late, 0.0), wanted)
         except (OverflowError, ValueError, ZeroDivisionError) as error:
             raise SimulationError(f"The motion of {self.structure.rig.name} diverges: {error}.") from None
         outputs = self._outputs(wanted[0])
-        if late > 0.0:
+        if late != 0.0:
             outputs[:, 0] = self._outputs(wanted[1])[:, 0]
         if not np.all(np.isfinite(outputs)):
             raise SimulationError(f"The motion of {self.structure.rig.name} overflows.")
