@@ -12,7 +12,8 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.several import pairs as pair_search
+from rigsight.diagnose.search.several import pair_search
+from rigsight.diagnose.search.several import pairs as pairs_module
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.pairs import grown, refit_singles
 from rigsight.diagnose.search.several.together import Together
@@ -138,10 +139,10 @@ def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
         return []
 
     monkeypatch.setattr(pair_search, "with_one_more", tried)
-    monkeypatch.setattr(pair_search, "refine", lambda _, pairs: pairs)
+    monkeypatch.setattr(pairs_module, "refine", lambda _, pairs: pairs)
     forms = SimpleNamespace(partners=lambda parent, effects: effects)
     together = SimpleNamespace(fitted=lambda size: [])
-    pair_search.grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms, together)
+    grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms, together)
     assert beside == ["power_law_stiffness"]
 
 

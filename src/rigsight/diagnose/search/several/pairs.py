@@ -20,7 +20,7 @@ from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import FirstLook
 from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.one_more_effect import with_one_more
+from rigsight.diagnose.search.several.pair_search import PairSearch
 from rigsight.diagnose.search.several.similar_pairs import with_other_forms, with_similar
 from rigsight.diagnose.search.several.third_effect import finished_best, with_a_third, with_relatives
 from rigsight.diagnose.search.several.together import Together
@@ -71,17 +71,13 @@ def grown(
     if not usable or usable[0].error_over_noise <= at_floor:
         return []
     allowed = _half_closed(usable[0].error_over_noise)
+    search = PairSearch(context, singles, usable, effects, at_floor, allowed, forms, prepare)
     pairs = together.fitted(2)
     triples = together.fitted(3) if _lowest(pairs) > at_floor else []
-    by_triples = _lowest(triples) <= VERDICT.exact < _lowest(pairs)
-    tried: list[Scored] = []
-    if not by_triples:
+    if not _lowest(triples) <= VERDICT.exact < _lowest(pairs):
         explaining = [model for model in usable if model.error_over_noise <= worthwhile] or usable
-        tried, pairs = _beside_singles(
-            context, explaining, usable, effects, at_floor, allowed, forms, pairs, prepare
-        )
-        pairs = with_similar(context, pairs, singles, usable, effects, allowed, forms, tried, prepare)
-        pairs = with_other_forms(context, pairs, usable, effects, allowed, prepare)
+        tried, pairs = _beside_singles(search, explaining, pairs)
+        pairs = with_other_forms(search, with_similar(search, pairs, tried))
     pairs.sort(key=lambda pair: pair.error_over_noise)
     # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
     last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
@@ -107,42 +103,38 @@ def grown(
 
 
 def _beside_singles(
-    context: FitContext,
-    explaining: Sequence[Scored],
-    usable: Sequence[Scored],
-    effects: Sequence[Effect],
-    at_floor: float,
-    allowed: float,
-    forms: OtherForms,
-    known: Sequence[Scored],
-    prepare: Prepare | None,
+    search: PairSearch, explaining: Sequence[Scored], known: Sequence[Scored]
 ) -> tuple[list[Scored], list[Scored]]:
     """Return the single effects that were extended, and the known pairs with those that extend them: until one explains all.
 
     Beside an effect that explains nothing a second one does what it does alone, so those that explain something are extended.
     """
     close = [
-        model for model in explaining if model.error_over_noise <= SEARCH.beam * usable[0].error_over_noise
+        model
+        for model in explaining
+        if model.error_over_noise <= SEARCH.beam * search.usable[0].error_over_noise
     ]
     # Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as
     # many, the one that the catalogue has first is the plainer.
     best = min(close, key=lambda model: (model.n_free, model.error_over_noise))
-    first = _plainest([model for model in close if model.n_free == best.n_free], best, effects)
+    first = _plainest([model for model in close if model.n_free == best.n_free], best, search.effects)
     others = [model for model in close if model is not first and not _alike(first, model)]
     others = [model for model in others if max(model.fit.substeps) <= SEARCH.finest_steps]
     parents = [(first, VERDICT.exact)]
     if others:
-        parents.append((_plainest(others, others[0], effects), VERDICT.exact))
+        parents.append((_plainest(others, others[0], search.effects), VERDICT.exact))
         # Fitted by itself, an effect may stand far off for what a second one does to it: one more where no pair competes.
-        parents.append((min(others, key=lambda model: (model.n_free, model.error_over_noise)), allowed))
+        parents.append(
+            (min(others, key=lambda model: (model.n_free, model.error_over_noise)), search.allowed)
+        )
     tried: list[Scored] = []
     pairs = list(known)
     for parent, enough in parents:
         if parent not in tried and _lowest(pairs) > enough:
-            partners = forms.partners(parent, effects)
-            widely = np.inf if tried else at_floor
+            partners = search.forms.partners(parent, search.effects)
+            widely = np.inf if tried else search.at_floor
             tried.append(parent)
-            pairs += with_one_more(context, parent, partners, pairs, usable, prepare, enough=widely)
+            pairs += search.beside(parent, partners, pairs, widely)
     return tried, pairs
 
 
