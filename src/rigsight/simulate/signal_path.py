@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from rigsight.effects import Effect, Energy, Place, placed_dimension
+from rigsight.effects import Effect, Energy, Place
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
-from rigsight.simulate.binder import Binder, state_symbol
+from rigsight.simulate.binder import Binder
+from rigsight.simulate.defined_signals import DefinedSignals
 from rigsight.simulate.equation_tree import (
-    Definition,
     EquationsOfMotion,
     EquationTree,
     FirstOrderState,
@@ -94,6 +94,7 @@ class _Path:
         ahead: Mapping[str, sp.Symbol] | None = None,
     ) -> None:
         self._binder = binder
+        self._defined = DefinedSignals(binder, rig)
         self._rig = rig
         self._effects = effects
         self._bandwidths = bandwidths or {}
@@ -101,9 +102,6 @@ class _Path:
         self._shown: dict[str, tuple[sp.Expr, sp.Expr]] = {}
         """Reading of each sensor of the observer, and its delay."""
         self._offsets = {name: sp.Symbol(f"offset of {name}", real=True) for name in offsets}
-        self._definitions: list[Definition] = []
-        self._values: dict[sp.Symbol, sp.Expr] = {}
-        """Expressions of signals, drives and sensors, by the symbols that denote them in the rig."""
         self._read = _read_by_laws(rig)
 
     def tree(self) -> EquationTree:
@@ -133,7 +131,7 @@ class _Path:
         states = (*followers, *memories, *lags, *of_sensors, *self._shifts())
         return EquationTree(
             inputs=self._inputs(),
-            definitions=tuple(self._definitions),
+            definitions=tuple(self._defined.definitions),
             motion=self._motion(resisting, states),
             states=states,
             outputs=tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors),
@@ -155,9 +153,8 @@ class _Path:
                 self._drive(drives[name])
             else:
                 self._sensor(sensors[name], {}, [])
-        bound = tuple(self._bound(expression) for expression in expressions)
-        tree = EquationTree((), tuple(self._definitions), EquationsOfMotion(), (), ())
-        return tuple(map(tree.flattened, bound))
+        bound = tuple(self._defined.bound(expression) for expression in expressions)
+        return tuple(map(self._defined.flattened, bound))
 
     def _inputs(self) -> tuple[sp.Symbol, ...]:
         mechanism, found = self._rig.mechanism, []
@@ -175,62 +172,48 @@ class _Path:
         if not self._rig.mechanism.free:
             return EquationsOfMotion()
         pulled = self._observer(states) if self._bandwidths else None
-        return equations_of_motion(self._rig, self._bound, resisting, pulled)
+        return equations_of_motion(self._rig, self._defined.bound, resisting, pulled)
 
     def _observer(self, states: Sequence[FirstOrderState]) -> sp.Matrix:
         """Return the accelerations by which an observer follows the measured readings, shape (n_degrees, 1)."""
         mechanism = self._rig.mechanism
         sensors = {sensor.name: sensor for sensor in mechanism.sensors}
-        tree = EquationTree((), tuple(self._definitions), EquationsOfMotion(), (), ())
         rates = {c.symbol: c.rate for c in mechanism.free} | {state.symbol: state.rate for state in states}
         found = sp.zeros(len(mechanism.free), 1)
         for place, (name, bandwidth) in enumerate(self._bandwidths.items(), len(mechanism.inputs)):
             reading, delay = self._shown[name]
-            shown = tree.flattened(reading)
+            shown = self._defined.flattened(reading)
             rate = sp.Add(*(sp.diff(shown, s) * rates[s] for s in rates if s in shown.free_symbols))
             found += observer_acceleration(
                 mechanism.free,
-                self._bound(sensors[name].reads),
+                self._defined.bound(sensors[name].reads),
                 (reading, rate),
                 measured_before(input_symbols(place), delay - self._ahead.get(name, sp.Integer(0))),
                 bandwidth,
             )
         return found
 
-    def _bound(self, expression: sp.Expr) -> sp.Expr:
-        """Bind an expression of the rig, with drives and sensors after their effects."""
-        for symbol, signal in self._rig.mechanism.signals.items():
-            if symbol in expression.free_symbols and symbol not in self._values:
-                self._values[symbol] = self._name(Kind.SIGNAL, symbol.name, self._bound(signal))
-        return self._binder.rig(expression).xreplace(self._values)
-
-    def _name(self, kind: Kind, name: str, expression: sp.Expr) -> sp.Symbol:
-        """Return a symbol for a named expression of the rig; an expression that is a symbol already keeps it."""
-        if expression.is_Symbol:
-            return expression
-        symbol = sp.Symbol(f"{name}:{kind.value}", real=True)
-        self._definitions.append(Definition(symbol, expression, kind, None, name=name))
-        return symbol
-
     def _at(self, place: str, *kinds: Place) -> list[Effect]:
         return [e for e in self._effects if e.place in kinds and self._rig.acts_at(e) == place]
 
     def _drive(self, drive: Drive) -> list[FirstOrderState]:
         """Chain the actuator effects, delays first, because static effects and lags may as well act on the delayed signal."""
-        source, lags = self._name(Kind.DRIVE, drive.name, self._bound(drive.signal)), []
+        source, lags = self._defined.name(Kind.DRIVE, drive.name, self._defined.bound(drive.signal)), []
         effects = self._at(drive.name, Place.ACTUATOR)
         for effect in effects:
             if effect.delay is not None:
                 delay = self._binder.effect(effect, effect.delay, {})
-                source = self._define(Kind.DRIVE, effect, late(source, delay))
+                source = self._defined.define(Kind.DRIVE, effect, late(source, delay))
         for effect in effects:
             if effect.drive is not None:
                 # The speed is that of the drive's own shaft, not of a joint.
-                speed = self._bound(self._rig.mechanism.rate(drive.along))
+                speed = self._defined.bound(self._rig.mechanism.rate(drive.along))
                 signals = {**self._of_motion(), "u": source, "v": speed}
-                lags += self._states(effect, signals)
-                source = self._define(Kind.DRIVE, effect, self._binder.effect(effect, effect.drive, signals))
-        self._values[sp.Symbol(drive.name, real=True)] = source
+                lags += self._defined.states(effect, signals)
+                source = self._defined.define(
+                    Kind.DRIVE, effect, self._binder.effect(effect, effect.drive, signals)
+                )
+        self._defined.stands_for(sp.Symbol(drive.name, real=True), source)
         return lags
 
     def _joint(self, joint: Joint, memories: list[FirstOrderState]) -> tuple[sp.Expr, ...]:
@@ -238,7 +221,7 @@ class _Path:
         signals = self._signals(joint)
         effects = self._at(joint.name, Place.DYNAMICS, Place.DISTURBANCE)
         spring, squeezed = self._spring(effects, signals, memories)
-        static = self._bound(
+        static = self._defined.bound(
             joint.force.xreplace({c.rate: sp.S.Zero for c in self._rig.mechanism.coordinates})
         )
         carried, torques = [spring, static], []
@@ -248,37 +231,39 @@ class _Path:
                 continue
             if effect.reads(canonical.load):
                 # Effects on the springs of other joints are left out, because the loads of two joints may depend on each other.
-                load = sp.Add(self._bound(self._rig.mechanism.carried_by(joint)), *carried)
-                signals = {**signals, "load": self._define(Kind.LOAD, effect, load)}
-            torque = self._define(Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals))
+                load = sp.Add(self._defined.bound(self._rig.mechanism.carried_by(joint)), *carried)
+                signals = {**signals, "load": self._defined.define(Kind.LOAD, effect, load)}
+            torque = self._defined.define(
+                Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals)
+            )
             if effect.energy is Energy.CONSERVATIVE:
                 carried.append(torque)
             torques.append(torque)
-            memories += self._states(effect, signals)
+            memories += self._defined.states(effect, signals)
         damped = squeezed if joint.damps_spring else signals["v"]
-        damping, force = self._bound(joint.damping) * damped, self._bound(joint.force)
+        damping, force = self._defined.bound(joint.damping) * damped, self._defined.bound(joint.force)
         return tuple(term for term in (damping, spring, *torques, force) if term != 0)
 
     def _signals(self, joint: Joint) -> dict[str, sp.Expr]:
         """Return the signals of the motion of a joint that effects use."""
         mechanism = self._rig.mechanism
-        x = self._bound(joint.motion) - self._bound(joint.rest)
+        x = self._defined.bound(joint.motion) - self._defined.bound(joint.rest)
         rate = mechanism.rate(joint.motion)
         signals = {
             "x": x,
-            "v": self._bound(rate),
-            "k": self._bound(joint.stiffness),
-            "position": self._bound(joint.motion),
+            "v": self._defined.bound(rate),
+            "k": self._defined.bound(joint.stiffness),
+            "position": self._defined.bound(joint.motion),
         }
         if not any(sp.diff(joint.motion, c.symbol) != 0 for c in mechanism.free):
-            signals["acceleration"] = self._bound(mechanism.prescribed_rate(rate))
+            signals["acceleration"] = self._defined.bound(mechanism.prescribed_rate(rate))
         if not any(effect.reads_inertia for effect in self._effects):
             return signals
         inertia = joint.inertia
         if inertia is None and mechanism.has_short_inverse:
             inertia = mechanism.inertia_along(joint.motion)
         if inertia is not None:
-            signals["m"] = self._bound(inertia)
+            signals["m"] = self._defined.bound(inertia)
         return signals
 
     def _of_motion(self) -> dict[str, sp.Expr]:
@@ -300,14 +285,16 @@ class _Path:
         deflection, rate = signals["x"], signals["v"]
         for effect in effects:
             if effect.deflection is not None:
-                own = self._states(effect, {**signals, "x": deflection, "v": rate})
+                own = self._defined.states(effect, {**signals, "x": deflection, "v": rate})
                 before = sp.Symbol("deflection_before", real=True)
                 after = self._binder.effect(effect, effect.deflection, {**signals, "x": before})
                 rate = sp.diff(after, before).xreplace({before: deflection}) * rate + sum(
                     (sp.diff(after, state.symbol) * state.limited_rate for state in own), start=sp.Integer(0)
                 )
-                deflection = self._define(Kind.DEFLECTION, effect, after.xreplace({before: deflection}))
-                rate = self._define(Kind.DEFLECTION_RATE, effect, rate, rate_of=deflection)
+                deflection = self._defined.define(
+                    Kind.DEFLECTION, effect, after.xreplace({before: deflection})
+                )
+                rate = self._defined.define(Kind.DEFLECTION_RATE, effect, rate, rate_of=deflection)
                 memories += own
         torque = signals["k"] * deflection
         for effect in effects:
@@ -318,10 +305,10 @@ class _Path:
                     "deflection": deflection,
                     "deflection_rate": rate,
                 }
-                torque = self._define(
+                torque = self._defined.define(
                     Kind.SPRING, effect, self._binder.effect(effect, effect.spring, chained)
                 )
-                memories += self._states(effect, chained)
+                memories += self._defined.states(effect, chained)
         return torque, rate
 
     def _followers(self) -> list[FirstOrderState]:
@@ -330,20 +317,22 @@ class _Path:
         for state in self._rig.mechanism.states:
             if follower is None or state.symbol != follower.symbol:
                 found.append(
-                    FirstOrderState(state.symbol, (self._bound(state.rate),), size_of(state.name), None, None)
+                    FirstOrderState(
+                        state.symbol, (self._defined.bound(state.rate),), size_of(state.name), None, None
+                    )
                 )
                 continue
             signals = {
                 **self._of_motion(),
-                "creepage": self._bound(follower.creepage),
-                "creep_gain": self._bound(follower.gain),
-                "lateral_displacement": self._bound(follower.displacement),
-                "lateral_feedback": self._bound(follower.feedback),
+                "creepage": self._defined.bound(follower.creepage),
+                "creep_gain": self._defined.bound(follower.gain),
+                "lateral_displacement": self._defined.bound(follower.displacement),
+                "lateral_feedback": self._defined.bound(follower.feedback),
             }
             linear = signals["creep_gain"] * signals["creepage"]
             # Each effect defines the whole rate; of several effects, the differences from the linear rate are added.
             changes = [
-                self._define(
+                self._defined.define(
                     Kind.LATERAL, effect, self._binder.effect(effect, effect.lateral, signals) - linear
                 )
                 for effect in self._effects
@@ -361,14 +350,14 @@ class _Path:
         shift = self._offsets.get(sensor.name, sp.Integer(0))
         if not effects and sensor.reads in forces:
             return (*forces[sensor.reads], *([shift] if shift != 0 else []))
-        reading = shift + self._bound(sensor.reads).xreplace(
+        reading = shift + self._defined.bound(sensor.reads).xreplace(
             {force: sp.Add(*terms) for force, terms in forces.items()}
         )
         for effect in effects:
             if effect.measured is not None:
                 signals = {**self._of_motion(), "reading": reading}
-                states += self._states(effect, signals)
-                reading = self._define(
+                states += self._defined.states(effect, signals)
+                reading = self._defined.define(
                     Kind.READING, effect, self._binder.effect(effect, effect.measured, signals)
                 )
         delays = [
@@ -380,34 +369,14 @@ class _Path:
             self._shown[sensor.name] = (reading, sp.Add(*(delay for _, delay in delays)))
         for effect, delay in delays:
             if not effect.shifts_the_record:
-                reading = self._define(Kind.READING, effect, late(reading, delay))
+                reading = self._defined.define(Kind.READING, effect, late(reading, delay))
         if reading_symbol(sensor.name) in self._read:
-            reading = self._name(Kind.READING, sensor.name, reading)
-        self._values[reading_symbol(sensor.name)] = reading
+            reading = self._defined.name(Kind.READING, sensor.name, reading)
+        self._defined.stands_for(reading_symbol(sensor.name), reading)
         for effect, delay in delays:
             if effect.shifts_the_record:
-                reading = self._define(Kind.READING, effect, shifted(reading, delay))
+                reading = self._defined.define(Kind.READING, effect, shifted(reading, delay))
         return (reading,)
-
-    def _define(
-        self, kind: Kind, effect: Effect, expression: sp.Expr, rate_of: sp.Symbol | None = None
-    ) -> sp.Symbol:
-        # Names of effects and parameters contain no colon, so there is no conflict.
-        symbol = sp.Symbol(f"{effect.name}:{kind.value}", real=True)
-        self._definitions.append(Definition(symbol, expression, kind, effect.name, rate_of))
-        return symbol
-
-    def _states(self, effect: Effect, signals: Mapping[str, sp.Expr]) -> list[FirstOrderState]:
-        return [
-            FirstOrderState(
-                symbol=state_symbol(effect, s.symbol),
-                terms=(self._binder.effect(effect, s.rate, signals),),
-                dimension=placed_dimension(effect, s.dimension),
-                limit=None if s.limit is None else self._binder.effect(effect, s.limit, signals),
-                owner=effect.name,
-            )
-            for s in effect.states
-        ]
 
 
 def _read_by_laws(rig: Rig) -> frozenset[sp.Symbol]:
