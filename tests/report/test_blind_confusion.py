@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rigsight.blind import Outcome
-from rigsight.report.blind_bench.confusion import confusion, pair_rows
+from rigsight.report.blind_bench.confusion import confusion, rows_of_several
 
 from .blind_content import content_of
 
@@ -32,4 +32,17 @@ def test_every_trial_but_pairs_is_in_one_cell(outcome_like: Like, wrong_outcome:
     }
     assert right == {("backlash", "backlash"), ("none", "none"), ("outside: fading drive", "unknown")}
     assert found.rows["backlash"][0].share == 0.25
-    assert pair_rows(content_of(outcomes)) == [("both named", 1)]
+    assert rows_of_several(content_of(outcomes)) == {"Pairs": [("both named", 1)]}
+
+
+def test_triples_have_a_table_of_their_own(outcome_like: Like, wrong_outcome: Like) -> None:
+    triple = ("backlash", "input_delay", "sensor_lag")
+    outcomes = [
+        outcome_like(kind="triple", effects=triple, named=triple),
+        wrong_outcome(kind="triple", effects=triple, named=triple[:2]),
+        wrong_outcome(kind="triple", effects=triple, verdict="unknown", named=()),
+    ]
+    assert rows_of_several(content_of(outcomes)) == {
+        "Triples": [("all three named", 1), ("one or two of them named", 1), ("called unknown", 1)]
+    }
+    assert not confusion(content_of(outcomes)).rows

@@ -12,9 +12,9 @@ from rigsight.blind.scoring.summary import (
     WRONG_PLACE,
     confusion,
     held_out,
-    pairs,
     parameters,
     reliability,
+    several,
 )
 
 Like = Callable[..., Outcome]
@@ -65,7 +65,7 @@ def test_a_pair_is_named_whole_in_part_or_not(
     found = outcome_like(
         kind="pair", effects=pair, named=named, verdict=verdict, right=right, effect_right=right
     )
-    assert pairs([found]) == {what: 1}
+    assert several([found], "pair") == {what: 1}
 
 
 def test_the_right_effects_at_a_wrong_place_are_a_verdict_of_their_own(wrong_outcome: Like) -> None:
@@ -74,7 +74,7 @@ def test_the_right_effects_at_a_wrong_place_are_a_verdict_of_their_own(wrong_out
         kind="pair", effects=("backlash", "input_delay"), named=("backlash", "input_delay"), effect_right=True
     )
     assert confusion([single])["backlash"] == {WRONG_PLACE: 1}
-    assert pairs([pair]) == {WRONG_PLACE: 1}
+    assert several([pair], "pair") == {WRONG_PLACE: 1}
     figures = summary([single, pair])["by"]["rig"]["axis"]
     assert (figures["right"]["count"], figures["effect_right"]["count"]) == (0, 2)
     assert (figures["looked_at"]["count"], figures["looked_at"]["total"]) == (1, 1)

@@ -16,6 +16,7 @@ from rigsight.blind.scoring.parameter_errors import OF_RIG, ParameterError
 from rigsight.blind.scoring.probability_scores import log_score, probability_scores
 from rigsight.blind.scoring.score import FAILED, SEVERAL, Outcome, WithheldError
 from rigsight.blind.scoring.shares import mean, median, quantile, share_of
+from rigsight.blind.subjects import Kind
 
 ALL = "all"
 """Of the conditions together."""
@@ -38,7 +39,8 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "goals": goals,
         "targets": targets(goals),
         "confusion": confusion(outcomes),
-        "pairs": pairs(outcomes),
+        "pairs": several(outcomes, "pair"),
+        "triples": several(outcomes, "triple"),
         "reliability": reliability(outcomes),
         "probabilities": probability_scores(outcomes),
         "held_out": held_out(outcomes),
@@ -108,24 +110,25 @@ def confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, int]]:
     return {truth: dict(counts.most_common()) for truth, counts in sorted(table.items())}
 
 
-def pairs(outcomes: Sequence[Outcome]) -> dict[str, int]:
-    """Return how many pairs were named whole, in part, or not at all."""
-    counts = Counter(_of_pair(o) for o in outcomes if o.kind == "pair")
+def several(outcomes: Sequence[Outcome], kind: Kind) -> dict[str, int]:
+    """Return how many pairs, or triples, were named whole, in part, or not at all."""
+    counts = Counter(_named_of_several(o) for o in outcomes if o.kind == kind)
     return dict(counts.most_common())
 
 
-def _of_pair(found: Outcome) -> str:
+def _named_of_several(found: Outcome) -> str:
+    whole, part = ("both", "one") if len(found.effects) == 2 else ("all", "some")
     if found.right:
-        return "both"
+        return whole
     if found.effect_right:
         return WRONG_PLACE
     hit = set(found.effects) & set(found.named)
     if not found.named:
         return found.verdict
     if len(hit) == len(found.effects):
-        return "both and another"
+        return f"{whole} and another"
     if hit:
-        return "one alone" if len(hit) == len(found.named) else "one with another"
+        return f"{part} alone" if len(hit) == len(found.named) else f"{part} with another"
     return "others"
 
 

@@ -1,4 +1,4 @@
-"""Confusion matrix of hidden and named effects for single effects and controls, and the outcome for pairs."""
+"""Confusion matrix of hidden and named effects for single effects and controls, and the outcome for several effects."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Confusion:
 
 
 def confusion(content: Mapping[str, Any]) -> Confusion:
-    """Return the confusion matrix of all truths but pairs; sets of several effects share one column."""
-    table = {truth: counts for truth, counts in content["confusion"].items() if not _is_pair(truth)}
+    """Return the confusion matrix of all truths but pairs and triples; sets of several effects share one column."""
+    table = {truth: counts for truth, counts in content["confusion"].items() if not _are_several(truth)}
     folded: dict[str, dict[str, int]] = {}
     for truth, counts in table.items():
         row: dict[str, int] = {}
@@ -52,7 +52,7 @@ def confusion(content: Mapping[str, Any]) -> Confusion:
     )
 
 
-def _is_pair(truth: str) -> bool:
+def _are_several(truth: str) -> bool:
     return " + " in truth and not truth.startswith(OUTSIDE)
 
 
@@ -62,19 +62,27 @@ def _cell(truth: str, named: str, row: Mapping[str, int]) -> Cell:
     return Cell(count, count / sum(row.values()), named == expected)
 
 
-def pair_rows(content: Mapping[str, Any]) -> list[tuple[str, int]]:
-    """Return what became of pairs, and how often."""
+def rows_of_several(content: Mapping[str, Any]) -> dict[str, list[tuple[str, int]]]:
+    """Return what became of pairs and of triples, and how often; empty where none were tried."""
     words = {
         "both": "both named",
-        _WRONG_PLACE: "both named, at least one at a wrong place",
+        "all": "all three named",
+        _WRONG_PLACE: "all named, at least one at a wrong place",
         "both and another": "both named, and another effect",
+        "all and another": "all three named, and another effect",
         "one alone": "one of them named alone",
+        "some alone": "one or two of them named",
         "one with another": "one of them named, with another effect",
+        "some with another": "one or two of them named, with another effect",
         "others": "other effects named",
         "unknown": "called unknown",
         "none": "no gap seen",
         "parameters": "wrong parameters blamed",
         "failed": "diagnosis failed",
     }
-    counts: Mapping[str, int] = content["pairs"]
-    return [(words[name], counts[name]) for name in words if name in counts]
+    found = {title: content[kind] for title, kind in (("Pairs", "pairs"), ("Triples", "triples"))}
+    return {
+        title: [(words[name], counts[name]) for name in words if name in counts]
+        for title, counts in found.items()
+        if counts
+    }

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from rigsight.report.blind_bench import conditions, views
-from rigsight.report.blind_bench.confusion import confusion, pair_rows
+from rigsight.report.blind_bench.confusion import confusion, rows_of_several
 
 _MOST_WRONG = 100
 """Wrong trials that the text lists; ``blind.json`` has all."""
@@ -42,12 +42,13 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         _table(["Figure", "Found", "Trials", "95 % interval"], views.beside_rows(content)),
         *_conditions(content),
         "## True causes and diagnosed causes",
-        _table(["Hidden", "Trials", "Right", "Named instead"], _confusion_rows(content)),
     ]
-    if pairs := pair_rows(content):
+    if rows := _confusion_rows(content):
+        parts.append(_table(["Hidden", "Trials", "Right", "Named instead"], rows))
+    for title, outcomes in rows_of_several(content).items():
         parts += [
-            "Pairs, gaps of all sizes:",
-            _table(["Outcome", "Trials"], [[words, str(count)] for words, count in pairs]),
+            f"{title}, gaps of all sizes:",
+            _table(["Outcome", "Trials"], [[words, str(count)] for words, count in outcomes]),
         ]
     parts += [
         "## Are the stated probabilities calibrated?",

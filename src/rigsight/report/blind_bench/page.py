@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from rigsight.report.blind_bench import conditions, views
-from rigsight.report.blind_bench.confusion import confusion, pair_rows
+from rigsight.report.blind_bench.confusion import confusion, rows_of_several
 from rigsight.report.blind_bench.figures import held_out_figure, reliability_figure
 from rigsight.report.render import environment
 
@@ -39,7 +39,7 @@ def render_blind(content: Mapping[str, Any]) -> str:
         seconds={name: views.number(value) for name, value in content["seconds"].items()},
         hours=views.number(content["seconds"]["total"] / 3600.0),
         confusion=confusion(content),
-        pairs=pair_rows(content),
+        several=rows_of_several(content),
         reliability=views.reliability_rows(content),
         score_heads=views.SCORE_HEADS,
         scores=views.score_rows(content),
