@@ -170,6 +170,7 @@ def test_a_campaign_is_done_once_and_again_when_it_has_changed(
         ({"effects": []}, ["effects", "an empty list", "exactly one effect"]),
         ({"kind": "pair"}, ["effects", "cubic_stiffness", "exactly two"]),
         ({"kind": "pair", "effects": ["backlash", "backlash"]}, ["exactly two"]),
+        ({"kind": "triple", "effects": ["backlash", "input_delay"]}, ["exactly three"]),
         ({"kind": "none"}, ["effects", "an empty list"]),
         ({"kind": "outside"}, ["effects", "not in the catalogue"]),
         ({"effects": ["conicity_variation"]}, ["conicity_variation", "axis"]),

@@ -55,6 +55,7 @@ _LEAST = '{"kind": "single", "effects": ["backlash"]}'
 _COUNTS: dict[Kind, tuple[int, int, str]] = {
     "single": (1, 1, "exactly one effect of the catalogue"),
     "pair": (2, 2, "exactly two effects of the catalogue"),
+    "triple": (3, 3, "exactly three effects of the catalogue"),
     "none": (0, 0, "an empty list"),
     "parameters": (0, 0, "an empty list"),
     "outside": (1, 50, "the name of at least one effect that is not in the catalogue"),
