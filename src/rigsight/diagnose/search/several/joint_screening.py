@@ -114,7 +114,18 @@ class _Columns:
         return cls(chosen, gram[np.ix_(kept, kept)], unit[:, kept].T @ residual, reversible)
 
     def extended(self, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
-        """Return sets with one more effect each, best first, and the squared residual that each explains."""
+        """Return sets with one more effect each, best first, and the squared residual that each explains.
+
+        Parameters
+        ----------
+        chosen
+            Indices of the columns of each set, shape (n_sets, size).
+
+        Returns
+        -------
+        chosen, explained
+            Shapes (n_new, size + 1) and (n_new,), at most `SEARCH.joint_beam` sets.
+        """
         names = np.array([response.effect.name for response in self.responses])
         found: dict[tuple[int, ...], float] = {}
         for own in chosen:
@@ -135,6 +146,7 @@ class _Columns:
         return np.array(best, dtype=np.int64).reshape(-1, size), np.array([found[own] for own in best])
 
     def effect_set(self, own: NDArray[np.int64], share: float) -> EffectSet:
+        """Return a set of columns, shape (size,), as effects with the sizes that the regression gives them."""
         factors = np.linalg.solve(self.gram[np.ix_(own, own)], self.along[own])
         members = [self.responses[i] for i in own]
         values = tuple(
