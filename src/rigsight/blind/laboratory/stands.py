@@ -149,11 +149,13 @@ def draw_law(stand: Stand, values: Mapping[str, float], rng: np.random.Generator
     else:
         found = linearize(compose(stand.rig), values)
         gain = float(np.real(found.frequency_response(np.zeros(1))[0, 0, 0]))
-        vibrating = np.abs(found.poles[np.abs(found.poles.imag) > 0.0])
+        is_oscillating = np.abs(found.poles.imag) > 0.0
+        # A stand may be damped so strongly that none of its motions oscillates.
+        lowest = float(np.min(np.abs(found.poles[is_oscillating] if np.any(is_oscillating) else found.poles)))
         stiffened = math.exp(rng.uniform(*np.log(_STIFFENED)))
-        bandwidth = float(np.min(vibrating)) * math.sqrt(1.0 + stiffened)
+        bandwidth = lowest * math.sqrt(1.0 + stiffened)
         p = stiffened / gain
-        d = 2.0 * _LOOP_DAMPING * math.sqrt(1.0 + stiffened) / (float(np.min(vibrating)) * gain)
+        d = 2.0 * _LOOP_DAMPING * math.sqrt(1.0 + stiffened) / (lowest * gain)
     law = Law(p, d, _SMOOTHED * bandwidth, bandwidth)
     wired = wired_rig(stand.rig, law, None)
     if linearize(compose(wired), {**values, **wired_numbers(law, None)}).stability == "unstable":

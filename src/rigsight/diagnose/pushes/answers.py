@@ -25,6 +25,7 @@ from rigsight.identify import FitResult
 from rigsight.identify.start.place_scales import scales_at_places
 from rigsight.records.record import Record
 from rigsight.simulate import compose, parameter_vector, record_input, record_values, simulate_sets
+from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
 from rigsight.units import characteristic_value
 
 Floats = NDArray[np.float64]
@@ -144,7 +145,8 @@ class Answers:
         # A rig with one motion is searched in sizes of its own kind; a push needs those of its place.
         self.scales = scales_at_places(rig, records, self.values) if rig.has_one_motion else context.scales
         self.records = [self._calm(record) for record in records]
-        self.calm_outputs = [self._outputs(i, record) for i, record in enumerate(self.records)]
+        self._held = [record_input(self.structure, record) for record in self.records]
+        self.calm_outputs = [self._outputs(i, held) for i, held in enumerate(self._held)]
         outputs = [signal.name for signal in rig.outputs]
         self._weights = [
             np.array([1.0 / context.noise[name] if name in record else 0.0 for name in outputs])
@@ -214,10 +216,12 @@ class Answers:
         size
             Factor on it so small that the answer is proportional.
         """
+        column = self.structure.rig.mechanism.inputs.index(push(place))
+        is_drive = place in signal_columns(self.context.rig)
         changes = []
         for i, (record, signal) in enumerate(zip(self.records, signals, strict=True)):
-            out = self._outputs(i, record.with_signals(**{push(place): size * signal}))
-            changes.append((out - self.calm_outputs[i])[:, : self._n_outputs] / size)
+            pushed = self._held[i].with_input(column, _between_samples(size * signal, record, is_drive))
+            changes.append((self._outputs(i, pushed) - self.calm_outputs[i])[:, : self._n_outputs] / size)
         return self.stacked(changes)
 
     def to_effect(self, effect: Effect, own: Mapping[str, float]) -> Floats:
@@ -310,10 +314,10 @@ class Answers:
             [characteristic_value(d, self.scales) for d in self.structure.state_dimensions]
         )
         changes = []
-        for index, record in enumerate(self.records):
+        for index, held in enumerate(self._held):
             x0 = np.repeat(self.initial_states[index][:, None], p.shape[1], axis=1)
             x0[np.arange(n_states), len(free) + np.arange(n_states)] += _STEP * state_sizes
-            out = self._outputs(index, record, p, x0)
+            out = self._outputs(index, held, p, x0)
             changes.append((out - self.calm_outputs[index][:, :, None])[:, : self._n_outputs])
         return changes
 
@@ -323,12 +327,12 @@ class Answers:
         return record.with_signals(**{signal.name: rest for signal in pushes})
 
     def _outputs(
-        self, index: int, record: Record, p: Floats | None = None, x0: Floats | None = None
+        self, index: int, held: HeldInput, p: Floats | None = None, x0: Floats | None = None
     ) -> Floats:
         """Return the outputs along a record, shape (n_samples, n_outputs), with sets behind where `p` and `x0` have several."""
+        record = self.records[index]
         sets = self._with_own_constants(record, self._p[:, None] if p is None else p)
         states = self.initial_states[index][:, None] if x0 is None else x0
-        held = record_input(self.structure, record)
         with np.errstate(all="ignore"):
             out = simulate_sets(
                 self.structure, held, sets, states, record.n_samples, self.fit.substeps[index]
@@ -341,6 +345,13 @@ class Answers:
         for name, value in record_values(self.structure, {}, record).items():
             own[self.structure.names.index(name)] = value
         return own
+
+
+def _between_samples(signal: Floats, record: Record, is_drive: bool) -> HeldInput:
+    """Return a push between its samples: that at a drive jumps as its input does, any other follows a motion, which is smooth."""
+    if is_drive and record.hold == "zoh":
+        return hold_input(signal, record.dt, "zoh")
+    return hold_motion(signal, np.gradient(signal, record.dt), record.dt)
 
 
 def orthonormal(columns: Floats) -> Floats:
