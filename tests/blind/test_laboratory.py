@@ -16,7 +16,7 @@ from rigsight.blind.counted import COUNTED_EFFECTS
 from rigsight.blind.laboratory import subjects
 from rigsight.blind.laboratory.bench import LaboratoryBench
 from rigsight.blind.laboratory.channels import in_steps, sampled
-from rigsight.blind.laboratory.stands import STANDS, WARMTH, Softening, wired_numbers, wired_rig
+from rigsight.blind.laboratory.stands import STANDS, WARMTH, Softening, draw_law, wired_numbers, wired_rig
 from rigsight.blind.laboratory.subjects import (
     CONDITIONS,
     FAMILIES,
@@ -50,6 +50,15 @@ def taken(condition: subjects.Condition, stand: str) -> tuple[LaboratoryBench, t
 
 def quiet(bench: LaboratoryBench) -> list[Record]:
     return [bench.quiet((), {}, run) for run in bench.runs]
+
+
+def test_a_stand_that_does_not_oscillate_has_a_stable_position_loop() -> None:
+    stand = STANDS["running_gear"]
+    values = {**stand.draw_numbers(np.random.default_rng(SEED)), "k_d": 1e3}
+    assert not np.any(linearize(compose(stand.rig), values).poles.imag)
+    law = draw_law(stand, values, np.random.default_rng(SEED))
+    wired = {**values, **wired_numbers(law, None)}
+    assert linearize(compose(wired_rig(stand.rig, law, None)), wired).stability == "stable"
 
 
 @pytest.mark.parametrize("n", [10, 20, 35, 60])

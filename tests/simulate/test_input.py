@@ -9,7 +9,7 @@ from scipy.signal import cont2discrete, dlsim
 from rigsight.effects import effect_named
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, parameter_vector, record_input, simulate, simulate_sets
-from rigsight.simulate.input_hold import hold_input
+from rigsight.simulate.input_hold import hold_input, together
 
 DT = 5e-3
 
@@ -57,6 +57,37 @@ def test_band_limited_input_is_the_analog_signal(axis, axis_values, make_record,
     linear = simulate(axis, axis_values, make_record(samples, dt=DT), initial_state=start)["x"]
     assert error_of(simulated[1500:], exact[1500:]) <= 2e-4
     assert error_of(simulated[1500:], exact[1500:]) <= 0.1 * error_of(linear[1500:], exact[1500:])
+
+
+@pytest.mark.parametrize(("cycles_per_sample", "per_sample"), [(0.02, 1), (0.2, 2)])
+def test_slow_band_limited_input_has_one_piece_per_sample(cycles_per_sample, per_sample, error_of):
+    omega = 2.0 * np.pi * cycles_per_sample / DT
+    held = hold_input(np.sin(omega * DT * np.arange(2000)), DT, "band_limited")
+    assert held.per_sample == per_sample
+    for tau in np.array([0.0, 0.25, 0.5, 0.75]) * held.interval:
+        between = held.coefficients[1:] @ tau ** np.arange(4)
+        exact = np.sin(omega * (np.arange(between.size) * held.interval + tau))
+        assert error_of(between[200:-200], exact[200:-200]) <= 2e-3
+        if per_sample == 1:
+            assert error_of(between[200:-200], exact[200:-200]) <= 3e-5
+
+
+def test_an_input_replaced_among_others_is_the_same_as_holding_it_with_them():
+    samples = np.random.default_rng(3).normal(size=(4, 50)).cumsum(axis=1)
+    first, second, third = (
+        hold_input(one, DT, hold) for one, hold in zip(samples, ("zoh", "band_limited", "foh"), strict=False)
+    )
+    slow = hold_input(samples[3], DT, "zoh")
+    for before, other in [((first, slow), second), ((first, second), third), ((slow, third), second)]:
+        found = together(before).with_input(1, other)
+        expected = together((before[0], other))
+        assert found.continuous == (expected.continuous and all(one.continuous for one in before))
+        times = np.linspace(0.0, 1.0, 7)[:-1] * expected.interval
+        parts = found.per_sample // expected.per_sample
+        for tau in times:
+            piece, own = int(tau / found.interval), tau % found.interval
+            at = found.coefficients[1 + piece :: parts] @ own ** np.arange(4)
+            np.testing.assert_allclose(at, expected.coefficients[1:] @ tau ** np.arange(4), atol=1e-9)
 
 
 @pytest.mark.parametrize("hold", ["zoh", "foh", "band_limited"])

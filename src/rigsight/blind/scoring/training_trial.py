@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
@@ -61,16 +61,12 @@ def training_trial(
     by_place = key.get("schema_version", 1) >= BY_PLACE_SCHEMA
     truth, needed = effects_at_places(key, by_place), needed_effects(key, by_place)
     tried = [candidate for candidate in diagnosis["candidates"] if candidate["effects"]]
-    shares = [_share(candidate) for candidate in tried]
+    shares = [share_of(candidate) for candidate in tried]
     total = math.fsum(shares)
     shares = [share / total if total > 0.0 else 0.0 for share in shares]
     is_true = [bool(needed) and needed <= effects_at_places(c, by_place) <= truth for c in tried]
-    named = effects_at_places(diagnosis, by_place)
     verdict = cast("Verdict", diagnosis["verdict"])
-    if verdict == "effect":
-        first = next(i for i, c in enumerate(tried) if effects_at_places(c, by_place) == named)
-    else:
-        first = max(range(len(tried)), key=shares.__getitem__, default=-1)
+    first = first_model(diagnosis, tried)
     has_effect = verdict in ("effect", "unknown")
     is_first = is_true[first] if has_effect and first >= 0 else verdict == key["kind"]
     cause: Cause = "first" if is_first else ("listed" if any(is_true) else "outside")
@@ -99,7 +95,24 @@ def training_trial(
     )
 
 
-def _share(candidate: Mapping[str, Any]) -> float:
+def first_model(diagnosis: Mapping[str, Any], tried: Sequence[Mapping[str, Any]]) -> int:
+    """Return the index of the model that is named, or without a named effect of the first in the ranking; -1 if none was tried.
+
+    Parameters
+    ----------
+    diagnosis
+        Content of ``diagnosis.json``.
+    tried
+        Its candidates with an effect.
+    """
+    if diagnosis["verdict"] == "effect":
+        named = effects_at_places(diagnosis, True)
+        return next(i for i, candidate in enumerate(tried) if effects_at_places(candidate, True) == named)
+    return max(range(len(tried)), key=lambda i: share_of(tried[i]), default=-1)
+
+
+def share_of(candidate: Mapping[str, Any]) -> float:
+    """Return a candidate's share of the ranking."""
     return float(candidate["ranking_share"] or 0.0)
 
 
