@@ -17,7 +17,7 @@ from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import FirstLook
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.one_law import are_one_law
-from rigsight.diagnose.search.several.one_more_effect import is_among, with_one_more
+from rigsight.diagnose.search.several.one_more_effect import with_one_more
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over
@@ -77,7 +77,8 @@ def with_relatives(
     triples
         Fitted and scored.
     pairs
-        Fitted and scored; parts of the best triples that are missing are fitted too, so that each effect's share can be told.
+        Fitted and scored. The parts of the best triples are fitted from there too: so that each effect's share can be told, and
+        because the fit of a pair may have stopped elsewhere where the third effect does nothing.
     singles
         Every effect alone, fitted and scored.
     effects
@@ -100,7 +101,7 @@ def with_relatives(
     found, known = list(triples), list(pairs)
     for is_tried in (as_good, plainer, as_good):
         best = min(found, key=lambda model: model.error_over_noise)
-        known += _parts_of(context, best, known)
+        known = _with_parts(context, best, known)
         new: list[Scored] = []
         for replaced in best.effects:
             pair = next(p for p in known if set(p.names) == set(best.names) - {replaced.name})
@@ -108,8 +109,10 @@ def with_relatives(
             if instead and pair.residuals:
                 new += with_one_more(context, pair, instead, [*found, *new], singles, prepare)
         found += finished_best(context, new)
-    known += _parts_of(context, min(found, key=lambda model: model.error_over_noise), known)
-    return found, known
+    best = min(found, key=lambda model: model.error_over_noise)
+    known = _with_parts(context, best, known)
+    near = [pair for pair in known if pair.error_over_noise <= VERDICT.comparable * best.error_over_noise]
+    return found, [*refine(context, near), *(pair for pair in known if pair not in near)]
 
 
 def finished_best(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
@@ -127,8 +130,8 @@ def finished_best(context: FitContext, models: Sequence[Scored]) -> list[Scored]
     return refine(context, [*best, *ordered[SEARCH.most_finished :]])
 
 
-def _parts_of(context: FitContext, triple: Scored, known: Sequence[Scored]) -> list[Scored]:
-    """Return the pairs of effects of a triple that have not been fitted so far, fitted from where they stand in it."""
+def _with_parts(context: FitContext, triple: Scored, pairs: Sequence[Scored]) -> list[Scored]:
+    """Return the pairs with those of the effects of a triple, fitted from where they stand in it if that is better."""
 
     def one(effects: tuple[Effect, ...]) -> Scored:
         structure = context.simplest(effects)
@@ -139,9 +142,9 @@ def _parts_of(context: FitContext, triple: Scored, known: Sequence[Scored]) -> l
         )
         return followed(context, look, promising=True, finish=False)
 
-    missing = [
-        two
-        for two in itertools.combinations(triple.effects, 2)
-        if not is_among(known, {effect.name for effect in two})
-    ]
-    return list(context.threads.side_by_side(one, missing))
+    found = {frozenset(pair.names): pair for pair in pairs}
+    for part in context.threads.side_by_side(one, list(itertools.combinations(triple.effects, 2))):
+        names = frozenset(part.names)
+        if names not in found or part.error_over_noise < found[names].error_over_noise:
+            found[names] = part
+    return list(found.values())
