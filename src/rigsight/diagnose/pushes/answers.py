@@ -32,7 +32,8 @@ Floats = NDArray[np.float64]
 
 _STEP = 1e-3
 """Relative change of a parameter whose answer is taken by differences."""
-_DEPENDENT = 1e-9
+_DEPENDENT = 1e-7
+"""Part of a column outside the others below which it depends on them: squares are accurate to 1e-16."""
 
 
 @dataclass(frozen=True)
@@ -361,5 +362,10 @@ def orthonormal(columns: Floats) -> Floats:
     columns = columns[:, size > 0.0] / size[size > 0.0]
     if columns.shape[1] == 0:
         return np.zeros((columns.shape[0], 0))
-    base, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(base[:, singular > _DEPENDENT * singular[0]])
+    # From the squares, which takes a quarter of the time of a singular value decomposition of these tall columns; done twice,
+    # the basis is orthonormal to rounding.
+    for _ in range(2):
+        squares, directions = np.linalg.eigh(columns.T @ columns)
+        kept = squares > _DEPENDENT**2 * squares[-1]
+        columns = columns @ (directions[:, kept] / np.sqrt(squares[kept]))
+    return columns
