@@ -155,7 +155,8 @@ def outcome(
     Parameters
     ----------
     key
-        As `draw_trial` makes it. An external key may contain a `fingerprint`, and None for `where` and `gap`.
+        As `draw_trial` makes it. An external key may contain a `fingerprint`, and None for `where` and `gap`. Without `values`
+        no errors of parameters are told.
     diagnosis
         Content of ``diagnosis.json``; None if the diagnosis failed.
     withheld
@@ -359,6 +360,6 @@ def _parameter_errors(key: Mapping[str, Any], found: Mapping[str, Any]) -> tuple
     by_place = key.get("schema_version", 1) >= BY_PLACE_SCHEMA
     truth = effects_at_places(key, by_place)
     named = next((c for c in found["candidates"] if effects_at_places(c, by_place) == truth), None)
-    if named is None:
+    if named is None or "values" not in key:
         return ()
     return parameter_errors(rig_of(key), sorted(truth), named["parameters"], key["values"])
