@@ -90,6 +90,25 @@ def test_an_input_replaced_among_others_is_the_same_as_holding_it_with_them():
             np.testing.assert_allclose(at, expected.coefficients[1:] @ tau ** np.arange(4), atol=1e-9)
 
 
+def test_a_sum_of_inputs_has_the_sum_of_their_values_at_every_time():
+    t = DT * np.arange(200)
+    slow, fast = np.sin(2.0 * t), np.random.default_rng(3).normal(size=t.size)
+    one, other = (hold_input(signal, DT, "band_limited") for signal in (slow, fast))
+    assert (one.per_sample, other.per_sample) == (1, 2)
+    for found in (one.plus(other), other.plus(one)):
+        assert found.per_sample == 2
+        for tau in np.array([0.0, 0.6]) * found.interval:
+            first, second = (
+                found.coefficients[1 + piece :: 2] @ tau ** np.arange(4)
+                - other.coefficients[1 + piece :: 2] @ tau ** np.arange(4)
+                for piece in (0, 1)
+            )
+            slow_at = [
+                one.coefficients[1:] @ (tau + piece * found.interval) ** np.arange(4) for piece in (0, 1)
+            ]
+            np.testing.assert_allclose([first, second], slow_at, atol=1e-12)
+
+
 @pytest.mark.parametrize("hold", ["zoh", "foh", "band_limited"])
 @pytest.mark.parametrize("periods", [0, 1, 7])
 def test_delay_by_whole_samples_shifts_the_response(

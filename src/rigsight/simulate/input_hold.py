@@ -71,17 +71,17 @@ class HeldInput:
         held
             The other one, of the same record.
         """
-        per_sample = math.lcm(self.per_sample, held.per_sample)
-        ours = _divided(self, per_sample // self.per_sample)
-        theirs = _divided(held, per_sample // held.per_sample)
+        ours, theirs = _alike_divided((self, held))
         rows = ours.coefficients.reshape(ours.n_pieces + 1, -1, 4).copy()
         rows[:, column] = theirs.coefficients
-        return HeldInput(
-            rows.reshape(ours.coefficients.shape),
-            ours.interval,
-            per_sample,
-            self.continuous and held.continuous,
-        )
+        continuous = self.continuous and held.continuous
+        return replace(ours, coefficients=rows.reshape(ours.coefficients.shape), continuous=continuous)
+
+    def plus(self, change: HeldInput) -> HeldInput:
+        """Return the sum of the same inputs of one record; longer pieces are divided."""
+        ours, theirs = _alike_divided((self, change))
+        continuous = self.continuous and change.continuous
+        return replace(ours, coefficients=ours.coefficients + theirs.coefficients, continuous=continuous)
 
     def read_ahead(self, column: int, by: float) -> HeldInput:
         """Return the same with one input advanced in time, with cubic Hermite interpolation between nodes.
@@ -221,14 +221,18 @@ def together(inputs: Sequence[HeldInput]) -> HeldInput:
     """Return several inputs as one; pieces are divided if those of other inputs are shorter."""
     if len(inputs) == 1:
         return inputs[0]
-    per_sample = math.lcm(*(held.per_sample for held in inputs))
-    divided = [_divided(held, per_sample // held.per_sample) for held in inputs]
-    return HeldInput(
-        np.stack([held.coefficients for held in divided], axis=1),
-        divided[0].interval,
-        per_sample,
+    divided = _alike_divided(inputs)
+    return replace(
+        divided[0],
+        coefficients=np.stack([held.coefficients for held in divided], axis=1),
         continuous=all(held.continuous for held in inputs),
     )
+
+
+def _alike_divided(inputs: Sequence[HeldInput]) -> list[HeldInput]:
+    """Return inputs of one record, each with as many pieces per sample as the others."""
+    per_sample = math.lcm(*(held.per_sample for held in inputs))
+    return [_divided(held, per_sample // held.per_sample) for held in inputs]
 
 
 def _divided(held: HeldInput, parts: int) -> HeldInput:

@@ -19,6 +19,7 @@ from rigsight.identify import FitResult, characteristic_scales
 from rigsight.records import Record
 from rigsight.rigs import AXIS, Rig
 from rigsight.simulate import compose, simulate
+from rigsight.simulate.input_hold import Hold
 
 DT, N = 0.01, 2000
 VALUES = {"gain": 1.0, "m": 1.0, "d": 0.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
@@ -124,13 +125,21 @@ def test_an_observer_has_errors_of_the_size_that_fits_scatter_by(noise: float, f
     assert 0.6 < np.median(errors) / np.sqrt(np.mean(np.square(off))) < 1.7
 
 
-def _followed(rig: Rig, noise: float, force: float, seed: int) -> tuple[FitContext, FitResult]:
+def test_an_observed_record_of_an_analog_input_has_errors_from_the_bootstrap() -> None:
+    """Forces change faster than the input, so that they have more pieces in a sample."""
+    bench, fit = _followed(AXIS, 1e-3, 0.02, seed=0, hold="band_limited")
+    assert uncertainty_of(bench, fit, np.random.default_rng(0)).method == "bootstrap"
+
+
+def _followed(
+    rig: Rig, noise: float, force: float, seed: int, hold: Hold = "foh"
+) -> tuple[FitContext, FitResult]:
     rng, t = np.random.default_rng(seed), DT * np.arange(N)
     own = {**VALUES, "k": 0.0}
     records = []
     for _ in range(2):
         u = sum(0.3 * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in np.arange(0.4, 4.0, 0.3))
-        asked = Record("run", DT, {"u": np.asarray(u)}, {}, hold="foh")
+        asked = Record("run", DT, {"u": np.asarray(u)}, {}, hold=hold)
         pushed = asked.with_signals(u=u + force * colored((N,), np.inf, rng))
         x = simulate(compose(rig), own, pushed)["x"] + rng.normal(scale=noise, size=N)
         records.append(replace(asked.with_signals(x=x), observed={"x": 5.0}))

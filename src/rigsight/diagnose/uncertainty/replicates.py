@@ -173,8 +173,7 @@ class Replicates:
         signals = {**record.signals, **dict(zip(joints, force.T, strict=True))}
         held = record_input(structure, replace(record, signals=signals))
         if noise is not None and record.observed:
-            change = self._observed_noise(record, noise)
-            held = replace(held, coefficients=held.coefficients + change.coefficients)
+            held = held.plus(self._observed_noise(record, noise))
         p = parameter_vector(structure, record_values(structure, self.fit.values, record))
         state = self.fit.initial_states[index]
         steps = None if taken is None else taken[: held.n_pieces]
