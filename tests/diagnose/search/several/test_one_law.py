@@ -17,6 +17,8 @@ UNLIKE = ("bouc_wen_hysteresis", "quadratic_damping")
         (SPRINGS, True),
         (("quadratic_damping", "stribeck_friction"), True),
         (("flexible_mode", "actuator_lag"), True),
+        (("power_law_stiffness", "torque_ripple"), True),
+        (("backlash", "torque_ripple"), False),
         (UNLIKE, False),
         (("flexible_mode", "cubic_stiffness"), False),
         (("cubic_stiffness",), False),

@@ -129,11 +129,13 @@ def _is_linear_in(law: sp.Expr, signals: Sequence[sp.Symbol]) -> bool:
 
 
 def _is_of_the_spring(effect: Effect) -> bool:
-    of_displacement = effect.torque is not None and not effect.states and _read(effect) == {canonical.x.name}
+    is_without_memory = effect.torque is not None and not effect.states
+    of_displacement = is_without_memory and effect.reads(canonical.x) and _read(effect) == {canonical.x.name}
     return effect.spring is not None or effect.deflection is not None or of_displacement
 
 
 def _read(effect: Effect) -> set[str]:
-    """Return the names of the signals that a force depends on."""
+    """Return the names of the signals that a force depends on; a position is a displacement from another rest."""
     assert effect.torque is not None
-    return {symbol.name for symbol in effect.torque.free_symbols} - {p.name for p in effect.parameters}
+    read = {symbol.name for symbol in effect.torque.free_symbols} - {p.name for p in effect.parameters}
+    return {canonical.x.name if name == canonical.position.name else name for name in read}
