@@ -22,6 +22,8 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, special_values
 
 _ROUGH_ACCURACY = 1e-3
+_LOOKED_AT = 8000
+"""Samples of all stretches together at which a candidate is first looked at."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,17 @@ class FitContext:
         duration = sum(record.n_samples * record.dt for record in records)
         most = HORIZON.most_pieces / max(1, len(self.rig.mechanism.free))
         return cut(records, max(periods * self.period, duration * len(self.look) / len(records) / most))
+
+    def looking_where_left(self, fit: FitResult) -> FitContext:
+        """Return the same, but looking at the stretch of each estimation record in which a fit leaves most.
+
+        What one more effect would explain may lie far from the strongest motion, such as a second resonance.
+        """
+        if len(fit.residuals) != len(self.estimation):
+            return self
+        weights = np.array([1.0 / self.noise[signal.name] for signal in self.rig.outputs])
+        left = [np.nansum((residual * weights) ** 2, axis=1) for residual in fit.residuals]
+        return replace(self, look=_strongest(self.estimation, left))
 
     def problem(
         self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY
@@ -294,15 +307,25 @@ def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
     return tuple(cut_off)
 
 
-def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = 8000) -> tuple[Record, ...]:
+def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = _LOOKED_AT) -> tuple[Record, ...]:
     """Return the most excited stretch of each record, together about `n_samples` long."""
+    shown = zip(records, shown_by(rig, records), strict=True)
+    return _strongest(
+        records, [(record[output] - np.mean(record[output])) ** 2 for record, output in shown], n_samples
+    )
+
+
+def _strongest(
+    records: Sequence[Record], powers: Sequence[NDArray[np.float64]], n_samples: int = _LOOKED_AT
+) -> tuple[Record, ...]:
+    """Return the stretch of each record with the largest sum of a power, shape (n_samples,), together about `n_samples` long."""
     share = max(500, n_samples // max(1, len(records)))
     stretches = []
-    for record, output in zip(records, shown_by(rig, records), strict=True):
+    for record, power in zip(records, powers, strict=True):
         if record.n_samples <= share:
             stretches.append(record)
             continue
-        energy = np.cumsum((record[output] - np.mean(record[output])) ** 2)
+        energy = np.cumsum(power)
         start = int(np.argmax(energy[share:] - energy[:-share]))
         stretches.append(record.slice(start, start + share))
     return tuple(stretches)
