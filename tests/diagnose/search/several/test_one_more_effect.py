@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
@@ -22,21 +22,30 @@ HIDDEN = {"c_2": 5.0, "m_a": 0.1, "w_a": 7.0, "zeta_a": 0.02}
 NOISE = 2e-5
 
 
-def measured(role: str, amplitude: float, rng: np.random.Generator) -> Record:
-    effects = [effect_named("quadratic_damping"), effect_named("flexible_mode")]
+RIPPLE = {"c_2": 5.0, "T_sin": 0.1, "T_cos": 0.05, "kappa": 150.0}
+
+
+def measured(effect: str, role: str, amplitude: float, rng: np.random.Generator) -> Record:
+    effects = [effect_named("quadratic_damping"), effect_named(effect)]
     t = 0.01 * np.arange(2000)
     record = Record(role, 0.01, {"u": linear_sweep(t, amplitude, 1.0, 30.0)}, {}, role=role, hold="zoh")
-    clean = simulate(compose(AXIS, effects), VALUES | HIDDEN, record)
+    clean = simulate(compose(AXIS, effects), {**VALUES, **HIDDEN, **RIPPLE}, record)
     return clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size))
 
 
-def test_an_effect_that_the_screening_puts_last_is_tried_where_the_first_ones_explain_too_little() -> None:
+def beside_a_damping(effect: str) -> tuple[FitContext, Scored]:
+    """Return the records of a quadratic damping with an effect, and the damping fitted alone."""
     rng = np.random.default_rng(0)
-    fitted = (measured("estimation", 0.4, rng), measured("estimation", 1.0, rng))
-    scored = (measured("validation", 0.7, rng),)
+    fitted = (measured(effect, "estimation", 0.4, rng), measured(effect, "estimation", 1.0, rng))
+    scored = (measured(effect, "validation", 0.7, rng),)
     scales = characteristic_scales(AXIS, fitted, VALUES)
     context = FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
     (damped,) = fit_candidates(context, reidentify(context, VALUES), [effect_named("quadratic_damping")])
+    return context, damped
+
+
+def test_an_effect_that_the_screening_puts_last_is_tried_where_the_first_ones_explain_too_little() -> None:
+    context, damped = beside_a_damping("flexible_mode")
     tried = [effect_named("maxwell_branch"), effect_named("flexible_mode")]
     assert [effect.name for effect in search_places(context, damped, tried).effects] == ["maxwell_branch"]
 
@@ -46,3 +55,11 @@ def test_an_effect_that_the_screening_puts_last_is_tried_where_the_first_ones_ex
     best = min(everything, key=lambda model: model.error_over_noise)
     assert best.names == ("quadratic_damping", "flexible_mode")
     assert best.error_over_noise < VERDICT.at_floor
+
+
+def test_an_effect_that_no_push_represents_is_tried_where_the_pushes_explain_too_little() -> None:
+    context, damped = beside_a_damping("torque_ripple")
+    tried = [effect_named("maxwell_branch"), effect_named("torque_ripple")]
+    (found,) = with_one_more(context, damped, tried, [], [damped], least_share=0.99)
+    assert found.names == ("quadratic_damping", "torque_ripple")
+    assert found.error_over_noise < VERDICT.at_floor

@@ -48,7 +48,8 @@ def with_one_more(
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
     least_share
-        Share of the squared residual that the pushes of one of the effects must explain for any of them to be tried.
+        Share of the squared residual that the push of one of the effects must explain for any of those to be tried that a push
+        represents.
     enough
         Error, in units of the noise floor, above which effects that the screening puts last are tried, too, if a parameter
         changes the shape of their force.
@@ -63,7 +64,9 @@ def with_one_more(
         prepare(structures_of_lineup(context.rig, open_ones, (*context.modelled, *parent.effects)))
     search = search_places(context, parent, open_ones)
     if search.most < least_share:
-        return []
+        # The screening says nothing about effects that no push represents, such as periodic ones.
+        unscreened = [effect for effect in search.effects if effect.name not in search.shares]
+        return _fitted_beside(context, parent, unscreened, search.starts, singles, prepare)
     found = _fitted_beside(context, parent, search.effects, search.starts, singles, prepare)
     movable = [effect for effect in search.others if _has_a_shape(effect)]
     if movable and min((model.error_over_noise for model in found), default=float("inf")) > enough:
