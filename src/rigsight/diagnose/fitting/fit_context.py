@@ -22,8 +22,6 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, special_values
 
 _ROUGH_ACCURACY = 1e-3
-_LOOKED_AT = 8000
-"""Samples of all stretches together at which a candidate is first looked at."""
 
 
 @dataclass(frozen=True)
@@ -307,7 +305,7 @@ def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
     return tuple(cut_off)
 
 
-def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = _LOOKED_AT) -> tuple[Record, ...]:
+def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = HORIZON.looked_at) -> tuple[Record, ...]:
     """Return the most excited stretch of each record, together about `n_samples` long."""
     shown = zip(records, shown_by(rig, records), strict=True)
     return _strongest(
@@ -316,7 +314,7 @@ def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = _LOOKED_AT) 
 
 
 def _strongest(
-    records: Sequence[Record], powers: Sequence[NDArray[np.float64]], n_samples: int = _LOOKED_AT
+    records: Sequence[Record], powers: Sequence[NDArray[np.float64]], n_samples: int = HORIZON.looked_at
 ) -> tuple[Record, ...]:
     """Return the stretch of each record with the largest sum of a power, shape (n_samples,), together about `n_samples` long."""
     share = max(500, n_samples // max(1, len(records)))

@@ -48,6 +48,14 @@ class HorizonNumbers:
         ),
         set_by="simulated random rigs with play of several widths: pieces of half to two periods were worse",
     )
+    looked_at: int = number(
+        8000,
+        "budget",
+        (
+            "Number of samples of all records together in the stretches at which candidates are first looked at: a look at whole "
+            "records of 40 s takes four times as long."
+        ),
+    )
     most_pieces: int = number(
         40,
         "budget",
