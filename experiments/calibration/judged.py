@@ -94,7 +94,8 @@ def _shortened(diagnosis: Line, key: Line) -> Line:
             for output, floor in diagnosis["noise_floor"].items()
         },
         "gap_by_place": [
-            {name: place[name] for name in ("place", "looked_at")} for place in diagnosis["gap_by_place"] or ()
+            {name: place[name] for name in ("place", "looked_at")}
+            for place in diagnosis["gap_by_place"] or ()
         ],
     }
 
