@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -12,7 +13,7 @@ import pytest
 from rigsight.diagnose.verdict.calibration import trained
 
 STUDY = Path(__file__).parents[2] / "experiments/calibration"
-MODULES = ("fit", "table")
+MODULES = ("fit", "judged", "table")
 JUDGING_SEEDS = range(200, 300)
 """Seeds of the bench on which stated probabilities are judged: none of them may train."""
 
@@ -47,3 +48,20 @@ def test_a_table_reads_back_as_it_was_written(study: ModuleType, tmp_path: Path)
     trials = study.read_table()
     write_table(trials, tmp_path / "again.csv")
     assert study.read_table(tmp_path / "again.csv") == trials
+
+
+def test_trials_that_judge_are_of_no_seed_that_trains_and_score_with_any_calibration(
+    study: ModuleType,
+) -> None:
+    import judged
+
+    lines = judged.read_lines()
+    assert lines
+    training = {trial.seed for trial in study.read_table()}
+    assert not {line["key"]["seed"] for line in lines} & training
+    doubting = replace(trained(), listed={**trained().listed, "intercept": -30.0})
+    for line in lines:
+        sure, unsure = (judged.scored(line, calibration) for calibration in (trained(), doubting))
+        assert sure.right == unsure.right
+        assert unsure.stated == pytest.approx(1.0 if sure.verdict == "unknown" else 0.0, abs=1e-6)
+    assert judged.tables([judged.scored(line, trained()) for line in lines]).count("\n") > 10
