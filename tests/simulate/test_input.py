@@ -69,7 +69,7 @@ def test_slow_band_limited_input_has_one_piece_per_sample(cycles_per_sample, per
         exact = np.sin(omega * (np.arange(between.size) * held.interval + tau))
         assert error_of(between[200:-200], exact[200:-200]) <= 2e-3
         if per_sample == 1:
-            assert error_of(between[200:-200], exact[200:-200]) <= 3e-5
+            assert error_of(between[200:-200], exact[200:-200]) <= 1e-5
 
 
 def test_an_input_replaced_among_others_is_the_same_as_holding_it_with_them():

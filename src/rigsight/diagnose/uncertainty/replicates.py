@@ -69,7 +69,7 @@ class Replicates:
         def of_record(index: int) -> tuple[Floats, int]:
             record = self.context.estimation[index]
             quiet = np.zeros((record.n_samples, len(self.fit.structure.rig.mechanism.joints)))
-            # Band-limited inputs have two pieces in a sample.
+            # Band-limited inputs have up to two pieces in a sample.
             taken = np.zeros(2 * record.n_samples, dtype=np.intc)
             return self._outputs(index, quiet, taken=taken), int(np.sum(taken))
 

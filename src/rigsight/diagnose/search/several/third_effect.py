@@ -101,7 +101,7 @@ def with_relatives(
     found, known = list(triples), list(pairs)
     for is_tried in (as_good, plainer, as_good):
         best = min(found, key=lambda model: model.error_over_noise)
-        known = _with_parts(context, best, known)
+        known = _with_refitted_parts(context, best, known)
         new: list[Scored] = []
         for replaced in best.effects:
             pair = next(p for p in known if set(p.names) == set(best.names) - {replaced.name})
@@ -110,7 +110,7 @@ def with_relatives(
                 new += with_one_more(context, pair, instead, [*found, *new], singles, prepare)
         found += finished_best(context, new)
     best = min(found, key=lambda model: model.error_over_noise)
-    known = _with_parts(context, best, known)
+    known = _with_refitted_parts(context, best, known)
     near = [pair for pair in known if pair.error_over_noise <= VERDICT.comparable * best.error_over_noise]
     return found, [*refine(context, near), *(pair for pair in known if pair not in near)]
 
@@ -130,7 +130,7 @@ def finished_best(context: FitContext, models: Sequence[Scored]) -> list[Scored]
     return refine(context, [*best, *ordered[SEARCH.most_finished :]])
 
 
-def _with_parts(context: FitContext, triple: Scored, pairs: Sequence[Scored]) -> list[Scored]:
+def _with_refitted_parts(context: FitContext, triple: Scored, pairs: Sequence[Scored]) -> list[Scored]:
     """Return the pairs with those of the effects of a triple, fitted from where they stand in it if that is better."""
 
     def one(effects: tuple[Effect, ...]) -> Scored:
