@@ -11,7 +11,7 @@ from rigsight.excitation import linear_sweep, step
 from rigsight.rigs import AXIS, ELEMENT
 from rigsight.workflow.identify import run_identify
 
-from .virtual_campaign import DT, Run, write_campaign
+from ..virtual_campaign import DT, Run, write_campaign
 
 AXIS_TRUTH = {"gain": -2.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 1e-3, "force_off": 0.0}
 

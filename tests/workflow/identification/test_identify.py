@@ -15,7 +15,7 @@ from rigsight.workflow.identify import run_identify
 from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
-from .virtual_campaign import CONSTANTS, NOISE, TRUTH, jump, sweep, write_campaign
+from ..virtual_campaign import CONSTANTS, NOISE, TRUTH, jump, sweep, write_campaign
 
 
 @pytest.fixture(scope="module")

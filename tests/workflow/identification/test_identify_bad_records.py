@@ -11,7 +11,7 @@ from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep
 from rigsight.workflow.identify import run_identify
 
-from .virtual_campaign import CONSTANTS, DT, TRUTH, Run, jump, sweep, write_campaign
+from ..virtual_campaign import CONSTANTS, DT, TRUTH, Run, jump, sweep, write_campaign
 
 
 def test_a_record_that_never_drives_the_resonance_is_not_fitted(tmp_path: Path) -> None:

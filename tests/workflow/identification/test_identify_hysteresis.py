@@ -26,8 +26,8 @@ from rigsight.workflow.identification.hysteresis import CALIBRATING
 from rigsight.workflow.identify import run_identify
 from rigsight.workflow.run.progress import Step
 
-from .any_rig import write_train_campaign
-from .virtual_campaign import CONSTANTS, DT, NOISE, TRUTH, Run, write_campaign
+from ..any_rig import write_train_campaign
+from ..virtual_campaign import CONSTANTS, DT, NOISE, TRUTH, Run, write_campaign
 
 BOUC_WEN = effect_named("bouc_wen_hysteresis")
 OF_AXIS = {
