@@ -45,7 +45,12 @@ def main(benches: Sequence[Path]) -> None:
     if not benches:
         print(tables([scored(line, trained()) for line in known.values()]))
         return
-    found = [line for bench in benches for line in _of_bench(bench)]
+    found = []
+    for bench in benches:
+        own = list(_of_bench(bench))
+        if not own:
+            sys.exit(f"{bench} holds no trial: name the folder that 'rigsight blind --out' wrote.")
+        found += own
     known |= {_name(line): line for line in found}
     lines = (json.dumps(known[name]) for name in sorted(known))
     FILE.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
