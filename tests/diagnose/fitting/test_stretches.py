@@ -33,7 +33,7 @@ def test_one_more_effect_is_looked_for_where_the_model_leaves_most() -> None:
     look = liveliest((record,), AXIS, 2000)
     context = FitContext(AXIS, (record,), (record,), look, scales, {"x": 1e-5}, frozenset({"force_off"}))
     fit = context.problem(context.composed(), (record,)).fit(VALUES, ["m", "d", "k"])
-    (seen,), (left,) = context.look, context.looking_where_left(fit).look
+    (seen,), (left,) = context.look, context.looking_at_residual(fit).look
     assert 5.0 < at_rate(seen) < 15.0
     assert 30.0 < at_rate(left) < 50.0
     assert left.n_samples == 8000
@@ -46,4 +46,4 @@ def test_without_residuals_the_most_excited_stretches_stay() -> None:
     context = FitContext(AXIS, (record,), (record,), (record,), scales, {"x": 1e-5}, frozenset())
     fit = context.problem(context.composed(), (record.slice(0, 100),)).fit({**VALUES, "k": -1e9}, [])
     assert not fit.residuals
-    assert context.looking_where_left(fit) is context
+    assert context.looking_at_residual(fit) is context

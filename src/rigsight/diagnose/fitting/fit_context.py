@@ -140,8 +140,8 @@ class FitContext:
         most = HORIZON.most_pieces / max(1, len(self.rig.mechanism.free))
         return cut(records, max(periods * self.period, duration * len(self.look) / len(records) / most))
 
-    def looking_where_left(self, fit: FitResult) -> FitContext:
-        """Return the same, but looking at the stretch of each estimation record in which a fit leaves most.
+    def looking_at_residual(self, fit: FitResult) -> FitContext:
+        """Return the same, with the stretch of each estimation record that has the largest residual of a fit as `look`.
 
         What one more effect would explain may lie far from the strongest motion, such as a second resonance.
         """

@@ -52,8 +52,8 @@ class HorizonNumbers:
         8000,
         "budget",
         (
-            "Number of samples of all records together in the stretches at which candidates are first looked at: a look at whole "
-            "records of 40 s takes four times as long."
+            "Number of samples, of all records together, to which candidates are first fitted: fits to whole records of 40 s "
+            "take four times as long."
         ),
     )
     most_pieces: int = number(

@@ -54,7 +54,7 @@ def with_one_more(
         Error, in units of the noise floor, above which effects that the screening puts last are tried, too, if a parameter
         changes the shape of their force.
     """
-    context = context.looking_where_left(parent.fit)
+    context = context.looking_at_residual(parent.fit)
     open_ones = [
         effect
         for effect in context.offered(effects)
