@@ -52,20 +52,31 @@ def _shifted(
     value: NDArray[np.float64], rise: NDArray[np.float64], delays: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return values, shape (n_samples, n_sets), delayed by numbers of samples (n_sets,); `rise` is their slope per sample."""
-    n_samples = value.shape[0]
     shifted = np.empty_like(value)
     for i, delay in enumerate(delays):
-        place = np.arange(n_samples) - float(delay)
-        start = np.clip(np.floor(place).astype(np.int64), 0, n_samples - 2)
-        s = place - start
-        x, v = value[:, i], rise[:, i]
-        a, b, va, vb = x[start], x[start + 1], v[start], v[start + 1]
-        # The values of a set that diverges may overflow.
-        with np.errstate(over="ignore", invalid="ignore"):
-            inside = a + s * (va + s * (3.0 * (b - a) - 2.0 * va - vb + s * (2.0 * (a - b) + va + vb)))
-        before = np.where(s < 0.0, x[0] + v[0] * place, inside)
-        shifted[:, i] = np.where(s > 1.0, x[-1] + v[-1] * (place - (n_samples - 1)), before)
+        shifted[:, i] = _delayed(value[:, i].copy(), rise[:, i].copy(), float(delay))
     return shifted
+
+
+def _delayed(value: NDArray[np.float64], rise: NDArray[np.float64], delay: float) -> NDArray[np.float64]:
+    n_samples = value.size
+    whole = int(np.clip(np.ceil(delay), -n_samples, n_samples))
+    # A delay is the same fraction of every interval, so the Hermite polynomials are four numbers.
+    s = whole - delay
+    begin, end = max(whole, 0), min(n_samples, max(n_samples - 1 + whole, 0))
+    left, right = slice(begin - whole, end - whole), slice(begin - whole + 1, end - whole + 1)
+    delayed = np.empty_like(value)
+    # The values of a set that diverges may overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        delayed[begin:end] = (
+            (1.0 + 2.0 * s) * (1.0 - s) ** 2 * value[left]
+            + s**2 * (3.0 - 2.0 * s) * value[right]
+            + s * (1.0 - s) ** 2 * rise[left]
+            - s**2 * (1.0 - s) * rise[right]
+        )
+        delayed[:begin] = value[0] + rise[0] * (np.arange(begin) - delay)
+        delayed[end:] = value[-1] + rise[-1] * (np.arange(end, n_samples) - delay - (n_samples - 1))
+    return delayed
 
 
 @lru_cache(maxsize=1024)
