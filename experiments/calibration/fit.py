@@ -2,6 +2,10 @@
 
 Two logistic models with a ridge (scikit-learn), and the threshold of the sets by leave-one-out conformal prediction: each trial's
 probability comes from models that were fitted without it.
+
+References
+----------
+R. J. Tibshirani et al., NeurIPS (2019), for conformal quantiles of weighted trials.
 """
 
 from __future__ import annotations
@@ -39,11 +43,16 @@ def main() -> None:
 
 def calibrated(trials: Sequence[TrainingTrial]) -> Calibration:
     """Return the calibration that a table gives."""
-    unseen = probabilities_unseen(trials)
-    # The finite-sample quantile of conformal prediction: one of n + 1 trials is the next.
-    rank = int(np.ceil((len(trials) + 1) * VERDICT.set_coverage))
-    least = float(np.sort(unseen)[::-1][min(rank, len(trials)) - 1])
+    least = _least_probability(probabilities_unseen(trials), weights_of(trials))
     return _fitted(trials, round(least, DIGITS))
+
+
+def _least_probability(unseen: np.ndarray, weights: np.ndarray) -> float:
+    """Return the weighted conformal quantile of the probability of the true cause; the next trial weighs as much as the mean."""
+    order = np.argsort(unseen)[::-1]
+    share = np.cumsum(weights[order]) / (np.sum(weights) + np.mean(weights))
+    enough = np.flatnonzero(share >= VERDICT.set_coverage)
+    return float(unseen[order[enough[0] if enough.size else -1]])
 
 
 def probabilities_unseen(trials: Sequence[TrainingTrial]) -> np.ndarray:
@@ -64,7 +73,7 @@ def probability_of_truth(model: Calibration, trial: TrainingTrial) -> float:
 
 
 def _fitted(trials: Sequence[TrainingTrial], least: float) -> Calibration:
-    weights = _weights(trials)
+    weights = weights_of(trials)
     is_listed = np.array([trial.cause != "outside" for trial in trials])
     inside = [trial for trial in trials if trial.cause != "outside"]
     return Calibration(
@@ -77,7 +86,7 @@ def _fitted(trials: Sequence[TrainingTrial], least: float) -> Calibration:
     )
 
 
-def _weights(trials: Sequence[TrainingTrial]) -> np.ndarray:
+def weights_of(trials: Sequence[TrainingTrial]) -> np.ndarray:
     """Return weights with which causes from outside are as frequent as the policy takes them to be, where something is hidden."""
     hidden = np.array([trial.kind not in ("none", "parameters") for trial in trials])
     outside = hidden & np.array([trial.left_out or trial.kind == "outside" for trial in trials])
@@ -100,7 +109,7 @@ def _logistic(
 
 def _report(trials: Sequence[TrainingTrial], calibration: Calibration) -> str:
     unseen = probabilities_unseen(trials)
-    weights = _weights(trials)
+    weights = weights_of(trials)
     log_score = float(np.average(-np.log(np.maximum(unseen, 1e-3)), weights=weights))
     names = dict.fromkeys([*calibration.listed, *calibration.first])
     rows = [

@@ -10,6 +10,7 @@ ranking and errors. A calibration changes neither, so it may be trained while th
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -17,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from rigsight.blind.scoring.goals import is_clear
 from rigsight.blind.scoring.probability_scores import ALL, probability_scores, scores_of
-from rigsight.blind.scoring.score import Outcome, outcome
+from rigsight.blind.scoring.score import FAILED, Outcome, outcome
 from rigsight.blind.scoring.training_trial import first_model, share_of, training_trial
 from rigsight.diagnose import Calibration
 from rigsight.diagnose.verdict.calibration import trained
@@ -32,10 +34,7 @@ OF_DIAGNOSIS = ("verdict", "effects", "where", "ambiguous_with", "adequate", "li
 OF_CANDIDATE = ("effects", "where", "probability", "error_over_noise", "ranking_share")
 NEGLIGIBLE = 1e-4
 """Share of the ranking below which a candidate that is not the true cause is left out."""
-CLEAR = 5.0
-"""Gap, in noise floors, of a clear trial."""
-FAR = 10.0
-"""Gap of the goals for several effects."""
+_LEAST_SHARE = 1e-12
 Line = dict[str, Any]
 
 
@@ -123,8 +122,11 @@ def with_probabilities(diagnosis: Line, key: Line, calibration: Calibration) -> 
     tried = [dict(candidate) for candidate in diagnosis["candidates"] if candidate["effects"]]
     first = first_model(diagnosis, tried)
     ordered = [tried[first], *(c for i, c in enumerate(tried) if i != first)] if tried else []
-    probabilities = calibration.probabilities(situation, [share_of(c) for c in ordered])
-    for candidate, probability in zip(ordered, probabilities, strict=True):
+    shares = [share_of(c) for c in ordered]
+    # A bench tries the whole catalogue: those that a line leaves out keep what the calibration gives them.
+    omitted = max(_LEAST_SHARE, 1.0 - math.fsum(shares))
+    probabilities = calibration.probabilities(situation, [*shares, omitted] if shares else [])
+    for candidate, probability in zip(ordered, probabilities, strict=False):
         candidate["probability"] = probability
     without = {
         "effects": [],
@@ -135,7 +137,7 @@ def with_probabilities(diagnosis: Line, key: Line, calibration: Calibration) -> 
     }
     candidates = [*ordered, without]
     stated = [candidate["probability"] for candidate in candidates]
-    outside = max(0.0, 1.0 - sum(stated))
+    outside = max(0.0, 1.0 - math.fsum([*stated, *probabilities[len(ordered) :]]))
     enough = min(calibration.least_probability, max(outside, *stated))
     likely = [_names(c, situation.several_places) for c in candidates if c["probability"] >= enough]
     return {
@@ -153,48 +155,59 @@ def _names(candidate: Line, by_place: bool) -> list[str]:
 def tables(outcomes: Sequence[Outcome]) -> str:
     """Return scores of the stated probabilities and shares of right verdicts, as Markdown."""
     rows = [
-        "| stratum | trials | stated, mean | true | log score | Brier | slope | likely causes hold the truth | their number |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "| stratum | trials | stated, mean | true | log score | Brier | slope | offset | set contains the truth | set size |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     strata = probability_scores(outcomes)
-    clear = [o for o in outcomes if o.gap is not None and (o.gap >= CLEAR or not o.effects)]
-    strata[f"clear: {CLEAR:g} floors and more, and controls"] = scores_of(clear)
-    rows += [_row(name, scores) for name, scores in strata.items() if scores["count"]]
-    rows += ["", "| trials | right | of | share | seconds, median |", "|---|---:|---:|---:|---:|"]
+    strata["clear trials"] = scores_of([o for o in outcomes if is_clear(o)])
+    rows += [_row(name, scores) for name, scores in strata.items()]
+    rows += [
+        "",
+        "| trials | right | failed | of | share | seconds, median |",
+        "|---|---:|---:|---:|---:|---:|",
+    ]
     for name, of_group in _groups(outcomes).items():
-        right = sum(o.right for o in of_group)
+        right, failed = (sum(told(o) for o in of_group) for told in (_is_right, _has_failed))
         median = float(np.median([o.seconds for o in of_group]))
-        rows.append(f"| {name} | {right} | {len(of_group)} | {right / len(of_group):.0%} | {median:.0f} |")
+        share = right / len(of_group)
+        rows.append(f"| {name} | {right} | {failed} | {len(of_group)} | {share:.0%} | {median:.0f} |")
     return "\n".join(rows)
 
 
+def _is_right(found: Outcome) -> bool:
+    return found.right
+
+
+def _has_failed(found: Outcome) -> bool:
+    return found.verdict == FAILED
+
+
 def _row(name: str, scores: Line) -> str:
-    slope = "" if scores["slope"] is None else f"{scores['slope']:.2f} ± {scores['slope_error']:.2f}"
-    covered, size = scores["covered"], scores["set_size"]
     return (
-        f"| {name} | {scores['count']} | {scores['stated']:.2f} | {_share(scores['true'])} | {scores['log_score']:.2f} "
-        f"| {scores['brier']:.3f} | {slope} | {_share(covered)} | {size:.2f} |"
+        f"| {name} | {scores['count']} | {_number(scores['stated'], 2)} | {_share(scores['true'])} "
+        f"| {_number(scores['log_score'], 2)} | {_number(scores['brier'], 3)} "
+        f"| {_with_error(scores, 'slope')} | {_with_error(scores, 'offset')} "
+        f"| {_share(scores['covered'])} | {_number(scores['set_size'], 2)} |"
     )
 
 
-def _share(told: Any) -> str:
-    share = told["share"] if isinstance(told, dict) else told
-    return "" if share is None else f"{share:.0%}"
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
+
+
+def _with_error(scores: Line, name: str) -> str:
+    return "" if scores[name] is None else f"{scores[name]:.2f} ± {scores[f'{name}_error']:.2f}"
+
+
+def _share(told: Line) -> str:
+    return "" if told["share"] is None else f"{told['share']:.0%}"
 
 
 def _groups(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
     found: dict[str, list[Outcome]] = {ALL: list(outcomes)}
     for one in outcomes:
-        if one.kind in ("pair", "triple"):
-            found.setdefault(
-                f"{one.kind}s, {'' if (one.gap or 0.0) >= FAR else 'below '}{FAR:g} floors", []
-            ).append(one)
-        elif one.kind == "single":
-            found.setdefault(
-                f"single effects, {'' if (one.gap or 0.0) >= CLEAR else 'below '}{CLEAR:g} floors", []
-            ).append(one)
-        else:
-            found.setdefault(one.kind, []).append(one)
+        size = "" if one.kind in ("none", "parameters") else (", clear" if is_clear(one) else ", faint")
+        found.setdefault(f"{one.kind}{size}", []).append(one)
         found.setdefault(f"design {one.design}", []).append(one)
     return dict(sorted(found.items(), key=lambda named: (named[0] != ALL, named[0])))
 

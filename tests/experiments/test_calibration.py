@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 from rigsight.diagnose.verdict.calibration import trained
@@ -36,6 +37,13 @@ def test_the_table_gives_the_calibration_of_the_package(study: ModuleType) -> No
     assert found.least_probability == pytest.approx(kept.least_probability, abs=1e-3)
     for now, then in ((found.listed, kept.listed), (found.first, kept.first)):
         assert now == pytest.approx(dict(then), abs=2e-3)
+
+
+def test_sets_contain_the_cause_in_nine_of_ten_trials_by_weight(study: ModuleType) -> None:
+    trials = [trial for trial in study.read_table() if study.is_judgeable(trial)]
+    unseen, weights = study.probabilities_unseen(trials), study.weights_of(trials)
+    covered = unseen >= study.calibrated(trials).least_probability - 1e-4
+    assert 0.9 <= np.average(covered, weights=weights) < 0.92
 
 
 def test_no_seed_that_judges_is_in_the_table(study: ModuleType) -> None:

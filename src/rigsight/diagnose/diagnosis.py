@@ -158,7 +158,7 @@ def _assembled(
     )
     chosen = judgement.model.effects if is_effect else ()
     likely = _likely(candidates, calibration.least_probability)
-    rivals = [names for names in likely.sets if names != judgement.model.names] if is_effect else []
+    rivals = _not_distinguished(candidates, likely, judgement.model.names) if is_effect else []
     where = tuple(rig.where(effect) for effect in chosen)
     if judgement.verdict == "unknown":
         where = _evidence(found)
@@ -230,6 +230,21 @@ def _likely(candidates: Sequence[Candidate], least: float) -> LikelyCauses:
     enough = min(least, most)
     sets = tuple(candidate.effects for candidate in candidates if candidate.probability >= enough)
     return LikelyCauses(sets, outside >= enough)
+
+
+def _not_distinguished(
+    candidates: Sequence[Candidate], likely: LikelyCauses, named: tuple[str, ...]
+) -> list[tuple[str, ...]]:
+    """Return the other likely causes, and those that are first in the ranking in more than a negligible share of resamplings."""
+    return [
+        candidate.effects
+        for candidate in candidates
+        if candidate.effects not in ((), named)
+        and (
+            candidate.effects in likely.sets
+            or (candidate.grounds is not None and candidate.grounds.share > VERDICT.surely)
+        )
+    ]
 
 
 def _with_disturbance(

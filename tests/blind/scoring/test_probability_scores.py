@@ -1,4 +1,4 @@
-"""Scores of probabilities: honest ones are best, boasting shows in the slope, and sets are counted with their size."""
+"""Scores of probabilities: honest ones are best, overconfidence shows in slope and offset, sets count with their size."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from rigsight.blind.scoring.probability_scores import (
     LEAST_PROBABILITY,
     log_score,
     probability_scores,
+    reliability_offset,
     reliability_slope,
     scores_of,
 )
@@ -27,13 +28,13 @@ def test_stating_one_everywhere_is_no_better_than_being_honest(outcome_like, wro
         wrong = [wrong_outcome(stated=stated, probability=1.0 - stated) for _ in range(2)]
         return scores_of([*right, *wrong])
 
-    honest, boasting = scored(0.9), scored(1.0)
-    assert honest["log_score"] < boasting["log_score"]
-    assert honest["brier"] < boasting["brier"]
+    honest, overconfident = scored(0.9), scored(1.0)
+    assert honest["log_score"] < overconfident["log_score"]
+    assert honest["brier"] < overconfident["brier"]
 
 
 @pytest.mark.parametrize(("sharpened", "slope"), [(1.0, 1.0), (2.0, 0.5), (0.5, 2.0)])
-def test_the_slope_tells_honest_from_boasting_and_from_modest(sharpened: float, slope: float) -> None:
+def test_the_slope_tells_overconfident_and_underconfident_statements(sharpened: float, slope: float) -> None:
     rng = np.random.default_rng(3)
     log_odds = rng.normal(1.0, 1.5, 5000)
     true = rng.random(5000) < 1.0 / (1.0 + np.exp(-log_odds))
@@ -70,7 +71,11 @@ def test_sets_are_counted_where_there_are_any(outcome_like, wrong_outcome) -> No
 
 def test_strata_are_verdicts_kinds_designs_and_rigs_with_several_places(outcome_like, wrong_outcome) -> None:
     scores = probability_scores(
-        [outcome_like(), outcome_like(kind="pair", looked_at=True), wrong_outcome(verdict="failed", named=())]
+        [
+            outcome_like(),
+            outcome_like(kind="pair", several_places=True),
+            wrong_outcome(verdict="failed", named=()),
+        ]
     )
     assert list(scores) == [
         "all",
@@ -81,7 +86,27 @@ def test_strata_are_verdicts_kinds_designs_and_rigs_with_several_places(outcome_
         "several places",
         "verdict: one effect",
     ]
-    assert scores["all"]["count"] == 2, "a diagnosis that failed states nothing"
+    assert (scores["all"]["count"], scores["all"]["failed"]) == (3, 1)
+
+
+def test_a_failed_diagnosis_costs_the_most_and_states_nothing(outcome_like, wrong_outcome) -> None:
+    failed = wrong_outcome(verdict="failed", named=(), probability=0.0, stated=0.0)
+    with_it, without = scores_of([outcome_like(), failed]), scores_of([outcome_like()])
+    assert with_it["log_score"] == pytest.approx((without["log_score"] - math.log(LEAST_PROBABILITY)) / 2.0)
+    assert with_it["brier"] == without["brier"]
+    assert with_it["true"] == without["true"]
+
+
+def test_the_offset_tells_who_states_too_much(outcome_like) -> None:
+    rng = np.random.default_rng(4)
+    log_odds = rng.normal(1.0, 1.5, 5000)
+    true = rng.random(5000) < 1.0 / (1.0 + np.exp(-log_odds))
+    stated = 1.0 / (1.0 + np.exp(-(log_odds + 1.0)))
+    slope, slope_error = reliability_slope(stated, true)
+    offset, error = reliability_offset(stated, true)
+    assert abs(slope - 1.0) < 3.0 * slope_error, "the slope alone does not show it"
+    assert abs(offset + 1.0) < 3.0 * error
+    assert error < 0.1
 
 
 @pytest.mark.parametrize(

@@ -170,7 +170,7 @@ def test_an_effect_is_right_at_its_own_place_alone(
 ) -> None:
     got = held(placed_key(*truth), placed_diagnosis(*found))
     assert (got.right, got.effect_right, got.place_right) == (right, effect_right, place_right)
-    assert got.probability == (pytest.approx(0.9) if right else 0.0)
+    assert got.probability == pytest.approx(0.9 if right else 0.1), "0.1 is what no model was given"
     assert sorted(zip(got.effects, got.places, strict=True)) == sorted(truth)
 
 
@@ -197,8 +197,34 @@ def test_of_several_effects_the_main_one_must_be_named_and_none_that_is_not_ther
     said = placed_diagnosis(*found) if found else diagnosis("unknown") | {"candidates": []}
     got = held(truth, said)
     assert (got.right, got.effect_right, got.place_right) == (right, effect_right, place_right)
-    assert got.probability == (pytest.approx(0.9) if right else 0.0)
+    assert got.probability == pytest.approx(0.9 if right else 0.1 if found else 1.0)
     assert got.condition == "three_effects"
+
+
+def test_unknown_is_true_if_no_model_tried_is_the_cause_and_still_not_right() -> None:
+    said = placed_diagnosis(FRICTION) | {"verdict": "unknown", "effects": [], "where": []}
+    got = held(placed_key(FRICTION, PLAY), said | {"likely_causes": {"effects": [], "outside": True}})
+    assert (got.right, got.stated_is_true, got.in_set) == (False, True, True)
+    assert got.probability == got.stated
+    tried = placed_diagnosis(FRICTION, PLAY) | {"verdict": "unknown", "effects": [], "where": []}
+    got = held(placed_key(FRICTION, PLAY), tried | {"likely_causes": {"effects": [], "outside": True}})
+    assert (got.right, got.stated_is_true, got.in_set) == (False, False, False)
+
+
+@pytest.mark.parametrize(("hidden", "verdict"), [("none", "parameters"), ("parameters", "none")])
+def test_right_and_wrong_parameters_are_told_apart_though_their_candidate_is_the_same(
+    hidden: str, verdict: str
+) -> None:
+    likely = {"likely_causes": {"effects": [[]], "outside": False}}
+    right, wrong = (held(key(hidden), diagnosis(said) | likely) for said in (hidden, verdict))
+    assert (right.right, right.stated_is_true, right.in_set) == (True, True, True)
+    assert (wrong.right, wrong.stated_is_true, wrong.in_set) == (False, False, False)
+    assert wrong.probability == pytest.approx(1.0 - right.probability)
+
+
+def test_a_gap_below_the_floor_is_none_that_was_measured() -> None:
+    assert held(key("single", "backlash") | {"gap": 0.02}, diagnosis("effect", "backlash")).gap is None
+    assert held(key("none") | {"gap": 0.98}, diagnosis("none")).gap == 0.98
 
 
 def test_several_effects_are_in_the_set_with_their_main_one() -> None:

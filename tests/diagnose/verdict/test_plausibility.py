@@ -39,11 +39,12 @@ def models(scored):
 
 
 def ranked(*models: Scored) -> Ranking:
+    shares = tuple(np.arange(len(models), 0, -1) / sum(range(len(models) + 1)))
     return Ranking(
         models,
-        tuple(np.full(len(models), 1.0 / len(models))),
+        shares,
         (),
-        tuple(Grounds(0.0, 0.0, None) for _ in models),
+        tuple(Grounds(share, share, None) for share in shares),
     )
 
 
@@ -74,7 +75,10 @@ def test_a_plausible_model_at_the_same_place_comes_first(models) -> None:
     assert np.isnan(found.error_of_choice), "no resampling chose it"
     assert found.order[0] is coulomb
     assert found.tied == (stribeck,)
-    assert sum(found.probabilities) == pytest.approx(1.0)
+    assert found.probabilities == pytest.approx((2.0 / 3.0, 1.0 / 3.0)), (
+        "it takes over the share of the first"
+    )
+    assert [grounds.share for grounds in found.grounds] == pytest.approx(found.probabilities)
 
 
 def test_a_model_that_is_far_worse_or_elsewhere_does_not(models, scored) -> None:

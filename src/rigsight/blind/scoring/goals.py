@@ -15,6 +15,7 @@ from rigsight.blind.subjects import TIERS
 _LARGE_GAP = TIERS["clear"][0]
 _GAP_OF_SEVERAL = 2.0 * _LARGE_GAP
 """Each of several effects shows only a part of the gap."""
+_CONTROLS = ("none", "parameters")
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ GOALS: dict[str, Goal] = {
     "singles_right": Goal(0.98),
     "singles_place_right": Goal(0.99),
     "controls_right": Goal(0.98),
-    "outside_unknown_large_gap": Goal(0.90),
+    "outside_right_large_gap": Goal(0.90),
     "pairs_right": Goal(0.90),
     "log_score": Goal(0.25, at_most=True),
     "held_out_median": Goal(1.1, at_most=True),
@@ -54,21 +55,16 @@ SURE = 0.9
 def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Return the figures for which there are goals, and the accompanying ones.
 
-    An unknown gap counts as a large one, otherwise a failed diagnosis would not count at all. Trials of a laboratory count
-    towards its own goals alone.
+    Trials of a laboratory count towards its own goals alone, and towards the log score.
     """
+    log_scores = [log_score(o.probability) for o in outcomes if is_clear(o)]
     taken, outcomes = [o for o in outcomes if o.condition], [o for o in outcomes if not o.condition]
-    large = [o for o in outcomes if o.gap is None or o.gap >= _LARGE_GAP]
-    singles = [o for o in large if o.kind == "single"]
-    several = [o for o in outcomes if o.gap is None or o.gap >= _GAP_OF_SEVERAL]
-    pairs = [o for o in several if o.kind == "pair"]
-    triples = [o for o in several if o.kind == "triple"]
+    clear = [o for o in outcomes if is_clear(o)]
+    singles, pairs, triples = ([o for o in clear if o.kind == kind] for kind in ("single", "pair", "triple"))
     faint = [o for o in outcomes if o.kind == "single" and o.tier == "faint"]
     outside = [o for o in outcomes if o.kind == "outside"]
-    controls = [o for o in outcomes if o.kind in ("none", "parameters")]
+    controls = [o for o in outcomes if o.kind in _CONTROLS]
     effects = [*singles, *pairs, *triples]
-    known = [*effects, *controls]
-    log_scores = [log_score(o.probability) for o in known]
     # A model that cannot be simulated on a withheld record has an infinite error.
     errors = [math.inf if o.held_out is None else o.held_out for o in effects if o.withheld]
     return {
@@ -84,8 +80,9 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "triples_right": share_of(triples, lambda o: o.right),
         "triples_right_within_set": share_of(triples, lambda o: o.right_within_set),
         "controls_right": share_of(controls, lambda o: o.right),
-        "outside_unknown": share_of(outside, lambda o: o.right),
-        "outside_unknown_large_gap": share_of([o for o in large if o.kind == "outside"], lambda o: o.right),
+        "outside_right": share_of(outside, lambda o: o.right),
+        "outside_right_large_gap": share_of([o for o in clear if o.kind == "outside"], lambda o: o.right),
+        "outside_unknown": share_of(outside, lambda o: o.verdict == "unknown"),
         "outside_named_above_half": share_of(outside, lambda o: bool(o.named) and o.stated > 0.5),
         "faint_right": share_of(faint, lambda o: o.right),
         "faint_right_within_set": share_of(faint, lambda o: o.right_within_set),
@@ -98,6 +95,20 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "seconds_median": median([o.seconds for o in (*taken, *outcomes)]),
         **laboratory_figures(taken),
     }
+
+
+def is_clear(found: Outcome) -> bool:
+    """Return True for a control, and for a gap of at least five times the noise floor, ten for several effects.
+
+    An unknown gap counts as a large one, otherwise a failed diagnosis would not count at all.
+
+    Parameters
+    ----------
+    found
+        Outcome of a trial.
+    """
+    least = _GAP_OF_SEVERAL if found.kind in ("pair", "triple") else _LARGE_GAP
+    return found.kind in _CONTROLS or found.gap is None or found.gap >= least
 
 
 def laboratory_figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
@@ -126,7 +137,7 @@ def targets(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     if found["laboratory_right"]["total"]:
         others = any(
             found[name]["total"]
-            for name in ("singles_right", "pairs_right", "triples_right", "controls_right", "outside_unknown")
+            for name in ("singles_right", "pairs_right", "triples_right", "controls_right", "outside_right")
         )
         goals = {**goals, **LABORATORY_GOALS} if others else LABORATORY_GOALS
     for name, goal in goals.items():

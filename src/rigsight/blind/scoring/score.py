@@ -64,7 +64,8 @@ class Outcome:
         From the key: kind of subject, hidden effects, the place of each (empty where the key does not say it effect by effect),
         rig, noise level.
     gap
-        Error of the re-identified equations on validation records, in units of the true noise floor; None if unknown.
+        Error of the re-identified equations on validation records, in units of the true noise floor; None if unknown, or below 1,
+        which no model can have: then the floor of the key contains a disturbance that made the rig drift.
     tier
         Strength by that gap; "below" where it is smaller than the faintest, "" where nothing is hidden.
     verdict, named, named_places
@@ -83,13 +84,16 @@ class Outcome:
     looked_at
         All these places are among those at which the diagnosis tried effects; None as above, and where it did not have to choose.
     probability
-        Of the truth; for an effect from outside the catalogue, the probability not given to any candidate.
+        Of the true cause. Where it is none of the models tried, the probability that it is none of them.
     stated
-        On what the verdict says; 0 where there is none.
+        Of what the verdict says; 0 where there is none.
     stated_is_true
-        What the verdict says is the truth: as `right`, but a relative of an effect from outside is not that effect.
+        What the verdict says is the truth: as `right`, but a relative of an effect from outside is not that effect, and `unknown`
+        is true if the cause is none of the models tried, even if each of its effects is in the catalogue.
     in_set, set_size
-        Whether the set of likely causes holds the truth, and how many it holds; None where the diagnosis states none.
+        Whether the set of likely causes contains the true one, and its size; None where the diagnosis states none.
+    several_places
+        The rig has several places for effects.
     held_out
         RMS error on all withheld records in units of the true noise floor, from the model alone; None where one of them cannot
         be simulated, or there is none.
@@ -130,6 +134,7 @@ class Outcome:
     stated_is_true: bool
     in_set: bool | None
     set_size: int | None
+    several_places: bool
     held_out: float | None
     withheld: tuple[WithheldError, ...]
     parameters: tuple[ParameterError, ...]
@@ -188,14 +193,17 @@ def outcome(
     )
     within = expected == "effect" and _is_among(needed, truth, found["ambiguous_with"])
     candidates = {effects_at_places(c, by_place): float(c["probability"] or 0.0) for c in found["candidates"]}
-    left = max(0.0, 1.0 - sum(candidates.values()))
-    known = math.fsum(p for effects, p in candidates.items() if needed <= effects <= truth)
-    probability = left if kind == "outside" else known
-    stated = left if verdict == "unknown" else candidates.get(named, 0.0)
+    outside = max(0.0, 1.0 - sum(candidates.values()))
+    of_truth = [p for effects, p in candidates.items() if needed <= effects <= truth]
+    is_tried = kind != "outside" and bool(of_truth) and not _is_other_control(expected, verdict)
+    probability = math.fsum(of_truth) if is_tried else outside
+    stated = outside if verdict == "unknown" else candidates.get(named, 0.0)
     if verdict == FAILED:
         probability = stated = 0.0
-    likely = _likely(found, needed, truth, kind, expected == "effect")
+    likely = _likely(found, needed, truth, is_tried)
     gap = None if key["gap"] is None else float(key["gap"])
+    if truth and gap is not None and gap < 1.0:
+        gap = None
     hides_a_place = bool(truth) and key["where"] is not None
     return Outcome(
         design=str(key["design"]),
@@ -220,9 +228,10 @@ def outcome(
         looked_at=_looked_at(key, found) if hides_a_place else None,
         probability=probability,
         stated=stated,
-        stated_is_true=right and not (honest and found["verdict"] == "effect"),
+        stated_is_true=not is_tried if verdict == "unknown" else right and not honest,
         in_set=None if likely is None else likely[0],
         set_size=None if likely is None else likely[1],
+        several_places=bool(found.get("gap_by_place")),
         held_out=_over_all(withheld),
         withheld=tuple(withheld),
         parameters=_parameter_errors(key, found) if right and kind != "outside" else (),
@@ -294,14 +303,19 @@ def _is_among(
     )
 
 
+def _is_other_control(expected: str, verdict: str) -> bool:
+    """Return True if nothing is hidden, but the verdict on the given parameters is wrong: both have the same candidate."""
+    controls = {"none", "parameters"}
+    return expected in controls and verdict in controls - {expected}
+
+
 def _likely(
     found: Mapping[str, Any],
     needed: frozenset[tuple[str, str]],
     truth: frozenset[tuple[str, str]],
-    kind: str,
-    hides_known_effects: bool,
+    is_tried: bool,
 ) -> tuple[bool, int] | None:
-    """Return whether the set of likely causes holds the truth, and its size; None where a diagnosis states no set.
+    """Return whether the set of likely causes contains the true one, and its size; None where a diagnosis states no set.
 
     Of a control, the equations without an effect are the truth.
     """
@@ -309,9 +323,9 @@ def _likely(
     if likely is None:
         return None
     size = len(likely["effects"]) + bool(likely["outside"])
-    if kind == "outside":
+    if not is_tried:
         return bool(likely["outside"]), size
-    if not hides_known_effects:
+    if not truth:
         return [] in likely["effects"], size
     return _is_among(needed, truth, likely["effects"]), size
 

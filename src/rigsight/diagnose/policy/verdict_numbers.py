@@ -85,7 +85,8 @@ class VerdictNumbers:
         "convention",
         (
             "Share of the resamplings in which a statement may fail and still counts as certain; models that are equal within "
-            "the tolerance in more of them are not distinguished further."
+            "the tolerance in more of them are not distinguished further, and a model with a larger share of the ranking is not "
+            "distinguished from the named one."
         ),
     )
     significance: float = number(

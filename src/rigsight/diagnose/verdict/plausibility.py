@@ -96,15 +96,17 @@ def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str,
 
 def _with_first(ranking: Ranking, index: int) -> Ranking:
     """Return the ranking with one model moved to its front, together with the probability of the one that stood there."""
-    order, shares, grounds = list(ranking.order), list(ranking.probabilities), list(ranking.grounds)
+    shares = list(ranking.probabilities)
     shares[0], shares[index] = shares[index], shares[0]
-    chosen, share = order.pop(index), shares.pop(index)
+    chosen = ranking.order[index]
     rivals: Sequence[Scored] = [m for m in ranking.tied if m is not chosen]
+    grounds = [replace(own, share=share) for own, share in zip(ranking.grounds, shares, strict=True)]
+    first = [index, *(i for i in range(len(shares)) if i != index)]
     return replace(
         ranking,
-        order=(chosen, *order),
-        probabilities=(share, *shares),
-        grounds=(grounds.pop(index), *grounds),
+        order=tuple(ranking.order[i] for i in first),
+        probabilities=tuple(shares[i] for i in first),
+        grounds=tuple(grounds[i] for i in first),
         tied=(ranking.order[0], *rivals),
         error_of_choice=math.nan,
     )

@@ -54,7 +54,8 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         "## Are the stated probabilities calibrated?",
         _table(["Stated, mean", "True", "Trials", "95 % interval"], views.reliability_rows(content)),
         "By stratum. Slope of the logistic regression of the outcome on the stated log odds: 1 is calibrated, below 1 "
-        "overconfident. The set of likely causes should contain the true cause in 90 % of the trials.",
+        "overconfident. Offset of the log odds: below 0 if too much is stated on average. The set of likely causes should "
+        "contain the true cause in 90 % of the trials.",
         _table(["Stratum", *views.SCORE_HEADS], views.score_rows(content)),
         "## Errors on withheld records",
         "In noise floors, simulated from the model and the input alone, by kind and amplitude of the record; all trials except "

@@ -21,14 +21,15 @@ SHARES = {
     "triples_right": "triples, all three right, gap of 10 x floor and more",
     "triples_right_within_set": "  or named among causes that cannot be distinguished",
     "controls_right": "controls right (none, parameters)",
-    "outside_unknown": "outside the catalogue, called unknown",
-    "outside_unknown_large_gap": "  gap of 5 x floor and more",
+    "outside_right": "outside the catalogue: unknown, or a similar effect with a remainder",
+    "outside_right_large_gap": "  gap of 5 x floor and more",
+    "outside_unknown": "  called unknown",
     "outside_named_above_half": "  an effect named with more than 0.5",
     "faint_right": "faint single effects right, 1.5 to 5 x floor",
     "faint_right_within_set": "  or named among causes that cannot be distinguished",
 }
 NUMBERS = {
-    "log_score": "mean log score on the truth (0 is perfect)",
+    "log_score": "mean log score of clear trials (0 is perfect)",
     "held_out_median": "error on withheld records, median, x floor",
     "seconds_median": "seconds per diagnosis, median",
 }
@@ -36,10 +37,10 @@ _GOALS = {
     "singles_right": "single effects named",
     "singles_place_right": "place of single effects named",
     "controls_right": "controls recognized (no gap, wrong parameters)",
-    "outside_unknown_large_gap": "effects from outside the catalogue called unknown",
+    "outside_right_large_gap": "effects from outside the catalogue recognized",
     "pairs_right": "pairs, both effects named",
     "triples_right": "triples, all three effects named",
-    "log_score": "log score on the truth, mean (0 is perfect)",
+    "log_score": "log score of clear trials, mean (0 is perfect)",
     "held_out_median": "error on withheld records, median",
     "laboratory_right": "effect and place named in laboratory records",
     "laboratory_wrong_name": "another effect or place named there",
@@ -53,7 +54,8 @@ _BESIDE = {
     "triples_right_within_set": "triples named, or among causes that the records cannot distinguish",
     "faint_right": "faint single effects named (gap of 1.5 to 5 noise floors)",
     "faint_right_within_set": "faint single effects named, or among causes that cannot be distinguished",
-    "outside_unknown": "effects from outside called unknown, gaps of all sizes",
+    "outside_right": "effects from outside recognized, gaps of all sizes",
+    "outside_unknown": "effects from outside called unknown",
     "outside_named_above_half": "effects from outside for which an effect was named with more than 0.5",
 }
 HIDDEN = "Hidden"
@@ -89,7 +91,7 @@ class GroupView:
 
 GROUP_HEADS = (
     "Trials", "Right", "95 % interval", "Effect right", "Right or indistinguishable", "Place right", "Place looked at",
-    "Log score on the truth",
+    "Log score",
     "Withheld error, median", "Seconds, median",
 )  # fmt: skip
 
@@ -243,7 +245,8 @@ SCORE_HEADS = (
     "Log score",
     "Brier score",
     "Slope",
-    "Likely causes contain the truth",
+    "Offset",
+    "Likely causes contain the true one",
     "Causes in the set",
 )
 
@@ -258,12 +261,17 @@ def score_rows(content: Mapping[str, Any]) -> list[list[str]]:
             share_cells(row["true"])[0],
             number(row["log_score"]),
             number(row["brier"]),
-            NOTHING if row["slope"] is None else f"{row['slope']:.2f} \u00b1 {row['slope_error']:.2f}",
+            _with_error(row["slope"], row["slope_error"]),
+            _with_error(row["offset"], row["offset_error"]),
             share_cells(row["covered"])[0],
             number(row["set_size"]),
         ]
         for name, row in content["probabilities"].items()
     ]
+
+
+def _with_error(value: float | None, error: float | None) -> str:
+    return NOTHING if value is None else f"{value:.2f} \u00b1 {error:.2f}"
 
 
 def held_out_rows(content: Mapping[str, Any]) -> list[list[str]]:
