@@ -343,12 +343,29 @@ def carried_over(values: Mapping[str, float], source: Structure, target: Structu
     return carried
 
 
-def special_values(rig: Rig, effects: Iterable[Effect], beside: Iterable[Effect] = ()) -> dict[str, float]:
-    """Return the special values of effects, which shorten the equations, by their names in a structure with other effects."""
+def special_values(
+    rig: Rig, effects: Iterable[Effect], beside: Iterable[Effect] = (), like: Structure | None = None
+) -> dict[str, float]:
+    """Return the special values of effects, which shorten the equations, by their names in a structure with other effects.
+
+    Those are left out that have other values in another structure with the same effect.
+    """
     effects = tuple(effects)
     names = unique_names(rig, (*effects, *beside))
+    released = set()
+    if like is not None:
+        fixed = dict(like.fixed)
+        released = {
+            (effect.name, own)
+            for effect in like.effects
+            for own in effect.special_cases
+            if like.parameter_name(effect, own) not in fixed
+        }
     return {
-        names[effect.name, own]: value for effect in effects for own, value in effect.special_cases.items()
+        names[effect.name, own]: value
+        for effect in effects
+        for own, value in effect.special_cases.items()
+        if (effect.name, own) not in released
     }
 
 

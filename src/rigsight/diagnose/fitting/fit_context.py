@@ -22,6 +22,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, special_values
 
 _ROUGH_ACCURACY = 1e-3
+_FINE_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -161,9 +162,12 @@ class FitContext:
         """Return the equations of the given simulation with effects added."""
         return compose(self.rig, (*self.modelled, *effects), fixed)
 
-    def simplest(self, effects: Sequence[Effect]) -> Structure:
-        """Return the same with parameters of these effects at the values that make the equations shorter."""
-        return self.composed(effects, special_values(self.rig, effects, self.modelled))
+    def simplest(self, effects: Sequence[Effect], like: Structure | None = None) -> Structure:
+        """Return the same with parameters of these effects at the values that make the equations shorter.
+
+        A parameter that another structure with its effect left free stays free.
+        """
+        return self.composed(effects, special_values(self.rig, effects, self.modelled, like))
 
     def free_parameters(self, structure: Structure) -> list[str]:
         """Return what a fit of this structure moves from the start."""
@@ -254,10 +258,17 @@ class FitContext:
         records = (*self.estimation, *self.scoring)
         return any(not is_constant(record[name]) for record in records for name in told)
 
-    def score(self, effects: tuple[Effect, ...], fit: FitResult, roughly: bool = False) -> Scored:
+    def score(
+        self,
+        effects: tuple[Effect, ...],
+        fit: FitResult,
+        roughly: bool = False,
+        tolerance: float = _FINE_TOLERANCE,
+    ) -> Scored:
         """Simulate the scoring records with a fitted model; only their initial states are estimated.
 
-        `roughly` is sufficient to rank a model that is far from the best.
+        `roughly` is sufficient to rank a model that is far from the best. The tolerance is that of the initial states: those of a
+        fit that was stopped early need not be exact.
         """
         if roughly:
             rough = self.problem(fit.structure, self.scoring, _ROUGH_ACCURACY)
@@ -265,7 +276,7 @@ class FitContext:
                 fit.values, [], max_evaluations=HORIZON.rough_evaluations_of_rig, tolerance=_ROUGH_ACCURACY
             )
         else:
-            result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
+            result = self.problem(fit.structure, self.scoring).fit(fit.values, [], tolerance=tolerance)
         error_over_noise = result.weighted_rms if result.residuals else float("inf")
         return Scored(effects, fit, result, error_over_noise)
 

@@ -91,7 +91,7 @@ class Evidence:
             smooth += _FAINT * np.mean(np.abs(lines) ** 2) * np.eye(lines.shape[1])
             told += 2.0 * float(np.sum(np.linalg.slogdet(smooth)[1]))
             n_samples += left[:, measured].size
-        n_free = len(self._context.on_all_records(model).free)
+        n_free = len(model.fit.free)
         return told + n_free * float(np.log(max(n_samples, 1))) + self._price_of_states(model)
 
     def gain(self, model: Scored, simpler: Scored) -> float:

@@ -58,7 +58,7 @@ class SearchNumbers:
     most_starts: int = number(
         4,
         "budget",
-        "Number of starts up to which all are fitted at length.",
+        "Number of starts up to which all are fitted at length; of more, so many after a very short fit.",
     )
     lengthy_starts: int = number(
         2,
@@ -141,7 +141,7 @@ class SearchNumbers:
     worth_following: float = number(
         0.85,
         "budget",
-        "Factor by which an effect must lower the cost at a first fit to be fitted together with another.",
+        "Factor by which an effect must lower the cost above that of noise at a first fit to be fitted together with another.",
     )
     most_followed: int = number(
         6,

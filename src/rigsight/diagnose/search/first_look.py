@@ -89,7 +89,7 @@ def look_at(
     substeps
         Integration steps per sample of each record; None chooses them, which needs the accurate integrator.
     """
-    structure = context.simplest(effects)
+    structure = context.simplest(effects, base.structure)
     known = context.constant_forces_beside(structure.effects)
     moved = {*context.free_parameters(structure), *base.free} - {*hold, *known}
     free = tuple(name for name in structure.names if name in moved)
@@ -160,11 +160,16 @@ def _looked(
         first = [*at_length, *glimpses[SEARCH.lengthy_starts :]]
     else:
         first = [tried(start, None, SEARCH.look_evaluations) for start in starts]
-    near = [
-        fit.fit(found.values, free, None, SEARCH.look_evaluations, _LOOK_TOLERANCE, False, substeps)
-        for found in _apart(first)
-    ]
-    return _distinct(near)
+
+    def in_one_piece(start: FitResult, states: Sequence[NDArray[np.float64]] | None, most: int) -> FitResult:
+        return fit.fit(start.values, free, states, most, _LOOK_TOLERANCE, False, substeps)
+
+    apart = _apart(first)
+    if len(apart) > SEARCH.most_starts:
+        short = [in_one_piece(found, None, SEARCH.glimpse_evaluations) for found in apart]
+        best = _apart(short)[: SEARCH.most_starts]
+        return _distinct([in_one_piece(g, g.initial_states, SEARCH.look_evaluations) for g in best])
+    return _distinct([in_one_piece(found, None, SEARCH.look_evaluations) for found in apart])
 
 
 def widened(

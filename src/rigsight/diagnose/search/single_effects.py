@@ -287,4 +287,5 @@ def _fitted(
     usable = [result for result in results if result.residuals]
     if not usable:
         return Scored(effects, results[0], results[0], float("inf"))
-    return context.score(effects, min(usable, key=lambda result: result.cost), roughly=not promising)
+    best = min(usable, key=lambda result: result.cost)
+    return context.score(effects, best, roughly=not promising, tolerance=_ROUGH_TOLERANCE)

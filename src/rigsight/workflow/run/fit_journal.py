@@ -36,6 +36,7 @@ class FitJournal:
         name = hashlib.sha256(f"{version('rigsight')} {campaign.resolve()}".encode()).hexdigest()[:24]
         self._path = cache_folder() / "unfinished" / f"{name}.jsonl"
         self._known: dict[str, Mapping[str, Any]] = {}
+        self._own: dict[str, Mapping[str, Any]] = {}
         self._lock = threading.Lock()
         self._going_on = going_on
         self._again: set[str] = set()
@@ -67,9 +68,11 @@ class FitJournal:
                 self._path.unlink()
 
     def recall(self, key: str) -> Mapping[str, Any] | None:
-        """Return the outcome stored under a key, None if there is none."""
+        """Return the outcome stored under a key, also of a fit of this process; None if there is none."""
         found = self._known.get(key)
-        if found is not None:
+        if found is None:
+            found = self._own.get(key)
+        else:
             with self._lock:
                 # Not earlier: a campaign that was changed since has the same path but none of these fits.
                 is_first = not self._again
@@ -80,6 +83,7 @@ class FitJournal:
 
     def remember(self, key: str, outcome: Mapping[str, Any]) -> None:
         """Append an outcome; if it cannot be written, the diagnosis continues without it."""
+        self._own[key] = outcome
         line = json.dumps({"key": key, **outcome}) + "\n"
         with self._lock, contextlib.suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)

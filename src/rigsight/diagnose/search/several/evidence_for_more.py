@@ -34,18 +34,20 @@ class OtherForms:
     def __init__(self, context: FitContext, lower_bound: bool) -> None:
         self._context = context
         self._noise = 0.0 if lower_bound else 1.0
-        self._known: dict[tuple[str, ...], float] = {}
+        # A model that is fitted again has the same names, but another residual.
+        self._known: dict[tuple[tuple[str, ...], float], float] = {}
 
     def gain(self, model: Scored) -> float:
         """Return the reduction of a model's mean square error, in units of the noise floor, by another form of one effect."""
-        if model.names not in self._known:
+        key = (model.names, model.fit.cost)
+        if key not in self._known:
             answers = Answers(
                 self._context, self._context.scoring, model.held_out, model.effects, model.fit.free
             )
             forms = [orthonormal(answers.without_free(law_columns(answers, e))) for e in model.effects]
             gains = [float(np.sum((form.T @ answers.left) ** 2)) for form in forms]
-            self._known[model.names] = max(gains) / answers.n_measured
-        return self._known[model.names]
+            self._known[key] = max(gains) / answers.n_measured
+        return self._known[key]
 
     def share(self, model: Scored) -> float:
         """Return the share of the squared residual above the noise that another form of one effect explains."""
@@ -55,16 +57,18 @@ class OtherForms:
     def partners(self, single: Scored, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects that are worth trying beside a single one.
 
-        If another form of it would explain most of its residual, only effects that act as one law with it.
+        If another form of it would explain most of its residual, only effects that act as one law with it. Beside an effect with
+        memory, another law without memory is no other form: it is tried, and must explain the records.
         """
-        if self.share(single) < VERDICT.larger_part:
+        if any(effect.states for effect in single.effects) or self.share(single) < VERDICT.larger_part:
             return list(effects)
         return [e for e in effects if are_one_law((*single.effects, e), self._context.rig)]
 
     def with_own_evidence(self, singles: Sequence[Scored], larger: Sequence[Scored]) -> list[Scored]:
         """Return the models without pairs whose second effect explains less than another form of the first would.
 
-        A third effect was compared with other forms of the first two before it was tried.
+        A pair that leaves only noise stands: nothing is left for another form. A third effect was compared with other forms of
+        the first two before it was tried.
 
         Parameters
         ----------
@@ -83,6 +87,8 @@ class OtherForms:
             single = alone.get(model.names[0])
             # Two effects that act as one law are other forms of each other; they are distinguished by other means.
             if len(model.effects) > 2 or single is None or not model.residuals or is_one_law(model):
+                return True
+            if self._noise > 0.0 and model.error_over_noise <= VERDICT.exact:
                 return True
             return self.gain(single) < VERDICT.larger_part * (
                 single.error_over_noise**2 - model.error_over_noise**2

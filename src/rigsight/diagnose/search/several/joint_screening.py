@@ -13,6 +13,7 @@ best subset of columns.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -141,9 +142,22 @@ class _Columns:
             explained = self.along[own] @ alone + added**2 * outside[usable]
             for members_of, square in zip(members.T[possible], explained[possible], strict=True):
                 found[tuple(sorted(map(int, members_of)))] = float(square)
-        best = sorted(found, key=lambda members: -found[members])[: SEARCH.joint_beam]
+        best = self._beam(found)
         size = chosen.shape[1] + 1
         return np.array(best, dtype=np.int64).reshape(-1, size), np.array([found[own] for own in best])
+
+    def _beam(self, found: Mapping[tuple[int, ...], float]) -> list[tuple[int, ...]]:
+        """Return the best sets; of the same effects only as many starts as are fitted, as one with many would fill all places."""
+        starts: Counter[frozenset[str]] = Counter()
+        best: list[tuple[int, ...]] = []
+        for members in sorted(found, key=lambda members: -found[members]):
+            effects = frozenset(self.responses[i].effect.name for i in members)
+            starts[effects] += 1
+            if starts[effects] <= SEARCH.lengthy_starts:
+                best.append(members)
+            if len(best) == SEARCH.joint_beam:
+                break
+        return best
 
     def effect_set(self, own: NDArray[np.int64], share: float) -> EffectSet:
         """Return a set of columns, shape (size,), as effects with the sizes that the regression gives them."""

@@ -19,6 +19,7 @@ from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.screening import structures_of_lineup
 from rigsight.diagnose.search.single_effects import followed
 from rigsight.effects import Effect
+from rigsight.identify import FitResult
 
 
 def with_one_more(
@@ -48,8 +49,8 @@ def with_one_more(
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
     least_share
-        Share of the squared residual that the push of one of the effects must explain for any of those to be tried that a push
-        represents.
+        Share of the squared residual above the noise that the push of one of the effects must explain; otherwise only those are
+        tried that no push represents.
     enough
         Error, in units of the noise floor, above which effects that the screening puts last are tried, too, if a parameter
         changes the shape of their force.
@@ -63,7 +64,7 @@ def with_one_more(
     if prepare is not None:
         prepare(structures_of_lineup(context.rig, open_ones, (*context.modelled, *parent.effects)))
     search = search_places(context, parent, open_ones)
-    if search.most < least_share:
+    if search.most < least_share * _above_noise(parent.fit) / parent.fit.cost:
         # The screening says nothing about effects that no push represents, such as periodic ones.
         unscreened = [effect for effect in search.effects if effect.name not in search.shares]
         return _fitted_beside(context, parent, unscreened, search.starts, singles, prepare)
@@ -90,7 +91,7 @@ def _fitted_beside(
 ) -> list[Scored]:
     base = parent.fit
     if prepare is not None:
-        prepare([context.simplest((*parent.effects, effect)) for effect in effects])
+        prepare([context.simplest((*parent.effects, effect), base.structure) for effect in effects])
 
     alone = {model.names[0]: model.fit for model in singles}
 
@@ -127,13 +128,19 @@ def _fitted_beside(
 
     looks = list(context.threads.side_by_side(other_way, looks))
     lowest = min((found.cost for found in looks), default=float("inf"))
-    worth = min(SEARCH.worth_following * base.cost, SEARCH.near_the_best * lowest)
+    unexplained = (1.0 - SEARCH.worth_following) * _above_noise(base)
+    worth = min(base.cost - unexplained, SEARCH.near_the_best * lowest)
     promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
 
     def follow(found: FirstLook) -> Scored:
         return followed(context, found, promising=True, finish=False)
 
     return list(context.threads.side_by_side(follow, promising[: SEARCH.most_followed]))
+
+
+def _above_noise(fit: FitResult) -> float:
+    """Return the part of a cost above that of noise alone; all of it if the noise floor is above the residual."""
+    return fit.cost - fit.n_samples if fit.cost > fit.n_samples else fit.cost
 
 
 def _has_a_shape(effect: Effect) -> bool:

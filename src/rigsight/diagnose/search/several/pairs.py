@@ -72,34 +72,37 @@ def grown(
         return []
     allowed = _half_closed(usable[0].error_over_noise)
     search = PairSearch(context, singles, usable, effects, at_floor, allowed, forms, prepare)
-    pairs = together.fitted(2)
-    triples = together.fitted(3) if _lowest(pairs) > at_floor else []
+    # What is compared with a limit is fitted to convergence first.
+    pairs = _best_converged(context, together.fitted(2))
+    triples = _best_converged(context, together.fitted(3)) if _lowest(pairs) > at_floor else []
     if not _lowest(triples) <= VERDICT.exact < _lowest(pairs):
         explaining = [model for model in usable if model.error_over_noise <= worthwhile] or usable
         tried, pairs = _beside_singles(search, explaining, pairs)
         pairs = with_other_forms(search, with_similar(search, pairs, tried))
-    pairs.sort(key=lambda pair: pair.error_over_noise)
+    pairs = each_once(pairs)
     # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
     last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
     n_finished = sum(pair.error_over_noise <= SEARCH.alike_pairs * last for pair in pairs)
     pairs = [*(finished(context, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
     pairs = refine(context, pairs)
-    if _lowest(triples) > at_floor:
-        triples += with_a_third(context, usable, pairs, effects, forms, prepare)
     nearest = _lowest(pairs)
-    triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
-    if triples and nearest > at_floor:
-        triples = finished_best(context, triples)
-        triples, pairs = with_relatives(context, triples, pairs, usable, effects, prepare)
-    else:
+    if nearest <= at_floor:
         triples = []
+    elif _lowest(triples) > at_floor:
+        triples += with_a_third(context, usable, pairs, effects, forms, prepare)
+    if triples:
+        triples = finished_best(context, each_once(triples))
+    triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
+    if triples:
+        triples, pairs = with_relatives(context, triples, pairs, usable, effects, prepare)
     of_triples = [set(triple.names) for triple in triples]
     pairs = [
         pair
         for pair in pairs
         if pair.error_over_noise <= allowed or any(set(pair.names) < own for own in of_triples)
     ]
-    return larger_first(without_repeated_equations(context, [*pairs, *triples]), singles)
+    models = each_once([*pairs, *triples])
+    return larger_first(without_repeated_equations(context, models), singles)
 
 
 def _beside_singles(
@@ -128,18 +131,40 @@ def _beside_singles(
             (min(others, key=lambda model: (model.n_free, model.error_over_noise)), search.allowed)
         )
     tried: list[Scored] = []
-    pairs = list(known)
+    # Pairs fitted from where the screening puts them may have ended in another minimum: others start from a single effect.
+    settled = [pair for pair in known if pair.error_over_noise <= VERDICT.exact]
+    found: list[Scored] = []
     for parent, enough in parents:
-        if parent not in tried and _lowest(pairs) > enough:
+        if parent not in tried and _lowest([*known, *found]) > enough:
             partners = search.forms.partners(parent, search.effects)
             widely = np.inf if tried else search.at_floor
             tried.append(parent)
-            pairs += search.beside(parent, partners, pairs, widely)
-    return tried, pairs
+            found += search.beside(parent, partners, [*settled, *found], widely)
+    return tried, each_once([*known, *found])
+
+
+def _best_converged(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+    """Return the models, best first, that one fitted to convergence."""
+    ordered = sorted(models, key=lambda model: model.error_over_noise)
+    return [*refine(context, [finished(context, model) for model in ordered[:1]]), *ordered[1:]]
 
 
 def _lowest(models: Sequence[Scored]) -> float:
     return min((model.error_over_noise for model in models), default=np.inf)
+
+
+def each_once(models: Sequence[Scored]) -> list[Scored]:
+    """Return of the models with the same effects the best, best first.
+
+    Parameters
+    ----------
+    models
+        Fitted and scored.
+    """
+    found: dict[frozenset[str], Scored] = {}
+    for model in sorted(models, key=lambda model: model.error_over_noise):
+        found.setdefault(frozenset(model.names), model)
+    return list(found.values())
 
 
 def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Scored]:

@@ -99,8 +99,13 @@ def with_relatives(
         return other.name in replaced.parents
 
     found, known = list(triples), list(pairs)
+    compared: Scored | None = None
     for is_tried in (as_good, plainer, as_good):
         best = min(found, key=lambda model: model.error_over_noise)
+        if is_tried is as_good:
+            if best is compared:
+                break
+            compared = best
         known = _with_refitted_parts(context, best, known)
         new: list[Scored] = []
         for replaced in best.effects:
@@ -134,7 +139,7 @@ def _with_refitted_parts(context: FitContext, triple: Scored, pairs: Sequence[Sc
     """Return the pairs with those of the effects of a triple, fitted from where they stand in it if that is better."""
 
     def one(effects: tuple[Effect, ...]) -> Scored:
-        structure = context.simplest(effects)
+        structure = context.simplest(effects, triple.fit.structure)
         values = {**carried_over(triple.fit.values, triple.fit.structure, structure), **dict(structure.fixed)}
         start = replace(triple.fit, values=values)
         look = FirstLook(
