@@ -39,6 +39,7 @@ TOLERANCES = {
     "_DAMPING_RATIO": "shape of a weight",
     "_TOLERANCE": "of an optimizer",
     "_ROUGH_TOLERANCE": "of an optimizer",
+    "_FINE_TOLERANCE": "of an optimizer",
     "_HOPELESS_TOLERANCE": "of an optimizer",
     "_LOOK_TOLERANCE": "of an optimizer",
     "_ACCURACY": "of an integration",

@@ -194,6 +194,14 @@ def test_special_values_go_by_the_names_of_the_structure() -> None:
     assert structure.special_cases == {"n"}
 
 
+def test_a_parameter_that_was_freed_in_one_structure_stays_free_in_a_larger_one() -> None:
+    hysteresis, power = effect_named("bouc_wen_hysteresis"), effect_named("power_law_stiffness")
+    freed = compose(AXIS, [hysteresis])
+    assert special_values(AXIS, [hysteresis, power], like=freed) == {}
+    fixed = compose(AXIS, [hysteresis], special_values(AXIS, [hysteresis]))
+    assert special_values(AXIS, [hysteresis, power], like=fixed) == {"bouc_wen_hysteresis.n": 1.0}
+
+
 def test_of_ordered_parameters_the_larger_one_moves_as_its_excess() -> None:
     """Static friction is never below sliding friction, wherever a search goes."""
     structure = compose(AXIS, [effect_named("stribeck_friction")])

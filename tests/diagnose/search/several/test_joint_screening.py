@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.screening import Response
 from rigsight.diagnose.search.several.joint_screening import best_sets
 from rigsight.effects import effect_named
@@ -66,6 +69,22 @@ def test_starts_that_differ_in_size_only_count_once() -> None:
     found = best_sets(responses, residual, 2)
     assert [one.names for one in found] == [{"coulomb_friction", "cubic_stiffness"}] * 2
     assert found[0].share > 0.99 > found[1].share
+
+
+def test_an_effect_with_many_starts_leaves_room_for_others(monkeypatch) -> None:
+    monkeypatch.setattr(
+        "rigsight.diagnose.search.several.joint_screening.SEARCH", replace(SEARCH, joint_beam=3)
+    )
+    friction, damping, spring = COLUMNS[:3]
+    starts = [friction + 1e-2 * RNG.standard_normal(500) for _ in range(9)]
+    responses = [
+        *(response("coulomb_friction", 0.1, start) for start in starts),
+        response("cubic_stiffness", 0.1, spring),
+        response("quadratic_damping", 0.1, damping),
+    ]
+    found = best_sets(responses, 3.0 * friction + 3.0 * spring + damping, 2)
+    best = {"coulomb_friction", "cubic_stiffness"}
+    assert [one.names == best for one in found] == [True, True, False]
 
 
 def test_without_responses_there_are_no_sets() -> None:

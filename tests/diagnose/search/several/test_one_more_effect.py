@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
@@ -25,21 +25,23 @@ NOISE = 2e-5
 RIPPLE = {"c_2": 5.0, "T_sin": 0.1, "T_cos": 0.05, "kappa": 150.0}
 
 
-def measured(effect: str, role: str, amplitude: float, rng: np.random.Generator) -> Record:
+def measured(
+    effect: str, role: str, amplitude: float, rng: np.random.Generator, noise: float = NOISE
+) -> Record:
     effects = [effect_named("quadratic_damping"), effect_named(effect)]
     t = 0.01 * np.arange(2000)
     record = Record(role, 0.01, {"u": linear_sweep(t, amplitude, 1.0, 30.0)}, {}, role=role, hold="zoh")
     clean = simulate(compose(AXIS, effects), {**VALUES, **HIDDEN, **RIPPLE}, record)
-    return clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size))
+    return clean.with_signals(x=clean["x"] + rng.normal(scale=noise, size=t.size))
 
 
-def beside_a_damping(effect: str) -> tuple[FitContext, Scored]:
+def beside_a_damping(effect: str, noise: float = NOISE) -> tuple[FitContext, Scored]:
     """Return the records of a quadratic damping with an effect, and the damping fitted alone."""
     rng = np.random.default_rng(0)
-    fitted = (measured(effect, "estimation", 0.4, rng), measured(effect, "estimation", 1.0, rng))
-    scored = (measured(effect, "validation", 0.7, rng),)
+    fitted = tuple(measured(effect, "estimation", amplitude, rng, noise) for amplitude in (0.4, 1.0))
+    scored = (measured(effect, "validation", 0.7, rng, noise),)
     scales = characteristic_scales(AXIS, fitted, VALUES)
-    context = FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
+    context = FitContext(AXIS, fitted, scored, fitted, scales, {"x": noise}, frozenset())
     (damped,) = fit_candidates(context, reidentify(context, VALUES), [effect_named("quadratic_damping")])
     return context, damped
 
@@ -63,3 +65,13 @@ def test_an_effect_that_no_push_represents_is_tried_where_the_pushes_explain_too
     (found,) = with_one_more(context, damped, tried, [], [damped], least_share=0.99)
     assert found.names == ("quadratic_damping", "torque_ripple")
     assert found.error_over_noise < VERDICT.at_floor
+
+
+def test_beside_a_model_near_the_floor_an_effect_is_tried_that_explains_all_but_noise() -> None:
+    _, damped = beside_a_damping("torque_ripple")
+    ripple = NOISE * np.sqrt(damped.error_over_noise**2 - 1.0)
+    context, damped = beside_a_damping("torque_ripple", noise=ripple / np.sqrt(1.03**2 - 1.0))
+    assert damped.error_over_noise < VERDICT.at_floor
+    (found,) = with_one_more(context, damped, [effect_named("torque_ripple")], [], [damped])
+    assert found.error_over_noise < VERDICT.exact
+    assert found.fit.cost > SEARCH.worth_following * damped.fit.cost, "noise is most of both costs"

@@ -15,7 +15,7 @@ from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several import pair_search
 from rigsight.diagnose.search.several import pairs as pairs_module
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.pairs import grown, refit_singles
+from rigsight.diagnose.search.several.pairs import each_once, grown, refit_singles
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import Effect, effect_named
@@ -122,6 +122,13 @@ def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
         Together(context, reidentified, [spring, lag]),
     )
     assert [pair.names for pair in pairs] == [("cubic_stiffness", "actuator_lag")]
+
+
+def test_of_models_with_the_same_effects_the_best_is_kept(scored) -> None:
+    two = ("coulomb_friction", "cubic_stiffness")
+    worse, better = scored(two, error_over_noise=1.4), scored(two[::-1], error_over_noise=1.1)
+    other = scored(("coulomb_friction", "backlash"), error_over_noise=1.2)
+    assert each_once([worse, other, better]) == [better, other]
 
 
 def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
