@@ -78,3 +78,21 @@ def test_a_rival_beside_wrong_numbers_of_the_rig_gets_those_of_the_best(bench: F
     same, found = in_lowest_basins(bench, [best, stuck])
     assert same is best
     assert found.error_over_noise < 1.2 * right.error_over_noise
+
+
+def test_a_rival_of_several_effects_gets_the_effect_that_both_have(bench: FitContext) -> None:
+    def both(other: str, own: Mapping[str, float], evaluations: int) -> Scored:
+        effects = (STRIBECK, effect_named(other))
+        structure = bench.composed(effects)
+        problem = bench.problem(structure, bench.estimation)
+        fit = problem.fit({**TRUE, **own}, bench.free_parameters(structure), max_evaluations=evaluations)
+        return bench.score(effects, fit)
+
+    best = both("cubic_stiffness", {"k_3": 1e-3}, 60)
+    stopped = both("quadratic_damping", {"c_2": 1e-3, "T_c": 1e-3, "T_s": 5e-3, "w_s": 0.05}, 2)
+    assert best.error_over_noise < 1.03
+    assert stopped.error_over_noise > 2.0
+    same, found = in_lowest_basins(bench, [best, stopped])
+    assert same is best
+    assert found.error_over_noise < 1.03
+    assert found.fit.values["T_s"] == pytest.approx(TRUE["T_s"], rel=0.02)

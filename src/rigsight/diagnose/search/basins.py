@@ -18,6 +18,7 @@ from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import LOOK_ACCURACY
 from rigsight.identify import FitResult
+from rigsight.simulate import carried_over
 
 _TOLERANCE = 1e-4
 _SEED = 0
@@ -27,8 +28,8 @@ _SEED = 0
 def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
     """Return the models, the best of them in the lowest minimum that was found.
 
-    Each also starts from the rig parameters of the best one, because the mass of the rig does not depend on the missing effect.
-    If a model explains the records, nothing else is tried for the others.
+    Each also starts from the parameters that it has in common with the best one, because neither the mass of the rig nor an
+    effect that both have depends on the others. If a model explains the records, nothing else is tried.
 
     Parameters
     ----------
@@ -43,22 +44,22 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
         return list(models)
     leader = ranked[0]
     is_explained = leader.error_over_noise <= VERDICT.exact
-    nearest = [m for m in ranked if m.error_over_noise > VERDICT.exact][: SEARCH.basin_models]
+    nearest = ranked[1 : 1 + SEARCH.basin_models] if is_explained else ranked[: SEARCH.basin_models]
 
     def lowest(own: Scored) -> Scored:
         starts = [] if is_explained else _starts(own)
-        return _lowest(context, own, starts if own is leader else [*starts, _on_rig_of(leader, own)])
+        return _lowest(context, own, starts if own is leader else [*starts, _as_in(leader, own)])
 
     found = dict(zip(map(id, nearest), context.threads.side_by_side(lowest, nearest), strict=True))
     return [found.get(id(model), model) for model in models]
 
 
-def _on_rig_of(leader: Scored, model: Scored) -> dict[str, float]:
-    """Return the numbers of a model with those of the rig as another model has them."""
+def _as_in(leader: Scored, model: Scored) -> dict[str, float]:
+    """Return the parameters of a model with the values that another one has for those of both."""
     fit = model.fit
+    common = carried_over(leader.fit.values, leader.fit.structure, fit.structure)
     # Held parameters keep their value, such as a known constant force beside an effect that would absorb it.
-    own = {p.name for p in fit.structure.rig.parameters} & set(fit.free)
-    return {**fit.values, **{name: value for name, value in leader.fit.values.items() if name in own}}
+    return {**fit.values, **{name: value for name, value in common.items() if name in fit.free}}
 
 
 def _lowest(context: FitContext, model: Scored, starts: Sequence[dict[str, float]]) -> Scored:
@@ -68,9 +69,10 @@ def _lowest(context: FitContext, model: Scored, starts: Sequence[dict[str, float
     def roughly(values: dict[str, float]) -> FitResult:
         return rough.fit(values, fit.free, None, SEARCH.basin_evaluations, _TOLERANCE, finish=False)
 
-    lowest = min(map(roughly, [fit.values, *starts]), key=lambda found: found.cost)
-    # Roughly simulated, so that what looks lower may not be: the finished fit decides.
-    if not _is_lower(lowest, fit):
+    here, *elsewhere = map(roughly, [fit.values, *starts])
+    lowest = min([here, *elsewhere], key=lambda found: found.cost)
+    # Roughly simulated, so that what looks lower may not be, and conversely: the finished fit decides.
+    if not (_is_lower(lowest, fit) or _is_lower(lowest, here)):
         return model
     finished = context.problem(fit.structure, context.estimation).fit(
         lowest.values, fit.free, lowest.initial_states, SEARCH.basin_finish_evaluations, _TOLERANCE

@@ -76,25 +76,9 @@ def grown(
     pairs = _best_converged(context, together.fitted(2))
     triples = _best_converged(context, together.fitted(3)) if _lowest(pairs) > at_floor else []
     if not _lowest(triples) <= VERDICT.exact < _lowest(pairs):
-        explaining = [model for model in usable if model.error_over_noise <= worthwhile] or usable
-        tried, pairs = _beside_singles(search, explaining, pairs)
-        pairs = with_other_forms(search, with_similar(search, pairs, tried))
-    pairs = each_once(pairs)
-    # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
-    last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
-    n_finished = sum(pair.error_over_noise <= SEARCH.alike_pairs * last for pair in pairs)
-    pairs = [*(finished(context, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
-    pairs = refine(context, pairs)
-    nearest = _lowest(pairs)
-    if nearest <= at_floor:
-        triples = []
-    elif _lowest(triples) > at_floor:
-        triples += with_a_third(context, usable, pairs, effects, forms, prepare)
-    if triples:
-        triples = finished_best(context, each_once(triples))
-    triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
-    if triples:
-        triples, pairs = with_relatives(context, triples, pairs, usable, effects, prepare)
+        pairs = _added_one_by_one(search, worthwhile, pairs)
+    pairs = _alike_finished(context, each_once(pairs))
+    triples, pairs = _competing_triples(search, triples, pairs)
     of_triples = [set(triple.names) for triple in triples]
     pairs = [
         pair
@@ -103,6 +87,39 @@ def grown(
     ]
     models = each_once([*pairs, *triples])
     return larger_first(without_repeated_equations(context, models), singles)
+
+
+def _added_one_by_one(search: PairSearch, worthwhile: float, known: Sequence[Scored]) -> list[Scored]:
+    """Return the known pairs with those that extend a single effect, and with other forms of their effects."""
+    explaining = [model for model in search.usable if model.error_over_noise <= worthwhile] or search.usable
+    tried, pairs = _beside_singles(search, explaining, known)
+    return with_other_forms(search, with_similar(search, pairs, tried))
+
+
+def _alike_finished(context: FitContext, pairs: Sequence[Scored]) -> list[Scored]:
+    """Return pairs, best first, with the best two, and those that explain as much, fitted to convergence."""
+    # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
+    last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
+    n_finished = sum(pair.error_over_noise <= SEARCH.alike_pairs * last for pair in pairs)
+    return refine(context, [*(finished(context, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]])
+
+
+def _competing_triples(
+    search: PairSearch, triples: Sequence[Scored], pairs: Sequence[Scored]
+) -> tuple[list[Scored], list[Scored]]:
+    """Return the triples that close half of what the best pair leaves, and the pairs with the parts of the best triples."""
+    context, nearest = search.context, _lowest(pairs)
+    if nearest <= search.at_floor:
+        return [], list(pairs)
+    if _lowest(triples) > search.at_floor:
+        third = with_a_third(context, search.usable, pairs, search.effects, search.forms, search.prepare)
+        triples = [*triples, *third]
+    if triples:
+        triples = finished_best(context, each_once(triples))
+    triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
+    if not triples:
+        return [], list(pairs)
+    return with_relatives(context, triples, pairs, search.usable, search.effects, search.prepare)
 
 
 def _beside_singles(

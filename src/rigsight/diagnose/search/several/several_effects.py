@@ -8,6 +8,7 @@ from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.joint_starts import with_joint_starts
 from rigsight.diagnose.search.several.pairs import grown
@@ -65,5 +66,6 @@ def several_effects(
     worthwhile = reidentified.error_over_noise / VERDICT.worthwhile
     together = Together(context, reidentified, effects, prepare)
     pairs = grown(context, singles, effects, at_floor, worthwhile, forms, together, prepare)
+    pairs = in_lowest_basins(context, pairs)
     pairs = with_joint_starts(context, reidentified, pairs, singles, effects, checks.is_adequate, prepare)
     return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]
