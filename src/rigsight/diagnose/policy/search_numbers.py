@@ -58,7 +58,7 @@ class SearchNumbers:
     most_starts: int = number(
         4,
         "budget",
-        "Number of starts up to which all are fitted at length; of more, so many after a very short fit.",
+        "Number of starts up to which all are fitted at length.",
     )
     lengthy_starts: int = number(
         2,

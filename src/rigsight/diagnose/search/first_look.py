@@ -160,16 +160,11 @@ def _looked(
         first = [*at_length, *glimpses[SEARCH.lengthy_starts :]]
     else:
         first = [tried(start, None, SEARCH.look_evaluations) for start in starts]
-
-    def in_one_piece(start: FitResult, states: Sequence[NDArray[np.float64]] | None, most: int) -> FitResult:
-        return fit.fit(start.values, free, states, most, _LOOK_TOLERANCE, False, substeps)
-
-    apart = _apart(first)
-    if len(apart) > SEARCH.most_starts:
-        short = [in_one_piece(found, None, SEARCH.glimpse_evaluations) for found in apart]
-        best = _apart(short)[: SEARCH.most_starts]
-        return _distinct([in_one_piece(g, g.initial_states, SEARCH.look_evaluations) for g in best])
-    return _distinct([in_one_piece(found, None, SEARCH.look_evaluations) for found in apart])
+    near = [
+        fit.fit(found.values, free, None, SEARCH.look_evaluations, _LOOK_TOLERANCE, False, substeps)
+        for found in _apart(first)
+    ]
+    return _distinct(near)
 
 
 def widened(
