@@ -1,14 +1,16 @@
 """Scores of the trials that judge the calibration, with the probabilities that the present calibration gives.
 
-    .venv/bin/python experiments/calibration/judged.py BENCH...    # adds trials of benches to judged.jsonl
-    .venv/bin/python experiments/calibration/judged.py             # prints the scores of all of them
+    .venv/bin/python experiments/calibration/judged.py BENCH... --state 40f2704    # adds trials of benches to judged.jsonl
+    .venv/bin/python experiments/calibration/judged.py                             # prints the scores of all of them
 
 A line of the file has of a trial what its scores depend on: the key without the numbers of the rig, and of the diagnosis verdict,
-ranking and errors. A calibration changes neither, so it may be trained while the trials that judge it run.
+ranking and errors. A calibration changes neither, so it may be trained while the trials that judge it run. All lines are of one
+state of the code, and a trial that is run again keeps its first outcome.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import sys
@@ -38,22 +40,38 @@ _LEAST_SHARE = 1e-12
 Line = dict[str, Any]
 
 
-def main(benches: Sequence[Path]) -> None:
+def main() -> None:
     """Add the trials of benches, or print the scores."""
-    known = {_name(line): line for line in read_lines()}
-    if not benches:
-        print(tables([scored(line, trained()) for line in known.values()]))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("bench", type=Path, nargs="*")
+    parser.add_argument("--state", help="commit of the code that ran them")
+    given = parser.parse_args()
+    if not given.bench:
+        print(tables([scored(line, trained()) for line in read_lines()]))
         return
-    found = []
+    if not given.state:
+        parser.error("name the commit of the code that ran these trials: --state 40f2704")
+    lines = with_benches(read_lines(), given.bench, given.state)
+    FILE.write_text("".join(f"{json.dumps(line)}\n" for line in lines), encoding="utf-8")
+    print(f"{len(lines)} trials in {FILE}.")
+
+
+def with_benches(known: Sequence[Line], benches: Sequence[Path], state: str) -> list[Line]:
+    """Return the lines with those of benches that one state of the code ran; a trial that is there already stays as it is."""
+    others = {line["state"] for line in known} - {state}
+    if others:
+        sys.exit(
+            f"{FILE} has trials of {', '.join(sorted(others))}. Remove it before trials of {state} are added."
+        )
+    lines = {_name(line): line for line in known}
     for bench in benches:
-        own = list(_of_bench(bench))
-        if not own:
-            sys.exit(f"{bench} holds no trial: name the folder that 'rigsight blind --out' wrote.")
-        found += own
-    known |= {_name(line): line for line in found}
-    lines = (json.dumps(known[name]) for name in sorted(known))
-    FILE.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    print(f"{len(found)} trials read, {len(known)} in {FILE}.")
+        found = list(_of_bench(bench, state))
+        if not found:
+            sys.exit(f"{bench} has no trials: name the folder that 'rigsight blind --out' wrote.")
+        lines = {_name(line): line for line in found} | lines
+    return [lines[name] for name in sorted(lines)]
 
 
 def read_lines() -> list[Line]:
@@ -68,13 +86,14 @@ def _name(line: Line) -> tuple[str, int, str]:
     return (key["design"], key["seed"], str(key["trial"]).zfill(3))
 
 
-def _of_bench(bench: Path) -> Iterable[Line]:
+def _of_bench(bench: Path, state: str) -> Iterable[Line]:
     for run in sorted(bench.glob("results/*/run.json")):
         key = json.loads((bench / "keys" / f"{run.parent.name}.json").read_text(encoding="utf-8"))
         told = json.loads(run.read_text(encoding="utf-8"))
         result = run.with_name("diagnosis.json")
         diagnosis = json.loads(result.read_text(encoding="utf-8")) if result.exists() else None
         yield {
+            "state": state,
             "key": {name: key[name] for name in OF_KEY if name in key},
             "seconds": told["seconds"],
             "message": told["message"],
@@ -213,4 +232,4 @@ def _groups(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
 
 
 if __name__ == "__main__":
-    main([Path(name) for name in sys.argv[1:]])
+    main()

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 
+from rigsight.blind.scoring.training_trial import training_trial
 from rigsight.diagnose.verdict.calibration import trained
 
 STUDY = Path(__file__).parents[2] / "experiments/calibration"
 MODULES = ("fit", "judged", "table")
+FRICTION, PLAY, SPRING = "coulomb_friction", "free_play", "cubic_stiffness"
+KEY = {
+    "schema_version": 2, "design": "small", "seed": 202, "trial": 7, "kind": "single", "effects": [FRICTION],
+    "where": ["dynamics"], "rig": "axis", "noise": "low", "gap": 9.0,
+}  # fmt: skip
 JUDGING_SEEDS = range(200, 300)
 """Seeds of the bench on which stated probabilities are judged: none of them may train."""
 
@@ -73,3 +81,71 @@ def test_trials_that_judge_are_of_no_seed_that_trains_and_score_with_any_calibra
         assert sure.right == unsure.right
         assert unsure.stated == pytest.approx(1.0 if sure.verdict == "unknown" else 0.0, abs=1e-6)
     assert judged.tables([judged.scored(line, trained()) for line in lines]).count("\n") > 10
+
+
+def diagnosed(shares: dict[str, float]) -> dict[str, Any]:
+    """Return what ``diagnosis.json`` has of the first effect named, with a share of the ranking for each."""
+    models = {(name,): share for name, share in shares.items()} | {(): None}
+    return {
+        "verdict": "effect",
+        "effects": [next(iter(shares))],
+        "where": ["dynamics"],
+        "ambiguous_with": [],
+        "adequate": True,
+        "likely_causes": {"effects": [], "outside": False},
+        "candidates": [
+            {
+                "effects": list(names),
+                "where": ["dynamics"] * len(names),
+                "probability": 0.0,
+                "error_over_noise": 1.0 if names else 9.0,
+                "ranking_share": share,
+            }
+            for names, share in models.items()
+        ],
+        "noise_floor": {"x": {"lower_bound": False}},
+        "gap_by_place": [],
+    }
+
+
+def bench_of(folder: Path, diagnosis: dict[str, Any]) -> Path:
+    for path, content in {
+        "keys/007.json": KEY,
+        "results/007/run.json": {"seconds": 12.0, "message": ""},
+        "results/007/diagnosis.json": diagnosis,
+    }.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(json.dumps(content), encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("behind", [0.2, 2e-5, 1e-9])
+def test_a_shortened_line_has_the_probabilities_that_the_diagnosis_states(
+    study: ModuleType, tmp_path: Path, behind: float
+) -> None:
+    import judged
+
+    shares = {FRICTION: 1.0 - 2.0 * behind, PLAY: behind, SPRING: behind}
+    whole = diagnosed(shares)
+    (line,) = judged.with_benches([], [bench_of(tmp_path, whole)], "abc")
+    situation = training_trial(KEY, whole).situation
+    stated = trained().probabilities(situation, list(shares.values()))
+    found = judged.scored(line, trained())
+    assert found.stated == pytest.approx(stated[0], rel=1e-4)
+    told = judged.with_probabilities(line["diagnosis"], line["key"], trained())
+    outside = 1.0 - trained().probability_listed(situation)
+    assert 1.0 - sum(c["probability"] for c in told["candidates"]) >= outside - 1e-9
+
+
+def test_the_first_outcome_of_a_trial_counts_and_states_of_the_code_do_not_mix(
+    study: ModuleType, tmp_path: Path
+) -> None:
+    import judged
+
+    first = judged.with_benches([], [bench_of(tmp_path / "a", diagnosed({PLAY: 1.0}))], "abc")
+    again = bench_of(tmp_path / "b", diagnosed({FRICTION: 1.0}))
+    assert judged.with_benches(first, [again], "abc") == first
+    with pytest.raises(SystemExit, match="has trials of abc"):
+        judged.with_benches(first, [again], "def")
+    with pytest.raises(SystemExit, match="has no trials"):
+        judged.with_benches(first, [tmp_path / "nowhere"], "abc")

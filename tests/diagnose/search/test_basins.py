@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search import basins
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import characteristic_scales
@@ -96,3 +97,23 @@ def test_a_rival_of_several_effects_gets_the_effect_that_both_have(bench: FitCon
     assert same is best
     assert found.error_over_noise < 1.03
     assert found.fit.values["T_s"] == pytest.approx(TRUE["T_s"], rel=0.02)
+
+
+def test_the_best_one_starts_from_the_numbers_of_the_next_too(
+    bench: FitContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    best = fitted(bench, STRIBECK, TRUE)
+    next_one = fitted(bench, effect_named("coulomb_friction"), {**TRUE, "T_c": 2e-3})
+    asked: dict[tuple[str, ...], list[Mapping[str, float]]] = {}
+
+    def noted(_: FitContext, own: Scored, starts: list[Mapping[str, float]]) -> Scored:
+        asked[own.names] = starts
+        return own
+
+    monkeypatch.setattr(basins, "_lowest", noted)
+    in_lowest_basins(bench, [next_one, best])
+    (start,) = asked[best.names]
+    assert start["k"] == next_one.fit.values["k"] != best.fit.values["k"]
+    assert start["T_s"] == best.fit.values["T_s"]
+    (start,) = asked[next_one.names]
+    assert start["k"] == best.fit.values["k"]

@@ -28,8 +28,9 @@ _SEED = 0
 def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
     """Return the models, the best of them in the lowest minimum that was found.
 
-    Each also starts from the parameters that it has in common with the best one, because neither the mass of the rig nor an
-    effect that both have depends on the others. If a model explains the records, nothing else is tried.
+    Each also starts from the parameters that it has in common with the best one, and the best one from those of the next, because
+    neither the mass of the rig nor an effect that both have depends on the others. If a model explains the records, nothing else
+    is tried.
 
     Parameters
     ----------
@@ -44,11 +45,12 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
         return list(models)
     leader = ranked[0]
     is_explained = leader.error_over_noise <= VERDICT.exact
-    nearest = ranked[1 : 1 + SEARCH.basin_models] if is_explained else ranked[: SEARCH.basin_models]
+    nearest = ranked[: SEARCH.basin_models]
 
     def lowest(own: Scored) -> Scored:
         starts = [] if is_explained else _starts(own)
-        return _lowest(context, own, starts if own is leader else [*starts, _as_in(leader, own)])
+        others = nearest[1:2] if own is leader else [leader]
+        return _lowest(context, own, [*starts, *(_as_in(other, own) for other in others)])
 
     found = dict(zip(map(id, nearest), context.threads.side_by_side(lowest, nearest), strict=True))
     return [found.get(id(model), model) for model in models]

@@ -120,6 +120,7 @@ def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
         reidentified.error_over_noise,
         OtherForms(context, lower_bound=False),
         Together(context, reidentified, [spring, lag]),
+        lambda _: True,
     )
     assert [pair.names for pair in pairs] == [("cubic_stiffness", "actuator_lag")]
 
@@ -149,8 +150,36 @@ def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
     monkeypatch.setattr(pairs_module, "refine", lambda _, pairs: pairs)
     forms = SimpleNamespace(partners=lambda parent, effects: effects)
     together = SimpleNamespace(fitted=lambda size: [])
-    grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms, together)
+    grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms, together, lambda _: True)
     assert beside == ["power_law_stiffness"]
+
+
+@pytest.mark.parametrize(
+    ("left", "is_noise", "extended"),
+    [(1.0, False, False), (1.05, True, False), (1.05, False, True), (1.2, True, True)],
+)
+def test_a_pair_near_the_floor_is_extended_if_it_leaves_more_than_noise(
+    monkeypatch: pytest.MonkeyPatch, scored, left: float, is_noise: bool, extended: bool
+) -> None:
+    two = ("coulomb_friction", "cubic_stiffness")
+    single = scored(two[:1], residuals=np.full(8, 9.0))
+    pair = scored(two, residuals=np.full(8, left))
+    asked: list[str] = []
+
+    def third(*_: object) -> list[Scored]:
+        asked.append("third")
+        return []
+
+    monkeypatch.setattr(pairs_module, "with_a_third", third)
+    monkeypatch.setattr(pairs_module, "refine", lambda _, pairs: pairs)
+    monkeypatch.setattr(pairs_module, "finished", lambda _, pair: pair)
+    monkeypatch.setattr(pairs_module, "_added_one_by_one", lambda _search, _worthwhile, pairs: pairs)
+    monkeypatch.setattr(pairs_module, "without_repeated_equations", lambda _, models: models)
+    together = SimpleNamespace(fitted=lambda size: [pair] if size == 2 else [])
+    effects = [effect_named(name) for name in two]
+    found = grown(None, [single], effects, VERDICT.at_floor, 9.0, None, together, lambda _: is_noise)
+    assert found == [pair]
+    assert asked == ["third"] * extended
 
 
 def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:

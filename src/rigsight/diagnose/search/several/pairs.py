@@ -9,7 +9,7 @@ S. A. Billings, *Nonlinear System Identification* (Wiley 2013), for greedy forwa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +37,7 @@ def grown(
     worthwhile: float,
     forms: OtherForms,
     together: Together,
+    is_enough: Callable[[Scored], bool],
     prepare: Prepare | None = None,
 ) -> list[Scored]:
     """Return fitted models of two and three effects that close at least half of the error of the best with one less.
@@ -57,6 +58,8 @@ def grown(
         Says which effects are worth trying beside another.
     together
         Models whose effects explain most together.
+    is_enough
+        Says whether a pair near the floor leaves only noise and disturbance, as far as that can be told; else it is extended.
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
 
@@ -78,6 +81,9 @@ def grown(
     if not _lowest(triples) <= VERDICT.exact < _lowest(pairs):
         pairs = _added_one_by_one(search, worthwhile, pairs)
     pairs = _alike_finished(context, each_once(pairs))
+    best = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
+    if best is not None and VERDICT.exact < best.error_over_noise <= at_floor and not is_enough(best):
+        search = replace(search, at_floor=VERDICT.exact)
     triples, pairs = _competing_triples(search, triples, pairs)
     of_triples = [set(triple.names) for triple in triples]
     pairs = [

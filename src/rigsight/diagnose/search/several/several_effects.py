@@ -65,7 +65,11 @@ def several_effects(
         at_floor = VERDICT.exact
     worthwhile = reidentified.error_over_noise / VERDICT.worthwhile
     together = Together(context, reidentified, effects, prepare)
-    pairs = grown(context, singles, effects, at_floor, worthwhile, forms, together, prepare)
+
+    def is_enough(pair: Scored) -> bool:
+        return lower_bound or checks.is_adequate(pair)
+
+    pairs = grown(context, singles, effects, at_floor, worthwhile, forms, together, is_enough, prepare)
     pairs = in_lowest_basins(context, pairs)
     pairs = with_joint_starts(context, reidentified, pairs, singles, effects, checks.is_adequate, prepare)
     return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]

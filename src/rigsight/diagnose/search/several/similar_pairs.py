@@ -41,7 +41,8 @@ def with_similar(search: PairSearch, pairs: Sequence[Scored], tried: Sequence[Sc
         if kept.effects[0] in best.effects:
             (name,) = set(best.names) - set(kept.names)
             instead = [e for e in search.effects if alone[e.name] <= VERDICT.comparable * alone[name]]
-            found += search.beside(kept, search.forms.partners(kept, instead), found)
+            # Not only the partners that other forms of the kept effect leave: the pair has shown that a second effect is needed.
+            found += search.beside(kept, instead, found)
     return found
 
 

@@ -48,11 +48,7 @@ def with_a_third(
     """
     best = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
     alone = min((model.error_over_noise for model in singles), default=np.inf)
-    if (
-        best is None
-        or best.error_over_noise <= VERDICT.at_floor
-        or not best.error_over_noise * VERDICT.worthwhile < alone
-    ):
+    if best is None or not best.error_over_noise * VERDICT.worthwhile < alone:
         return []
     least = max(VERDICT.larger_part, forms.share(best))
     return with_one_more(context, best, effects, [], singles, prepare, least_share=least)
