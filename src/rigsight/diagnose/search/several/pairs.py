@@ -80,6 +80,8 @@ def grown(
     triples = _best_converged(context, together.fitted(3)) if _lowest(pairs) > at_floor else []
     if not _lowest(triples) <= VERDICT.exact < _lowest(pairs):
         pairs = _added_one_by_one(search, worthwhile, pairs)
+    if _lowest(pairs) <= allowed:
+        pairs = with_similar(context, pairs, usable, effects, prepare)
     pairs = _alike_finished(context, each_once(pairs))
     best = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
     if best is not None and VERDICT.exact < best.error_over_noise <= at_floor and not is_enough(best):
@@ -98,8 +100,7 @@ def grown(
 def _added_one_by_one(search: PairSearch, worthwhile: float, known: Sequence[Scored]) -> list[Scored]:
     """Return the known pairs with those that extend a single effect, and with other forms of their effects."""
     explaining = [model for model in search.usable if model.error_over_noise <= worthwhile] or search.usable
-    tried, pairs = _beside_singles(search, explaining, known)
-    return with_other_forms(search, with_similar(search, pairs, tried))
+    return with_other_forms(search, _beside_singles(search, explaining, known))
 
 
 def _alike_finished(context: FitContext, pairs: Sequence[Scored]) -> list[Scored]:
@@ -130,8 +131,8 @@ def _competing_triples(
 
 def _beside_singles(
     search: PairSearch, explaining: Sequence[Scored], known: Sequence[Scored]
-) -> tuple[list[Scored], list[Scored]]:
-    """Return the single effects that were extended, and the known pairs with those that extend them: until one explains all.
+) -> list[Scored]:
+    """Return the known pairs with those that extend single effects: until one explains all.
 
     Beside an effect that explains nothing a second one does what it does alone, so those that explain something are extended.
     """
@@ -163,7 +164,7 @@ def _beside_singles(
             widely = np.inf if tried else search.at_floor
             tried.append(parent)
             found += search.beside(parent, partners, [*settled, *found], widely)
-    return tried, each_once([*known, *found])
+    return each_once([*known, *found])
 
 
 def _best_converged(context: FitContext, models: Sequence[Scored]) -> list[Scored]:

@@ -11,8 +11,11 @@ from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.joint_starts import with_joint_starts
-from rigsight.diagnose.search.several.pairs import grown
+from rigsight.diagnose.search.several.one_more_effect import is_among
+from rigsight.diagnose.search.several.pairs import each_once, grown, larger_first
+from rigsight.diagnose.search.several.similar_pairs import with_similar
 from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search.single_effects import refine
 from rigsight.effects import Effect
 
 
@@ -70,6 +73,9 @@ def several_effects(
         return lower_bound or checks.is_adequate(pair)
 
     pairs = grown(context, singles, effects, at_floor, worthwhile, forms, together, is_enough, prepare)
-    pairs = in_lowest_basins(context, pairs)
-    pairs = with_joint_starts(context, reidentified, pairs, singles, effects, checks.is_adequate, prepare)
+    known = in_lowest_basins(context, pairs)
+    pairs = with_joint_starts(context, reidentified, known, singles, effects, checks.is_adequate, prepare)
+    if pairs and not is_among(known, set(pairs[0].names)):
+        similar = with_similar(context, pairs, singles, effects, prepare)
+        pairs = larger_first(refine(context, each_once(similar)), singles)
     return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]

@@ -3,47 +3,65 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-import numpy as np
-
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.first_look import look_at, widened
-from rigsight.diagnose.search.several.one_more_effect import is_among
+from rigsight.diagnose.search.first_look import LOOK_ACCURACY, look_at, widened
+from rigsight.diagnose.search.several.one_more_effect import is_among, with_one_more
 from rigsight.diagnose.search.several.pair_search import PairSearch
 from rigsight.diagnose.search.single_effects import followed
 from rigsight.effects import Effect
+from rigsight.simulate import carried_over
 
 
-def with_similar(search: PairSearch, pairs: Sequence[Scored], tried: Sequence[Scored]) -> list[Scored]:
-    """Return the pairs with those in which an effect that alone explains as much stands for one of the best pair.
+def with_similar(
+    context: FitContext,
+    pairs: Sequence[Scored],
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    prepare: Prepare | None,
+) -> list[Scored]:
+    """Return the pairs with those in which an effect that explains as much stands for one of the best pair.
 
-    One of the two may be right and the other only similar to the right one.
+    One of the two may be right and the other only similar to the right one, or records cannot distinguish them. What each of the
+    two explains is the residual of the pair's other parameters without it.
 
     Parameters
     ----------
-    search
-        Records, candidates and limits.
+    context
+        Records, scales and noise.
     pairs
-        Fitted and scored.
-    tried
-        Single effects beside which all candidates have been tried.
+        At least one, fitted and scored.
+    singles
+        Every effect alone, fitted and scored.
+    effects
+        Candidates.
+    prepare
+        Called with the structures that are about to be looked at, to compile them side by side.
     """
     found = list(pairs)
-    best = _best(pairs)
-    if best is None or best.error_over_noise > search.allowed:
-        return found
-    # An effect that was left out of the singles because another is equivalent may still be part of a pair.
-    alone = {effect.name: np.inf for effect in search.effects} | {
-        model.names[0]: model.error_over_noise for model in search.singles
-    }
-    for kept in (model for model in search.usable if model not in tried):
-        if kept.effects[0] in best.effects:
-            (name,) = set(best.names) - set(kept.names)
-            instead = [e for e in search.effects if alone[e.name] <= VERDICT.comparable * alone[name]]
-            # Not only the partners that other forms of the kept effect leave: the pair has shown that a second effect is needed.
-            found += search.beside(kept, instead, found)
+    replaced: Scored | None = None
+    for _ in range(SEARCH.most_swaps):
+        best = min(found, key=lambda pair: pair.error_over_noise)
+        if best is replaced:
+            break
+        replaced = best
+        for kept in best.effects:
+            parent = _without_the_other(context, best, kept)
+            found += with_one_more(context, parent, effects, found, singles, prepare)
     return found
+
+
+def _without_the_other(context: FitContext, pair: Scored, kept: Effect) -> Scored:
+    """Return the model of one effect of a pair with the values that it has there, and with initial states of its own."""
+    structure = context.simplest((kept,), pair.fit.structure)
+    values = {**carried_over(pair.fit.values, pair.fit.structure, structure), **dict(structure.fixed)}
+    fit = context.problem(structure, context.estimation, LOOK_ACCURACY).fit(values, [])
+    free = tuple(context.free_parameters(structure))
+    errors = {name: pair.fit.standard_errors.get(name, 0.0) for name in free}
+    return context.score((kept,), replace(fit, free=free, standard_errors=errors), roughly=True)
 
 
 def with_other_forms(search: PairSearch, pairs: Sequence[Scored]) -> list[Scored]:
