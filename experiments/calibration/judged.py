@@ -46,10 +46,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("bench", type=Path, nargs="*")
-    parser.add_argument("--state", help="commit of the code that ran them")
+    parser.add_argument("--state", help="commit of the code that ran the trials")
     given = parser.parse_args()
     if not given.bench:
-        print(tables([scored(line, trained()) for line in read_lines()]))
+        lines = read_lines()
+        if not lines:
+            sys.exit(f"There are no trials yet in {FILE}: name the benches to add.")
+        print(tables([scored(line, trained()) for line in lines]))
         return
     if not given.state:
         parser.error("name the commit of the code that ran these trials: --state 40f2704")

@@ -66,21 +66,24 @@ def test_a_table_reads_back_as_it_was_written(study: ModuleType, tmp_path: Path)
     assert study.read_table(tmp_path / "again.csv") == trials
 
 
-def test_trials_that_judge_are_of_no_seed_that_trains_and_score_with_any_calibration(
-    study: ModuleType,
-) -> None:
+def test_trials_that_judge_are_of_no_seed_that_trains(study: ModuleType) -> None:
     import judged
 
-    lines = judged.read_lines()
-    assert lines
     training = {trial.seed for trial in study.read_table()}
-    assert not {line["key"]["seed"] for line in lines} & training
+    assert not {line["key"]["seed"] for line in judged.read_lines()} & training
+
+
+def test_a_trial_scores_with_any_calibration(study: ModuleType, tmp_path: Path) -> None:
+    import judged
+
+    (line,) = judged.with_benches([], [bench_of(tmp_path, diagnosed({FRICTION: 0.9, PLAY: 0.1}))], "abc")
     doubting = replace(trained(), listed={**trained().listed, "intercept": -30.0})
-    for line in lines:
-        sure, unsure = (judged.scored(line, calibration) for calibration in (trained(), doubting))
-        assert sure.right == unsure.right
-        assert unsure.stated == pytest.approx(1.0 if sure.verdict == "unknown" else 0.0, abs=1e-6)
-    assert judged.tables([judged.scored(line, trained()) for line in lines]).count("\n") > 10
+    sure, unsure = (judged.scored(line, calibration) for calibration in (trained(), doubting))
+    assert sure.right
+    assert unsure.right
+    assert sure.stated > 0.5
+    assert unsure.stated == pytest.approx(0.0, abs=1e-6)
+    assert judged.tables([sure, unsure]).count("\n") > 10
 
 
 def diagnosed(shares: dict[str, float]) -> dict[str, Any]:
