@@ -174,7 +174,7 @@ def test_a_pair_near_the_floor_is_extended_if_it_leaves_more_than_noise(
     monkeypatch.setattr(pairs_module, "refine", lambda _, pairs: pairs)
     monkeypatch.setattr(pairs_module, "finished", lambda _, pair: pair)
     monkeypatch.setattr(pairs_module, "_added_one_by_one", lambda _search, _worthwhile, pairs: pairs)
-    monkeypatch.setattr(pairs_module, "with_similar", lambda _, pairs: pairs)
+    monkeypatch.setattr(pairs_module, "with_similar", lambda _, pairs, *rest: pairs)
     monkeypatch.setattr(pairs_module, "without_repeated_equations", lambda _, models: models)
     together = SimpleNamespace(fitted=lambda size: [pair] if size == 2 else [])
     effects = [effect_named(name) for name in two]
