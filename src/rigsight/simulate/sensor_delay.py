@@ -59,6 +59,8 @@ def _shifted(
 
 
 def _delayed(value: NDArray[np.float64], rise: NDArray[np.float64], delay: float) -> NDArray[np.float64]:
+    if not np.isfinite(delay):
+        return np.full_like(value, np.nan)
     n_samples = value.size
     whole = int(np.clip(np.ceil(delay), -n_samples, n_samples))
     # A delay is the same fraction of every interval, so the Hermite polynomials are four numbers.

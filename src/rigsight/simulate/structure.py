@@ -348,7 +348,7 @@ def special_values(
 ) -> dict[str, float]:
     """Return the special values of effects, which shorten the equations, by their names in a structure with other effects.
 
-    Those are left out that have other values in another structure with the same effect.
+    Left out are those that are free in another structure with the same effect.
     """
     effects = tuple(effects)
     names = unique_names(rig, (*effects, *beside))

@@ -118,18 +118,9 @@ def reliability_slope(stated: NDArray[np.float64], true: NDArray[np.bool_]) -> t
 
 
 def reliability_offset(stated: NDArray[np.float64], true: NDArray[np.bool_]) -> tuple[float, float] | None:
-    """Return what must be added to the stated log odds so that as many came true as stated, and its standard error.
+    """Return what must be added to the stated log odds so that as many come true as stated, and its standard error.
 
-    Parameters
-    ----------
-    stated
-        Probabilities, shape (n,).
-    true
-        Whether each came true, shape (n,).
-
-    Returns
-    -------
-    None if all were right, or all wrong.
+    Arguments are those of `reliability_slope`. None if all came true, or none did.
     """
     if true.all() or not true.any():
         return None

@@ -204,7 +204,7 @@ class SearchNumbers:
     most_swaps: int = number(
         2,
         "budget",
-        "Number of times that an effect of the best pair is replaced by a more general one: once for each of the two.",
+        "Number of times that an effect of the best pair is replaced by a more general or similar one: once for each of the two.",
     )
     finest_steps: int = number(
         4,

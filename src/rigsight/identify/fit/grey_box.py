@@ -190,7 +190,11 @@ class GreyBoxFit:
                     return settled, True, "Steps from coarse finite differences have become zero."
             return theta, bool(solution.status > 0), str(solution.message)
 
-        settings = (max_evaluations, tolerance, list(map(int, problem.substeps)))
+        settings = (
+            max_evaluations,
+            tolerance,
+            [*map(int, problem.substeps), finish, substeps is None],
+        )
         outcome = self._recalled(self._key(coordinates, start, theta, settings), problem, search)
         return self._result(problem, *outcome, finish)
 

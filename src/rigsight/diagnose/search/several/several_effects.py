@@ -76,6 +76,7 @@ def several_effects(
     known = in_lowest_basins(context, pairs)
     pairs = with_joint_starts(context, reidentified, known, singles, effects, checks.is_adequate, prepare)
     if pairs and not is_among(known, set(pairs[0].names)):
-        similar = with_similar(context, pairs, singles, effects, prepare)
-        pairs = larger_first(refine(context, each_once(similar)), singles)
+        of_two = [model for model in pairs if len(model.effects) == 2]
+        similar = with_similar(context, of_two, singles, effects, prepare)
+        pairs = larger_first(refine(context, each_once([*pairs, *similar])), singles)
     return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]
