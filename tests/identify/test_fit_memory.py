@@ -9,7 +9,7 @@ import numpy as np
 
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
-from rigsight.rigs import rig_file_text
+from rigsight.rigs import AXIS, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
@@ -43,4 +43,16 @@ def test_a_rig_file_with_other_bounds_is_another_problem() -> None:
             structure, [record], characteristic_scales(rig, [record], values), {"x": 1e-5}, memory=memory
         )
         fit.fit({**values, "m": 2.2}, ["m"])
+        assert memory.recalled == recalled
+
+
+def test_a_rough_fit_does_not_serve_for_one_that_is_finished() -> None:
+    values = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+    push = Record("push", 0.01, {"u": np.sin(np.linspace(0.0, 60.0, 300) ** 1.3)}, {})
+    record = simulate(compose(AXIS), values, push)
+    memory = Kept()
+    scales = characteristic_scales(AXIS, [record], values)
+    fit = GreyBoxFit(compose(AXIS), [record], scales, {"x": 1e-5}, memory=memory)
+    for finish, recalled in ((False, 0), (True, 0), (False, 1), (True, 2)):
+        fit.fit({**values, "m": 2.2}, ["m"], finish=finish)
         assert memory.recalled == recalled
