@@ -19,7 +19,7 @@ from typing import Any, get_type_hints
 from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.errors import InputError, MachineError
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 _PATIENCE = 60.0
 """Time [s] to wait for another process that writes."""
 _OF_THE_DISK = ("SQLITE_FULL", "SQLITE_IOERR", "SQLITE_READONLY")
