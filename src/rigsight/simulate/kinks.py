@@ -154,12 +154,13 @@ def freeze(structure: Structure) -> FrozenStructure:
             if power.base == sp.Abs(argument) and not power.exp.is_Integer
         }
         signed = -mode if flipped else mode
-        replacement = {
-            **powers,
-            sp.Abs(argument): mode * switch,
-            sp.sign(argument): signed,
-            positive_part(argument): sp.Mul(argument, 1 + signed, sp.Rational(1, 2)),
+        smooth = {
+            sp.Abs: mode * switch,
+            sp.sign: signed,
+            positive_part: sp.Mul(argument, 1 + signed, sp.Rational(1, 2)),
         }
+        # The kink itself is named too: sympy may write the function of the same argument anew in another form.
+        replacement = {**powers, **{kind(argument): by for kind, by in smooth.items()}, kink: smooth[kink.func]}
         replacements.append(replacement)
         expressions = [expression.xreplace(replacement) for expression in expressions]
     n_states, n_rates = len(structure.states), len(structure.states) + len(structure.computed_outputs)
