@@ -160,7 +160,11 @@ def freeze(structure: Structure) -> FrozenStructure:
             positive_part: sp.Mul(argument, 1 + signed, sp.Rational(1, 2)),
         }
         # The kink itself is named too: sympy may write the function of the same argument anew in another form.
-        replacement = {**powers, **{kind(argument): by for kind, by in smooth.items()}, kink: smooth[kink.func]}
+        replacement = {
+            **powers,
+            **{kind(argument): by for kind, by in smooth.items()},
+            kink: smooth[kink.func],
+        }
         replacements.append(replacement)
         expressions = [expression.xreplace(replacement) for expression in expressions]
     n_states, n_rates = len(structure.states), len(structure.states) + len(structure.computed_outputs)
