@@ -12,7 +12,6 @@ residuals. M. A. Branch, T. F. Coleman and Y. Li, SIAM J. Sci. Comput. 21 (1999)
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.fit.search import FINE_TOLERANCE, off_kinks, searched
-from rigsight.identify.fit.settled_states import guessed_states
+from rigsight.identify.fit.search_start import SearchStart
 from rigsight.identify.fit.variable_projection import VariableProjection
 from rigsight.records.record import Record
 from rigsight.simulate import (
@@ -44,25 +43,8 @@ _MOST_ROUNDS = 4
 """Largest number of successive searches with finer steps."""
 _WORTH_A_ROUND = 1e-3
 """Share of the cost by which a round must have lowered it for another round."""
-_STATE_RANGE = 20.0
-"""Largest distance of an initial state from its first estimate, in units of its size."""
 _Outcome = tuple[NDArray[np.float64], bool, str]
 """Coordinates and initial states at the end of a search, whether it converged, and the optimizer's message."""
-
-
-@dataclass(frozen=True)
-class _Begin:
-    """Start of a search: parameters and initial states together, and the states with their bounds per record."""
-
-    coordinates: Coordinates
-    theta: NDArray[np.float64]
-    places: list[NDArray[np.float64]]
-    lower: list[NDArray[np.float64]]
-    upper: list[NDArray[np.float64]]
-
-    @property
-    def n_states(self) -> int:
-        return self.lower[0].size
 
 
 class GreyBoxFit:
@@ -163,7 +145,7 @@ class GreyBoxFit:
         The result; ``success`` is False, with the reason as ``message``, if the start cannot be simulated or the optimizer ran
         out of evaluations.
         """
-        begin = self._begin(start, free, initial_states)
+        begin = SearchStart.of(self.data, self.scales, start, free, initial_states)
         coordinates, theta = begin.coordinates, begin.theta
         lower = np.concatenate([coordinates.lower, *begin.lower])
         upper = np.concatenate([coordinates.upper, *begin.upper])
@@ -190,11 +172,7 @@ class GreyBoxFit:
                     return settled, True, "Steps from coarse finite differences have become zero."
             return theta, bool(solution.status > 0), str(solution.message)
 
-        settings = (
-            max_evaluations,
-            tolerance,
-            [*map(int, problem.substeps), finish, substeps is None],
-        )
+        settings = [max_evaluations, tolerance, *map(int, problem.substeps), finish, substeps is None]
         outcome = self._recalled(self._key(coordinates, start, theta, settings), problem, search)
         return self._result(problem, *outcome, finish)
 
@@ -225,7 +203,7 @@ class GreyBoxFit:
         -------
         As for `fit`.
         """
-        begin = self._begin(start, free, None)
+        begin = SearchStart.of(self.data, self.scales, start, free)
         coordinates, n_free = begin.coordinates, len(free)
         problem = VariableProjection(self.data, coordinates, begin.places, begin.lower, begin.upper)
         problem.choose_substeps(begin.theta)
@@ -243,7 +221,7 @@ class GreyBoxFit:
                     break
             return np.concatenate([own, *problem.places]), success, message
 
-        settings = (max_evaluations, tolerance, [*map(int, problem.substeps), most_rounds])
+        settings = [max_evaluations, tolerance, *map(int, problem.substeps), most_rounds]
         outcome = self._recalled(self._key(coordinates, start, begin.theta, settings), problem, search)
         together = Problem(self.data, coordinates, begin.n_states, problem.upper)
         together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
@@ -264,7 +242,7 @@ class GreyBoxFit:
         -------
         Shape (n_free, n_free).
         """
-        begin, n = self._begin(start, free, None), len(free)
+        begin, n = SearchStart.of(self.data, self.scales, start, free), len(free)
         problem = Problem(self.data, begin.coordinates, begin.n_states, np.full(begin.theta.size, np.inf))
         problem.choose_substeps(begin.theta)
         normal = problem.at(begin.theta).normal
@@ -294,32 +272,12 @@ class GreyBoxFit:
             self.memory.remember(key, {**outcome, **steps})
         return theta, success, message
 
-    def _begin(
-        self,
-        start: Mapping[str, float],
-        free: Sequence[str],
-        initial_states: Sequence[NDArray[np.float64]] | None,
-    ) -> _Begin:
-        coordinates = Coordinates.of(self.data.structure, free, start, self.scales)
-        states = list(initial_states) if initial_states is not None else guessed_states(self.data, start)
-        own = coordinates.from_values(start)
-        sizes = self.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
-        limited = self.data.limited
-        places = [np.where(limited, np.clip(s / sizes, -1.0, 1.0), s / sizes) for s in states]
-        return _Begin(
-            coordinates=coordinates,
-            theta=np.concatenate([own, *places]),
-            places=places,
-            lower=[np.where(limited, -1.0, place - _STATE_RANGE) for place in places],
-            upper=[np.where(limited, 1.0, place + _STATE_RANGE) for place in places],
-        )
-
     def _key(
         self,
         coordinates: Coordinates,
         start: Mapping[str, float],
         theta: NDArray[np.float64],
-        settings: tuple[int, float, list[int]],
+        settings: Sequence[float],
     ) -> str:
         if self.memory is None:
             return ""
