@@ -13,9 +13,9 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 from rigsight.simulate import Structure
+from rigsight.simulate.equations.kinks import freeze
+from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.kinks import freeze
-from rigsight.simulate.structure import TIME, input_symbols
 
 Floats = NDArray[np.float64]
 RTOL = 1e-11

@@ -21,7 +21,7 @@ from rigsight.identify.start.scales import characteristic_scales
 from rigsight.records import Hold, Record
 from rigsight.rigs import RIGS, Rig, read_rig_file
 from rigsight.simulate import Structure, compose, record_input, simulate
-from rigsight.simulate.kinks import freeze
+from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.model import Model
 from rigsight.units import characteristic_value
 

@@ -14,7 +14,7 @@ from rigsight.export.targets import DELAY, FELT_ACCELERATION, SENSOR_DELAY, STIC
 from rigsight.parameters import Parameter
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
-from rigsight.simulate.kinks import freeze
+from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.model import Model
 
 TEXTS = [name for name, target in TARGETS.items() if target.suffix != ".fmu"]

@@ -15,7 +15,7 @@ from rigsight.identify.start.scales import characteristic_scales
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, RUNNING_GEAR, Rig
 from rigsight.simulate import Substeps, carries_tangents, compose, simulate, simulate_outputs
-from rigsight.simulate.kinks import freeze
+from rigsight.simulate.equations.kinks import freeze
 from rigsight.units import characteristic_value
 from rigsight.workflow.own.effect_checks import AXIS_BENCH, GEAR_BENCH
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from rigsight.effects import effect_named, placed
 from rigsight.rigs import ELEMENT, RIGS, read_rig_file
 from rigsight.simulate import Structure, compose
+from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.linearization import Linearization, linearize
-from rigsight.simulate.structure import TIME, input_symbols
 
 OMEGA = np.geomspace(0.1, 300.0, 25)
 

@@ -12,7 +12,7 @@ from rigsight.campaign import Campaign
 from rigsight.errors import InputError
 from rigsight.rigs import RIGS, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
-from rigsight.simulate.composition import compose
+from rigsight.simulate.equations.composition import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.in_memory import make_campaign, make_model
 from rigsight.workflow.campaign.model_file import model_of, read_model

@@ -14,7 +14,7 @@ import sympy as sp
 
 from rigsight.effects.symbols import positive_part
 from rigsight.simulate import Structure
-from rigsight.simulate.structure import INPUT, TIME
+from rigsight.simulate.equations.structure import INPUT, TIME
 
 _KINKS = (sp.Abs, sp.sign, positive_part)
 _TORQUE = sp.Symbol("disturbing_torque", real=True)

@@ -13,11 +13,11 @@ from rigsight.export.equilibrium import Balance
 from rigsight.simulate.compiled.c_functions import FUNCTIONS
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.kernel_source import accurate_integrator
+from rigsight.simulate.equations.structure import input_symbols
 from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.c import C
 from rigsight.simulate.rest import INTERVALS, RAMP_PERIODS, SETTLED, TOLERANCE, WAITS
 from rigsight.simulate.simulation import DEFAULT_ACCURACY, LOCAL_PER_GLOBAL
-from rigsight.simulate.structure import input_symbols
 
 HISTORY = 4096
 """Samples that a delay may last; more cost memory in every instance."""

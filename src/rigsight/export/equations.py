@@ -14,12 +14,12 @@ from rigsight.export.equilibrium import Balance, balance
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector
-from rigsight.simulate.binder import state_symbol
-from rigsight.simulate.composition import without_vanished_effects
+from rigsight.simulate.equations.binder import state_symbol
+from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate.equations.kinks import FrozenStructure, freeze
+from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.model import Model
-from rigsight.simulate.structure import TIME, Structure, input_symbols
 from rigsight.units import unit_text
 
 

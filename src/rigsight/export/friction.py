@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from rigsight.export.equations import Exported
-from rigsight.simulate.structure import TIME, input_symbols
+from rigsight.simulate.equations.structure import TIME, input_symbols
 
 
 def friction_mode(exported: Exported) -> int | None:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from rigsight.export.at_rest import no_input
 from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, rest_state
-from rigsight.simulate.composition import without_vanished_effects
-from rigsight.simulate.kinks import FrozenStructure, freeze
+from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate.equations.kinks import FrozenStructure, freeze
+from rigsight.simulate.equations.straight_line import straight_line
+from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.model import Model
-from rigsight.simulate.straight_line import straight_line
-from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 OSCILLATION = 0.03
 """Step times the angular frequency of the fastest oscillation: Runge-Kutta then errs by less than 1e-6 over its decay."""

@@ -14,9 +14,9 @@ from rigsight.export.friction import friction_mode, friction_sign, held_velocity
 from rigsight.export.precomputed import equations_of
 from rigsight.export.python_function import min_steps
 from rigsight.export.reserved_words import words
+from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.matlab import MATLAB
-from rigsight.simulate.structure import TIME, input_symbols
 
 WORDS = words(
     """break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd

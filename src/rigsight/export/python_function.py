@@ -14,9 +14,9 @@ from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.internal_step import is_linear
 from rigsight.export.precomputed import equations_of
+from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.python import PYTHON
-from rigsight.simulate.structure import TIME, input_symbols
 
 WORDS = frozenset(keyword.kwlist)
 """Of the language."""

@@ -25,10 +25,10 @@ from rigsight.export.python_function import WORDS as PYTHON
 from rigsight.export.python_function import python_function
 from rigsight.export.reserved_words import SHARED
 from rigsight.simulate import Structure, compose
+from rigsight.simulate.equations.kinks import freeze
+from rigsight.simulate.equations.structure import input_symbols
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.kinks import freeze
 from rigsight.simulate.model import Model
-from rigsight.simulate.structure import input_symbols
 
 _FMUS: dict[str, Version] = {"fmu": 2, "fmu3": 3}
 STICKING = "the sticking of dry friction"

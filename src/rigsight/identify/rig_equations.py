@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from rigsight.records.record import Record
 from rigsight.rigs import Joint, Rig, applied_symbol
 from rigsight.simulate import compose, parameter_vector, record_input, record_values
-from rigsight.simulate.chain_rule import slopes_of
-from rigsight.simulate.equation_tree import Output
+from rigsight.simulate.equations.chain_rule import slopes_of
+from rigsight.simulate.equations.signal_path import bound_to
+from rigsight.simulate.equations.straight_line import StraightLine, of_parts, straight_line
+from rigsight.simulate.equations.structure import TIME, input_symbols
+from rigsight.simulate.equations.tree import Output
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.signal_path import bound_to
-from rigsight.simulate.straight_line import StraightLine, of_parts, straight_line
-from rigsight.simulate.structure import TIME, input_symbols
 
 Floats = NDArray[np.float64]
 

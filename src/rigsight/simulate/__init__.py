@@ -2,9 +2,13 @@
 
 from rigsight.libraries import cache_folder as cache_folder
 from rigsight.simulate.compiled.kernel import FittedRecord as FittedRecord
-from rigsight.simulate.composition import compose as compose
-from rigsight.simulate.composition import structure_named as structure_named
-from rigsight.simulate.composition import structure_of_fit as structure_of_fit
+from rigsight.simulate.equations.composition import compose as compose
+from rigsight.simulate.equations.composition import structure_named as structure_named
+from rigsight.simulate.equations.composition import structure_of_fit as structure_of_fit
+from rigsight.simulate.equations.structure import Structure as Structure
+from rigsight.simulate.equations.structure import carried_over as carried_over
+from rigsight.simulate.equations.structure import special_values as special_values
+from rigsight.simulate.equations.structure import unique_names as unique_names
 from rigsight.simulate.rest import rest_state as rest_state
 from rigsight.simulate.side_by_side import carries_tangents as carries_tangents
 from rigsight.simulate.side_by_side import choose_substeps as choose_substeps
@@ -19,10 +23,6 @@ from rigsight.simulate.simulation import record_values as record_values
 from rigsight.simulate.simulation import simulate as simulate
 from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
 from rigsight.simulate.state_limits import state_limits as state_limits
-from rigsight.simulate.structure import Structure as Structure
-from rigsight.simulate.structure import carried_over as carried_over
-from rigsight.simulate.structure import special_values as special_values
-from rigsight.simulate.structure import unique_names as unique_names
 from rigsight.simulate.substeps import Substeps as Substeps
 
 __all__ = [

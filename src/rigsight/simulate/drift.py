@@ -10,7 +10,7 @@ from scipy.linalg import null_space
 
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
-from rigsight.simulate.structure import TIME, input_symbols
+from rigsight.simulate.equations.structure import TIME, input_symbols
 
 _DRAWS = 3
 _SINGULAR = 1e-9

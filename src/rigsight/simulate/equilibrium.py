@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.effects.symbols import v
-from rigsight.simulate.kinks import FrozenStructure, freeze, is_zero
+from rigsight.simulate.equations.kinks import FrozenStructure, freeze, is_zero
+from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.printing.c import limited
-from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 Floats = NDArray[np.float64]
 

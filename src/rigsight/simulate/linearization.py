@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvals
 
 from rigsight.errors import SimulationError
-from rigsight.simulate.equation_slopes import declared_start, slope_functions
+from rigsight.simulate.equations.derivatives import declared_start, slope_functions
+from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.simulation import parameter_vector
-from rigsight.simulate.structure import Structure
 
 Floats = NDArray[np.float64]
 Stability = Literal["stable", "drifts", "unstable"]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigsight.effects import Effect
-from rigsight.simulate.composition import compose
+from rigsight.simulate.equations.composition import compose
+from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.structure import Structure
 
 SCHEMA_VERSION = 1
 

@@ -14,8 +14,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.simulate.equations.structure import Structure, ahead_name
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.structure import Structure, ahead_name
 
 Floats = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rigsight.effects import Place
 from rigsight.simulate.compiled.kernel_cache import kernel_of
+from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.equilibrium import equilibrium
 from rigsight.simulate.input_hold import HeldInput, hold_input
-from rigsight.simulate.structure import Structure
 
 RAMP_PERIODS = 20.0
 """Length of the slow rise of the input in periods of the linear rig."""

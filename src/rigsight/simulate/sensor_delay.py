@@ -9,8 +9,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.structure import Structure
 
 
 def as_measured(

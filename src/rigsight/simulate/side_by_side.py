@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from rigsight.errors import SimulationError
 from rigsight.simulate.compiled.kernel import FittedRecord
 from rigsight.simulate.compiled.kernel_cache import kernel_of
+from rigsight.simulate.equations.kinks import freeze
+from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.kinks import freeze
 from rigsight.simulate.read_ahead import read_ahead
 from rigsight.simulate.sensor_delay import as_measured
 from rigsight.simulate.simulation import (
@@ -20,7 +21,6 @@ from rigsight.simulate.simulation import (
     simulate_outputs,
     state_vector,
 )
-from rigsight.simulate.structure import Structure
 from rigsight.simulate.substeps import Substeps, relative_needs
 
 _NUDGE = 1e-12

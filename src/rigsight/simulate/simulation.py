@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.records.record import Record
 from rigsight.simulate.compiled.kernel_cache import kernel_of
-from rigsight.simulate.composition import without_vanished_effects
+from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate.equations.structure import Structure, bandwidth_name
 from rigsight.simulate.input_hold import (
     HeldInput,
     hold_accelerated_motion,
@@ -23,7 +24,6 @@ from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motio
 from rigsight.simulate.read_ahead import read_ahead
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
-from rigsight.simulate.structure import Structure, bandwidth_name
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""

@@ -9,7 +9,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.simulate.structure import Structure
+from rigsight.simulate.equations.structure import Structure
 
 
 def state_limits(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:

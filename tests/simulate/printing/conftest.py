@@ -16,9 +16,9 @@ import pytest
 import sympy as sp
 
 from rigsight.simulate import Structure
-from rigsight.simulate.kinks import freeze
+from rigsight.simulate.equations.kinks import freeze
+from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.printing.python import PYTHON
-from rigsight.simulate.structure import TIME, input_symbols
 
 
 @dataclass(frozen=True)

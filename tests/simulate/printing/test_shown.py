@@ -15,11 +15,11 @@ from rigsight.effects import CATALOGUE, Effect, effect_named, placed
 from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.compiled.kernel_cache import kernel_of
-from rigsight.simulate.equation_tree import late
+from rigsight.simulate.equations.structure import TIME, input_symbols
+from rigsight.simulate.equations.tree import late
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.printing.names import declared_name, output_symbol, rate_symbol
 from rigsight.simulate.printing.shown import ShownEquation, shown_equations
-from rigsight.simulate.structure import TIME, input_symbols
 
 _TOGETHER = (
     ("backlash", "bouc_wen_hysteresis"),

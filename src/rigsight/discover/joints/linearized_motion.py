@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from rigsight.records.record import Record
 from rigsight.simulate import Structure, parameter_vector, record_input
-from rigsight.simulate.chain_rule import slopes_of
-from rigsight.simulate.compiled.linear_forms import slope
-from rigsight.simulate.elimination import Elimination
+from rigsight.simulate.equations.chain_rule import slopes_of
+from rigsight.simulate.equations.elimination import Elimination
+from rigsight.simulate.equations.linear_forms import slope
+from rigsight.simulate.equations.straight_line import straight_line
+from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.simulation import record_values
-from rigsight.simulate.straight_line import straight_line
-from rigsight.simulate.structure import TIME, input_symbols
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from rigsight.effects import Effect
 from rigsight.effects.effect import Energy, GainTrend, Place, Signature, State
 from rigsight.rigs import Joint
 from rigsight.simulate import Structure
-from rigsight.simulate.binder import state_symbol
-from rigsight.simulate.structure import input_symbols
+from rigsight.simulate.equations.binder import state_symbol
+from rigsight.simulate.equations.structure import input_symbols
 
 _FORCE = sp.Symbol("missing_force", real=True)
 _RATE = sp.Symbol("missing_force_rate", real=True)

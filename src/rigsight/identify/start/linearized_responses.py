@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rigsight.identify.rig_equations import RigEquations
 from rigsight.records.record import Record
-from rigsight.simulate.structure import input_symbols
+from rigsight.simulate.equations.structure import input_symbols
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

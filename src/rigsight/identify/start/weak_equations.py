@@ -33,7 +33,7 @@ from rigsight.identify.start.measured_states import (
 from rigsight.identify.start.parameter_products import MixedError, parameter_products
 from rigsight.identify.start.projection import Projection, projected
 from rigsight.records.record import Record
-from rigsight.simulate.structure import input_symbols
+from rigsight.simulate.equations.structure import input_symbols
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

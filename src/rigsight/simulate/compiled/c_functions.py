@@ -7,8 +7,8 @@ from importlib.resources import files
 
 import sympy as sp
 
+from rigsight.simulate.equations.straight_line import StraightLine, needed_steps
 from rigsight.simulate.printing.c import C_LANES, C
-from rigsight.simulate.straight_line import StraightLine, needed_steps
 
 _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 

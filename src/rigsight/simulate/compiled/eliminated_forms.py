@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from rigsight.simulate.chain_rule import slopes_of
-from rigsight.simulate.elimination import Elimination
-from rigsight.simulate.straight_line import straight_line
+from rigsight.simulate.equations.chain_rule import slopes_of
+from rigsight.simulate.equations.elimination import Elimination
+from rigsight.simulate.equations.straight_line import straight_line
 
 
 @dataclass(frozen=True)

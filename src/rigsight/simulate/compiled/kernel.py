@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rigsight.errors import MachineError
 from rigsight.simulate.compiled.simulated_bodies import connect
+from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.structure import Structure
 
 Floats = NDArray[np.float64]
 

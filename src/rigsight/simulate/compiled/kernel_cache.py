@@ -9,7 +9,7 @@ from rigsight.libraries import is_kept, library_file
 from rigsight.simulate.compiled.kernel import Kernel
 from rigsight.simulate.compiled.kernel_source import kernel_source
 from rigsight.simulate.compiled.simulated_bodies import include_folders
-from rigsight.simulate.structure import Structure
+from rigsight.simulate.equations.structure import Structure
 
 _kernels: dict[str, Kernel] = {}
 _by_identity: dict[int, tuple[Structure, str]] = {}

@@ -8,10 +8,10 @@ from functools import cached_property
 import sympy as sp
 
 from rigsight.simulate.compiled.c_functions import FUNCTIONS, elements, filled, function_body, real, template
-from rigsight.simulate.expressions import gathered, hoist_constants
-from rigsight.simulate.kinks import FrozenStructure, freeze
+from rigsight.simulate.equations.expressions import gathered, hoist_constants
+from rigsight.simulate.equations.kinks import FrozenStructure, freeze
+from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.printing.c import limited
-from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 
 class KernelEquations:

@@ -22,7 +22,7 @@ from rigsight.simulate.compiled.c_functions import filled, template
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.simulated_bodies import bodies_text, lane_bodies_text
 from rigsight.simulate.compiled.tangent_equations import carries_tangents, tangent_fragments
-from rigsight.simulate.structure import Structure
+from rigsight.simulate.equations.structure import Structure
 
 LANES = 32
 """Parameter sets that advance together: common values are computed once, and their vectors hide each other's latency."""

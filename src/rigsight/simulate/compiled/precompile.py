@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rigsight.simulate.compiled.kernel_cache import compiled as compiled
 from rigsight.simulate.compiled.kernel_cache import kernel_of
-from rigsight.simulate.structure import Structure
+from rigsight.simulate.equations.structure import Structure
 
 
 def compile_kernels(structure: Structure) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 
-from rigsight.simulate.structure import Structure
+from rigsight.simulate.equations.structure import Structure
 from rigsight.simulators.bodies import template
 
 

@@ -10,11 +10,11 @@ from rigsight.effects.symbols import positive_part
 from rigsight.simulate.compiled.c_functions import elements, function_body, lane_body, real, symbols
 from rigsight.simulate.compiled.eliminated_forms import EliminatedForms, eliminated_forms
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
-from rigsight.simulate.compiled.linear_forms import LinearForms, linear_forms, slope
-from rigsight.simulate.kinks import absolute
+from rigsight.simulate.equations.kinks import absolute
+from rigsight.simulate.equations.linear_forms import LinearForms, linear_forms, slope
+from rigsight.simulate.equations.straight_line import needed_steps, of_parts
+from rigsight.simulate.equations.structure import INPUT, INPUT_RATE
 from rigsight.simulate.printing.c import C, limited
-from rigsight.simulate.straight_line import needed_steps, of_parts
-from rigsight.simulate.structure import INPUT, INPUT_RATE
 
 _EARLIER = sp.Symbol("earlier input", real=True)
 

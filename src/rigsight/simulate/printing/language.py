@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from rigsight.simulate.straight_line import StraightLine, needed_steps, straight_line
+from rigsight.simulate.equations.straight_line import StraightLine, needed_steps, straight_line
 
 _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 

@@ -10,8 +10,8 @@ import sympy as sp
 
 from rigsight.effects import kind_of
 from rigsight.rigs import Rig
-from rigsight.simulate.equation_tree import Kind
-from rigsight.simulate.structure import TIME, Structure, input_symbols
+from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
+from rigsight.simulate.equations.tree import Kind
 
 GREEK = frozenset({
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "rho", "sigma",

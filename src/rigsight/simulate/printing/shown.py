@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from rigsight.simulate.equation_tree import late
+from rigsight.simulate.equations.structure import Structure
+from rigsight.simulate.equations.tree import late
 from rigsight.simulate.printing.limits import with_limits
 from rigsight.simulate.printing.names import (
     ShownName,
@@ -19,7 +20,6 @@ from rigsight.simulate.printing.names import (
     shown_names,
     simulated_symbol,
 )
-from rigsight.simulate.structure import Structure
 from rigsight.simulators import place_of, simulated
 
 

@@ -26,10 +26,10 @@ from rigsight.simulate import (
     simulate_sets,
     simulate_tangents,
 )
-from rigsight.simulate.elimination import Elimination
-from rigsight.simulate.kinks import freeze
+from rigsight.simulate.equations.elimination import Elimination
+from rigsight.simulate.equations.kinks import freeze
+from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.linearization import linearize
-from rigsight.simulate.straight_line import straight_line
 
 DT, N = 5e-3, 160
 VALUES: Mapping[str, Mapping[str, float]] = {

@@ -9,8 +9,8 @@ import sympy as sp
 
 from rigsight.effects.symbols import positive_part
 from rigsight.errors import InputError
-from rigsight.simulate.jumps import Jumps
-from rigsight.simulate.structure import Structure
+from rigsight.simulate.equations.jumps import Jumps
+from rigsight.simulate.equations.structure import Structure
 
 _KINKS = (sp.Abs, sp.sign, positive_part)
 MOST_FRICTIONS = 8

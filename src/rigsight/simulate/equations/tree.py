@@ -11,7 +11,7 @@ import sympy as sp
 
 from rigsight.effects.symbols import positive_part
 from rigsight.rigs import has_short_inverse
-from rigsight.simulate.elimination import acceleration_symbols
+from rigsight.simulate.equations.elimination import acceleration_symbols
 
 
 class Kind(StrEnum):

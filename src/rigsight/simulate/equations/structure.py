@@ -11,8 +11,8 @@ import sympy as sp
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig, joint_of
-from rigsight.simulate.elimination import Elimination, steps_to_accelerations
-from rigsight.simulate.equation_tree import EquationTree, late, rate_within
+from rigsight.simulate.equations.elimination import Elimination, steps_to_accelerations
+from rigsight.simulate.equations.tree import EquationTree, late, rate_within
 
 INPUT = sp.Symbol("input value", real=True)
 INPUT_RATE = sp.Symbol("input rate", real=True)

@@ -12,7 +12,7 @@ from rigsight.effects import CATALOGUE, Effect, Place, effect_named, placed
 from rigsight.effects.symbols import positive_part
 from rigsight.rigs import read_rig_file
 from rigsight.simulate import compose
-from rigsight.simulate.kinks import FrozenStructure, absolute, freeze
+from rigsight.simulate.equations.kinks import FrozenStructure, absolute, freeze
 
 DRIVE_TRAIN = read_rig_file(Path(rigs.__file__).parent / "files" / "drive_train.toml")
 BY_LOAD = placed(effect_named("load_dependent_friction"), "shaft")

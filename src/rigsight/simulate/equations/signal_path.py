@@ -13,9 +13,12 @@ import sympy as sp
 from rigsight.effects import Effect, Energy, Place
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
-from rigsight.simulate.binder import Binder
-from rigsight.simulate.defined_signals import DefinedSignals
-from rigsight.simulate.equation_tree import (
+from rigsight.simulate.equations.binder import Binder
+from rigsight.simulate.equations.defined_signals import DefinedSignals
+from rigsight.simulate.equations.lagrange import equations_of_motion
+from rigsight.simulate.equations.observer_acceleration import measured_before, observer_acceleration
+from rigsight.simulate.equations.structure import ahead_name, bandwidth_name, input_symbols
+from rigsight.simulate.equations.tree import (
     EquationsOfMotion,
     EquationTree,
     FirstOrderState,
@@ -24,9 +27,6 @@ from rigsight.simulate.equation_tree import (
     late,
     shifted,
 )
-from rigsight.simulate.equations_of_motion import equations_of_motion
-from rigsight.simulate.observer_acceleration import measured_before, observer_acceleration
-from rigsight.simulate.structure import ahead_name, bandwidth_name, input_symbols
 from rigsight.units import at_place, size_of
 
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from rigsight.simulate.kinks import absolute
+from rigsight.simulate.equations.kinks import absolute
 
 _TINY = sp.Float(1e-300)
 """Added to a magnitude in a divisor or a logarithm: where the magnitude is zero, the finite result is multiplied by zero."""

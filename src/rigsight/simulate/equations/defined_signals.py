@@ -8,8 +8,8 @@ import sympy as sp
 
 from rigsight.effects import Effect, placed_dimension
 from rigsight.rigs import Rig
-from rigsight.simulate.binder import Binder, state_symbol
-from rigsight.simulate.equation_tree import (
+from rigsight.simulate.equations.binder import Binder, state_symbol
+from rigsight.simulate.equations.tree import (
     Definition,
     EquationsOfMotion,
     EquationTree,

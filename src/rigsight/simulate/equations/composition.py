@@ -13,8 +13,8 @@ from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS, Rig, joint_of
-from rigsight.simulate.signal_path import equation_tree
-from rigsight.simulate.structure import Structure, ahead_name, bandwidth_name, unique_names
+from rigsight.simulate.equations.signal_path import equation_tree
+from rigsight.simulate.equations.structure import Structure, ahead_name, bandwidth_name, unique_names
 
 
 def compose(

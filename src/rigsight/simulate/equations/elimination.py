@@ -16,7 +16,7 @@ from itertools import islice
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
-from rigsight.simulate.straight_line import StraightLine, straight_line
+from rigsight.simulate.equations.straight_line import StraightLine, straight_line
 
 _SHORT = 40
 """Length of a force (its numbers, symbols and operations) up to which parts in common with other forces are not searched."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 import sympy as sp
 
 from rigsight.rigs import Rig, applied_symbol
-from rigsight.simulate.equation_tree import EquationsOfMotion
+from rigsight.simulate.equations.tree import EquationsOfMotion
 from rigsight.units import size_of
 
 Bound = Callable[[sp.Expr], sp.Expr]

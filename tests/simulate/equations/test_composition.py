@@ -11,7 +11,7 @@ from rigsight.effects import CATALOGUE, effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR
 from rigsight.simulate import compose, parameter_vector, simulate
-from rigsight.simulate.composition import without_vanished_effects
+from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.units import characteristic_value
 
 TIME = 5e-3 * np.arange(1500)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from rigsight.simulate.elimination import Elimination
-from rigsight.simulate.straight_line import straight_line
+from rigsight.simulate.equations.elimination import Elimination
+from rigsight.simulate.equations.straight_line import straight_line
 
 _DIGITS = 40
 """Digits of the numbers; a result below 1e-25 is then rounding error."""

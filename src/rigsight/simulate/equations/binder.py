@@ -9,7 +9,7 @@ import sympy as sp
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Rig, acceleration
-from rigsight.simulate.structure import TIME, input_symbols
+from rigsight.simulate.equations.structure import TIME, input_symbols
 
 
 class Binder:

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from rigsight.simulate.compiled.linear_forms import slope
-from rigsight.simulate.straight_line import StraightLine, in_order, of_parts
+from rigsight.simulate.equations.linear_forms import slope
+from rigsight.simulate.equations.straight_line import StraightLine, in_order, of_parts
 
 
 def slopes_of(line: StraightLine, by: Sequence[sp.Symbol]) -> StraightLine:

@@ -14,10 +14,10 @@ from scipy.optimize import least_squares
 
 from rigsight.effects.symbols import positive_part
 from rigsight.rigs import evaluated
-from rigsight.simulate.chain_rule import slopes_of
-from rigsight.simulate.elimination import Elimination
-from rigsight.simulate.straight_line import straight_line
-from rigsight.simulate.structure import TIME, Structure, input_symbols
+from rigsight.simulate.equations.chain_rule import slopes_of
+from rigsight.simulate.equations.elimination import Elimination
+from rigsight.simulate.equations.straight_line import straight_line
+from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ import sympy as sp
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.rigs import AXIS, ELEMENT, RIGS
 from rigsight.simulate import compose
-from rigsight.simulate.equation_tree import (
+from rigsight.simulate.equations.structure import INPUT
+from rigsight.simulate.equations.tree import (
     Definition,
     EquationsOfMotion,
     EquationTree,
@@ -18,7 +19,6 @@ from rigsight.simulate.equation_tree import (
     late,
     rate_within,
 )
-from rigsight.simulate.structure import INPUT
 
 ONE_MOTION = [name for name, rig in RIGS.items() if rig.has_one_motion]
 
