@@ -23,6 +23,7 @@ import numpy as np
 from rigsight.blind.scoring.goals import is_clear
 from rigsight.blind.scoring.probability_scores import ALL, probability_scores, scores_of
 from rigsight.blind.scoring.score import FAILED, Outcome, outcome
+from rigsight.blind.scoring.shares import share_of as share_of_trials
 from rigsight.blind.scoring.training_trial import first_model, share_of, training_trial
 from rigsight.diagnose import Calibration
 from rigsight.diagnose.verdict.calibration import trained
@@ -185,23 +186,17 @@ def tables(outcomes: Sequence[Outcome]) -> str:
     rows += [_row(name, scores) for name, scores in strata.items()]
     rows += [
         "",
-        "| trials | right | failed | of | share | seconds, median |",
+        "| trials | right | failed | of | share, 95 % interval | seconds, median |",
         "|---|---:|---:|---:|---:|---:|",
     ]
     for name, of_group in _groups(outcomes).items():
-        right, failed = (sum(told(o) for o in of_group) for told in (_is_right, _has_failed))
+        right = share_of_trials(of_group, lambda o: o.right)
+        failed = sum(o.verdict == FAILED for o in of_group)
+        low, high = right["interval"]
+        share = f"{right['share']:.0%}, {low:.0%} to {high:.0%}"
         median = float(np.median([o.seconds for o in of_group]))
-        share = right / len(of_group)
-        rows.append(f"| {name} | {right} | {failed} | {len(of_group)} | {share:.0%} | {median:.0f} |")
+        rows.append(f"| {name} | {right['count']} | {failed} | {right['total']} | {share} | {median:.0f} |")
     return "\n".join(rows)
-
-
-def _is_right(found: Outcome) -> bool:
-    return found.right
-
-
-def _has_failed(found: Outcome) -> bool:
-    return found.verdict == FAILED
 
 
 def _row(name: str, scores: Line) -> str:
@@ -231,6 +226,7 @@ def _groups(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
         size = "" if one.kind in ("none", "parameters") else (", clear" if is_clear(one) else ", faint")
         found.setdefault(f"{one.kind}{size}", []).append(one)
         found.setdefault(f"design {one.design}", []).append(one)
+        found.setdefault(f"rig {one.rig}", []).append(one)
     return dict(sorted(found.items(), key=lambda named: (named[0] != ALL, named[0])))
 
 
