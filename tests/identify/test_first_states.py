@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rigsight.effects import effect_named
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.fit.first_states import rig_state
 from rigsight.identify.rig_equations import equations_of
 from rigsight.records import Record
+from rigsight.rigs import AXIS
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
@@ -70,6 +72,22 @@ def test_without_a_sensor_of_the_current_it_goes_by_the_parameters(run: Record) 
     record = Record("run", run.dt, {"u": run["u"], "angle": run["angle"]}, {})
     assert not equations.shows_all_states(set(record.signals))
     assert rig_state(equations, record, VALUES)[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_rig_at_rest_in_dry_friction_is_fitted_from_a_moving_estimate() -> None:
+    t, noise = 2e-3 * np.arange(4000), 5e-4
+    force = np.interp(t, [0.0, 0.4, 1.5, 3.2, 4.5, 6.2, 7.3], [0.0, 0.0, 0.1, 0.1, -0.1, -0.1, 0.0])
+    structure = compose(AXIS, (effect_named("coulomb_friction"),))
+    truth = {"gain": 1.0, "m": 0.14, "d": 0.06, "k": 4.6, "x_off": 0.0, "force_off": 0.0, "T_c": 0.011}
+    clean = simulate(structure, truth, Record("run", 2e-3, {"u": force}, {}), initial_state=[1.5e-3, 0.0])
+    measured = clean["x"] + noise * np.random.default_rng(0).standard_normal(t.size)
+    run = Record("run", 2e-3, {"u": force, "x": measured}, {})
+    fit = GreyBoxFit(structure, [run], characteristic_scales(AXIS, [run], truth), {"x": noise})
+    start = {**truth, "m": 0.15, "d": 0.05, "k": 4.8, "T_c": 0.008}
+    found = fit.fit(start, ["m", "d", "k", "T_c"], [np.array([4.5e-3, 0.1])])
+    # From a velocity with which it slides past its place of rest, a descent stopped at three times the noise.
+    assert found.cost / found.n_samples == pytest.approx(1.0, abs=0.05)
+    assert found.values["T_c"] == pytest.approx(0.011, rel=0.02)
 
 
 TWO_PATHS = """

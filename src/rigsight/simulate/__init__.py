@@ -13,6 +13,7 @@ from rigsight.simulate.rest import rest_state as rest_state
 from rigsight.simulate.side_by_side import carries_tangents as carries_tangents
 from rigsight.simulate.side_by_side import choose_substeps as choose_substeps
 from rigsight.simulate.side_by_side import differs_at_events as differs_at_events
+from rigsight.simulate.side_by_side import has_dry_friction as has_dry_friction
 from rigsight.simulate.side_by_side import normal_equations as normal_equations
 from rigsight.simulate.side_by_side import simulate_sets as simulate_sets
 from rigsight.simulate.side_by_side import simulate_tangents as simulate_tangents
@@ -35,6 +36,7 @@ __all__ = [
     "choose_substeps",
     "compose",
     "differs_at_events",
+    "has_dry_friction",
     "normal_equations",
     "parameter_vector",
     "record_input",

@@ -133,7 +133,12 @@ def differs_at_events(structure: Structure) -> bool:
     """Return True if differences of sets need long steps, because events and steps of each set are located to a tolerance."""
     if structure.is_shifted or structure.histories or structure.jumps_at_a_place:
         return True
-    return bool(freeze(structure).frictions) and not carries_tangents(structure)
+    return has_dry_friction(structure) and not carries_tangents(structure)
+
+
+def has_dry_friction(structure: Structure) -> bool:
+    """Return True if a joint of a structure can stick."""
+    return bool(freeze(structure).frictions)
 
 
 def tangent_equations(

@@ -7,7 +7,7 @@ fit itself converges, and longer stretches are left to it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,11 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
     guesses = [first_state(data.structure, d.record, values) for d in data.records]
     p = parameter_vector(data.structure, values)
     if np.any(data.limited):
-        return data.of_each_record(lambda i: _placed(data, data.records[i], guesses[i], p, values))
+        return data.of_each_record(
+            lambda i: _likeliest(
+                data, data.records[i], p, _placed(data, data.records[i], guesses[i], p, values)
+            )
+        )
 
     def settled(index: int) -> Floats:
         record = data.records[index]
@@ -76,21 +80,45 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
     return data.of_each_record(settled)
 
 
+def at_rest_if_likelier(data: FitData, values: Mapping[str, float], states: Sequence[Floats]) -> list[Floats]:
+    """Return each record's initial state, or the state of rest if that fits the record better.
+
+    While a joint sticks, its initial velocity has no effect: a descent neither leaves the state of rest nor finds it.
+
+    Parameters
+    ----------
+    data, values
+        As of `guessed_states`.
+    states
+        Initial states, shape (n_states,) each.
+    """
+    p = parameter_vector(data.structure, values)
+
+    def likelier(index: int) -> Floats:
+        at_rest = state_at_rest(data.structure, data.records[index].record, states[index], values)
+        return _likeliest(data, data.records[index], p, np.column_stack([states[index], at_rest]))
+
+    return data.of_each_record(likelier)
+
+
 def _placed(
     data: FitData, record: RecordData, guess: Floats, p: Floats, values: Mapping[str, float]
 ) -> Floats:
-    """Return the best of the estimate and the state at rest, with several values of limited states within their ranges."""
-    own = record.parameters(p)
-    ranges = np.where(data.limited, data.state_sizes(own[:, None])[:, 0], 0.0)
+    """Return the estimate and the state at rest with several values of limited states, shape (n_states, n)."""
+    ranges = np.where(data.limited, data.state_sizes(record.parameters(p)[:, None])[:, 0], 0.0)
     at_rest = state_at_rest(data.structure, record.record, guess, values)
-    lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
+    return np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
+
+
+def _likeliest(data: FitData, record: RecordData, p: Floats, states: Floats) -> Floats:
+    """Return of several initial states, shape (n_states, n), the one with which the parameters fit the record best."""
+    sets = np.repeat(record.parameters(p)[:, None], states.shape[1], axis=1)
     with np.errstate(all="ignore"):
-        sets = np.repeat(own[:, None], lanes.shape[1], axis=1)
-        out = simulate_sets(data.structure, record.held, sets, lanes, record.record.n_samples, _SUBSTEPS)
+        out = simulate_sets(data.structure, record.held, sets, states, record.record.n_samples, _SUBSTEPS)
         errors = (record.measured[:, :, None] - out) * record.weights[:, None]
         costs = np.nansum(errors**2, axis=(0, 1))
     costs[~np.all(np.isfinite(out), axis=(0, 1))] = np.inf
-    return lanes[:, int(np.argmin(costs))] if np.any(np.isfinite(costs)) else guess
+    return states[:, int(np.argmin(costs))] if np.any(np.isfinite(costs)) else states[:, 0]
 
 
 def settled_state(data: FitData, record: RecordData, p: Floats, guess: Floats) -> Floats:
