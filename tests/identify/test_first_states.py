@@ -8,6 +8,7 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.fit.first_states import rig_state
+from rigsight.identify.fit.fit_problem import Evaluation
 from rigsight.identify.rig_equations import equations_of
 from rigsight.records import Record
 from rigsight.rigs import AXIS
@@ -74,20 +75,42 @@ def test_without_a_sensor_of_the_current_it_goes_by_the_parameters(run: Record) 
     assert rig_state(equations, record, VALUES)[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_a_rig_at_rest_in_dry_friction_is_fitted_from_a_moving_estimate() -> None:
+@pytest.fixture(scope="module")
+def stuck() -> GreyBoxFit:
+    """Fit of a mass that dry friction holds for the first 0.4 s."""
     t, noise = 2e-3 * np.arange(4000), 5e-4
     force = np.interp(t, [0.0, 0.4, 1.5, 3.2, 4.5, 6.2, 7.3], [0.0, 0.0, 0.1, 0.1, -0.1, -0.1, 0.0])
     structure = compose(AXIS, (effect_named("coulomb_friction"),))
-    truth = {"gain": 1.0, "m": 0.14, "d": 0.06, "k": 4.6, "x_off": 0.0, "force_off": 0.0, "T_c": 0.011}
-    clean = simulate(structure, truth, Record("run", 2e-3, {"u": force}, {}), initial_state=[1.5e-3, 0.0])
+    begin = Record("run", 2e-3, {"u": force}, {})
+    clean = simulate(structure, FRICTION, begin, initial_state=[1.5e-3, 0.0])
     measured = clean["x"] + noise * np.random.default_rng(0).standard_normal(t.size)
-    run = Record("run", 2e-3, {"u": force, "x": measured}, {})
-    fit = GreyBoxFit(structure, [run], characteristic_scales(AXIS, [run], truth), {"x": noise})
-    start = {**truth, "m": 0.15, "d": 0.05, "k": 4.8, "T_c": 0.008}
-    found = fit.fit(start, ["m", "d", "k", "T_c"], [np.array([4.5e-3, 0.1])])
-    # From a velocity with which it slides past its place of rest, a descent stopped at three times the noise.
+    run = begin.with_signals(x=measured)
+    return GreyBoxFit(structure, [run], characteristic_scales(AXIS, [run], FRICTION), {"x": noise})
+
+
+FRICTION = {
+    "gain": 1.0, "m": 0.14, "d": 0.06, "k": 4.6, "x_off": 0.0, "force_off": 0.0, "T_c": 0.011,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("state", [[4.5e-3, 0.1], [1.5e-3, 0.0]], ids=["moving", "at rest"])
+def test_a_mass_that_sticks_at_first_is_fitted_wherever_the_search_begins(
+    stuck: GreyBoxFit, state: list[float]
+) -> None:
+    """From a velocity with which the mass slides past its place, a descent stopped at three times the noise."""
+    start = {**FRICTION, "m": 0.15, "d": 0.05, "k": 4.8, "T_c": 0.008}
+    found = stuck.fit(start, ["m", "d", "k", "T_c"], [np.array(state)])
     assert found.cost / found.n_samples == pytest.approx(1.0, abs=0.05)
     assert found.values["T_c"] == pytest.approx(0.011, rel=0.02)
+
+
+def test_a_coordinate_without_effect_keeps_its_value_and_stops_no_other() -> None:
+    slopes = np.array([[2.0, 0.0], [1.0, 0.0], [0.5, 0.0]])
+    left = np.array([1.0, -1.0, 2.0])
+    here = Evaluation(np.zeros(2), float(left @ left), slopes.T @ slopes, slopes.T @ left)
+    root, projection = here.compressed
+    step = np.linalg.solve(root, -projection)
+    np.testing.assert_allclose(step, [-(slopes[:, 0] @ left) / (slopes[:, 0] @ slopes[:, 0]), 0.0])
 
 
 TWO_PATHS = """

@@ -117,3 +117,5 @@ def test_the_best_one_starts_from_the_numbers_of_the_next_too(
     assert start["T_s"] == best.fit.values["T_s"]
     (start,) = asked[next_one.names]
     assert start["k"] == best.fit.values["k"]
+    # Coulomb friction is a special case of Stribeck friction.
+    assert start["T_c"] == best.fit.values["T_c"] != next_one.fit.values["T_c"]

@@ -10,6 +10,7 @@ W. H. Press et al., *Numerical Recipes* (Cambridge 2007), section 15.6, for diff
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -57,9 +58,18 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
 
 
 def _as_in(leader: Scored, model: Scored) -> dict[str, float]:
-    """Return the parameters of a model with the values that another one has for those of both."""
+    """Return the parameters of a model with the values that another one has for those of both.
+
+    An effect that is a special case of one of the other's has its parameters, too: a friction those of a friction that also
+    depends on the load.
+    """
     fit = model.fit
     common = carried_over(leader.fit.values, leader.fit.structure, fit.structure)
+    for simple, general in itertools.product(model.effects, leader.effects):
+        if simple.name in general.parents:
+            own = leader.fit.structure.values_of(general, leader.fit.values)
+            of_both = [p.name for p in simple.parameters if p.name in own]
+            common |= {fit.structure.parameter_name(simple, name): own[name] for name in of_both}
     # Held parameters keep their value, such as a known constant force beside an effect that would absorb it.
     return {**fit.values, **{name: value for name, value in common.items() if name in fit.free}}
 

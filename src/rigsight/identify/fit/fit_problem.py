@@ -58,7 +58,11 @@ class Evaluation:
         """R and c with R^T R = J^T J and R^T c = J^T r, also for linearly dependent derivatives."""
         size = np.sqrt(np.diag(self.normal))
         size[size == 0.0] = 1.0
-        eigenvalues, vectors = symmetric_eigen(self.normal / np.outer(size, size))
+        correlation = self.normal / np.outer(size, size)
+        # What has no effect, such as the velocity of a joint that sticks, keeps its value: with a column of zeros the steps of
+        # the optimizer break down.
+        np.fill_diagonal(correlation, 1.0)
+        eigenvalues, vectors = symmetric_eigen(correlation)
         kept = np.maximum(eigenvalues, 0.0)
         floor = 1e-13 * max(float(kept[-1]), 1e-300)
         root = np.sqrt(kept)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.fit_data import FitData
-from rigsight.identify.fit.settled_states import at_rest_if_likelier, guessed_states
+from rigsight.identify.fit.settled_states import guessed_states, moving_or_at_rest
 from rigsight.simulate import has_dry_friction
 
 _STATE_RANGE = 20.0
@@ -71,7 +71,7 @@ class SearchStart:
         coordinates = Coordinates.of(data.structure, free, values, scales)
         states = list(initial_states) if initial_states is not None else guessed_states(data, values)
         if has_dry_friction(data.structure):
-            states = at_rest_if_likelier(data, values, states)
+            states = moving_or_at_rest(data, values, states)
         own = coordinates.from_values(values)
         sizes = data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
         limited = data.limited

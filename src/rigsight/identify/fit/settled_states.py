@@ -80,8 +80,8 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
     return data.of_each_record(settled)
 
 
-def at_rest_if_likelier(data: FitData, values: Mapping[str, float], states: Sequence[Floats]) -> list[Floats]:
-    """Return each record's initial state, or the state of rest if that fits the record better.
+def moving_or_at_rest(data: FitData, values: Mapping[str, float], states: Sequence[Floats]) -> list[Floats]:
+    """Return each record's initial state, fitted to the whole record from the given one and from rest, whichever fits better.
 
     While a joint sticks, its initial velocity has no effect: a descent neither leaves the state of rest nor finds it.
 
@@ -95,8 +95,15 @@ def at_rest_if_likelier(data: FitData, values: Mapping[str, float], states: Sequ
     p = parameter_vector(data.structure, values)
 
     def likelier(index: int) -> Floats:
-        at_rest = state_at_rest(data.structure, data.records[index].record, states[index], values)
-        return _likeliest(data, data.records[index], p, np.column_stack([states[index], at_rest]))
+        record = data.records[index]
+        own = record.parameters(p)
+        sizes = data.state_sizes(own[:, None])[:, 0]
+        at_rest = state_at_rest(data.structure, record.record, states[index], values)
+        found = [
+            _fitted(data, record, own, start, np.where(sizes > 0.0, sizes, 1.0), record.record.n_samples)
+            for start in (states[index], at_rest)
+        ]
+        return min(found, key=lambda fitted: fitted[1])[0]
 
     return data.of_each_record(likelier)
 
