@@ -32,3 +32,10 @@ def test_most_inner_numbers_are_not_where_a_search_begins(name: str, number: str
     assert np.mean(nearest < 0.1) < 0.4, "within a tenth of a start"
     assert np.min(drawn) < 0.7 * min(starts)
     assert np.max(drawn) > 1.4 * max(starts)
+
+
+def test_no_power_law_is_a_linear_spring() -> None:
+    effect, rng = effect_named("power_law_stiffness"), np.random.default_rng(0)
+    drawn = [draw_shape(effect, SCALES, rng)["n"] for _ in range(200)]
+    assert min(drawn) >= 1.2
+    assert max(drawn) > 3.5

@@ -49,7 +49,6 @@ _OFF = (0.05, 0.2)
 """How far wrong parameters are off."""
 _DIGITS = 5
 """Digits of the given simulation's parameters."""
-_EVALUATIONS = 25
 
 
 def draw_placed_trial(seed: int, trial: int) -> Trial:
@@ -216,7 +215,7 @@ class _Bench:
     def refit(self, records: Sequence[Record]) -> FitResult:
         """Return the equations without effects with the numbers that fit these records best."""
         fit = GreyBoxFit(compose(self.rig), records, self.scales, self.noise)
-        found = fit.fit(self.values, [p.name for p in self.rig.parameters], max_evaluations=_EVALUATIONS)
+        found = fit.fit(self.values, [p.name for p in self.rig.parameters])
         if not found.residuals:
             raise SimulationError(
                 f"The equations without effects cannot be fitted to this motion: {found.message}"

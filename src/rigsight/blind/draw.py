@@ -43,7 +43,6 @@ _OFF = (0.05, 0.2)
 """How far wrong parameters are off."""
 _DIGITS = 5
 """Digits of the given simulation's parameters."""
-_EVALUATIONS = 25
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +274,7 @@ class _Bench:
     def refit(self, records: Sequence[Record]) -> FitResult:
         """Return the linear equations with the numbers that fit these records best."""
         fit = GreyBoxFit(self.structure, records, self.scales, self.noise)
-        found = fit.fit(self.linear.values, self._free, max_evaluations=_EVALUATIONS)
+        found = fit.fit(self.linear.values, self._free)
         if not found.residuals:
             raise SimulationError(f"Linear equations cannot be fitted to this motion: {found.message}")
         return found

@@ -68,10 +68,15 @@ def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Gener
 
 
 def _inner(parameter: Parameter, rng: np.random.Generator) -> float:
-    """Return an inner number in units of its dimension: evenly over its logarithm, or over itself where its sign is open."""
+    """Return an inner number in units of its dimension: evenly over its logarithm, or over itself where its sign is open.
+
+    It lies within the range that a search explores: a power law with an exponent of 1 would be a linear spring.
+    """
     low, high = min(parameter.starts), max(parameter.starts)
     if low > 0.0:
-        return math.exp(rng.uniform(math.log(low / _BEYOND_STARTS), math.log(high * _BEYOND_STARTS)))
+        least, most = parameter.search
+        low, high = max(low / _BEYOND_STARTS, least), min(high * _BEYOND_STARTS, most)
+        return math.exp(rng.uniform(math.log(low), math.log(high)))
     half = 0.5 * (high - low)
     return float(rng.uniform(low - half, high + half))
 

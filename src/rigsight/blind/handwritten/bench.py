@@ -22,7 +22,6 @@ from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import compose
 
-_EVALUATIONS = 25
 _LEAST_OF_WISHED = 0.5
 """Share of the requested gap that an effect must cause; otherwise it is drawn again."""
 
@@ -201,7 +200,7 @@ class HandwrittenBench:
         self, records: Sequence[Record], start: Mapping[str, float], free: Sequence[str]
     ) -> FitResult:
         fit = GreyBoxFit(compose(self.rig), records, self.scales, self.noise)
-        found = fit.fit(start, list(free), max_evaluations=_EVALUATIONS)
+        found = fit.fit(start, list(free))
         if not found.residuals:
             raise SimulationError(
                 f"The equations of {self.rig.name} cannot be fitted to this motion: {found.message}"

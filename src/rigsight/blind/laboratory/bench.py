@@ -36,7 +36,6 @@ _ACCURACY = 1e-7
 """Relative: far below the noise."""
 _EVERY = 30.0
 """Time from one record's begin to the next [s]: it is stored in between, and the rig goes on warming up."""
-_EVALUATIONS = 25
 
 
 @dataclass(frozen=True)
@@ -289,7 +288,7 @@ class LaboratoryBench:
         whole = not self.stand.looped
         pieces = records if whole else cut(records, window_length(self.rig, records))
         fit = GreyBoxFit(structure, pieces, self.scales, self.noise)
-        found = fit.fit(start, list(free), max_evaluations=_EVALUATIONS)
+        found = fit.fit(start, list(free))
         if not found.residuals:
             raise SimulationError(
                 f"The equations of {self.rig.name} cannot be fitted to this motion: {found.message}"
