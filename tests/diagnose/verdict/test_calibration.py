@@ -74,3 +74,13 @@ def test_one_model_alone_takes_what_the_first_has() -> None:
     calibration = trained()
     assert calibration.probabilities(CLEAR, []) == []
     assert calibration.probabilities(CLEAR, [1.0]) == [stated(CLEAR)]
+
+
+def test_no_rival_is_more_probable_than_the_doubted_first_model() -> None:
+    doubted = replace(CLEAR, first_share=0.503, left=1.15, n_effects=2, adequate=False)
+    calibration = trained()
+    first, second, third = calibration.probabilities(doubted, [0.503, 0.49, 0.007])
+    assert calibration.probability_first(doubted) < 0.5
+    assert first == pytest.approx(second)
+    assert third < 0.1 * second
+    assert first + second + third == pytest.approx(calibration.probability_listed(doubted))

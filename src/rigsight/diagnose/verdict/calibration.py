@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
+import numpy as np
+from scipy.optimize import isotonic_regression
 from scipy.special import expit
 
 from rigsight.diagnose.policy import VERDICT
@@ -116,7 +118,8 @@ class Calibration:
         situation
             The diagnosis.
         shares
-            Of the ranking, the first model's first; the others share in their proportion what the first one leaves.
+            Of the ranking, the first model's first; the others share in their proportion what the first one leaves, but none has
+            more than a model ahead of it.
         """
         if not shares:
             return []
@@ -125,7 +128,12 @@ class Calibration:
             return _in_proportion(listed * (1.0 - first), shares)
         if len(shares) == 1:
             return [listed * first]
-        return [listed * first, *_in_proportion(listed * (1.0 - first), shares[1:])]
+        separate = np.array([listed * first, *_in_proportion(listed * (1.0 - first), shares[1:])])
+        # Where the first is doubted, a rival with nearly the same share must not become more probable than it.
+        order = np.argsort([-math.inf, *(-share for share in shares[1:])], kind="stable")
+        probabilities = np.empty_like(separate)
+        probabilities[order] = isotonic_regression(separate[order], increasing=False).x
+        return probabilities.tolist()
 
     def without_effect(self, situation: Situation) -> float:
         """Return the probability that the equations need no effect."""
