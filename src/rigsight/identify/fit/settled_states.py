@@ -7,13 +7,14 @@ fit itself converges, and longer stretches are left to it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.fit.first_states import first_state, moves_freely, state_at_rest
-from rigsight.identify.fit.fit_data import FitData, RecordData, weighted
+from rigsight.identify.fit.fit_data import FitData, RecordData
 from rigsight.simulate import parameter_vector, simulate_sets
 
 Floats = NDArray[np.float64]
@@ -96,14 +97,9 @@ def moving_or_at_rest(data: FitData, values: Mapping[str, float], states: Sequen
 
     def likelier(index: int) -> Floats:
         record = data.records[index]
-        own = record.parameters(p)
-        sizes = data.state_sizes(own[:, None])[:, 0]
         at_rest = state_at_rest(data.structure, record.record, states[index], values)
-        found = [
-            _fitted(data, record, own, start, np.where(sizes > 0.0, sizes, 1.0), record.record.n_samples)
-            for start in (states[index], at_rest)
-        ]
-        return min(found, key=lambda fitted: fitted[1])[0]
+        found = _fitted(data, record, record.parameters(p), [states[index], at_rest], record.record.n_samples)
+        return min(found, key=lambda fitted: fitted.error).state
 
     return data.of_each_record(likelier)
 
@@ -146,54 +142,91 @@ def settled_state(data: FitData, record: RecordData, p: Floats, guess: Floats) -
     -------
     Shape (n_states,).
     """
-    own = record.parameters(p)
-    sizes = data.state_sizes(own[:, None])[:, 0]
-    sizes = np.where(sizes > 0.0, sizes, 1.0)
     state, n_samples, before = guess, min(_FIRST_SAMPLES, record.record.n_samples), np.inf
     while True:
-        found, error, slopes = _fitted(data, record, own, state, sizes, n_samples)
-        if not error <= _LOST * max(before, 1.0):
+        (found,) = _fitted(data, record, record.parameters(p), [state], n_samples)
+        if not found.error <= _LOST * max(before, 1.0):
             return state
-        state, before = found, error
-        if n_samples == record.record.n_samples or _dies_away(slopes, n_samples):
+        state, before = found.state, found.error
+        if n_samples == record.record.n_samples or _dies_away(found.slopes, n_samples):
             return state
         n_samples = min(_LONGER * n_samples, record.record.n_samples)
 
 
-def _fitted(
-    data: FitData, record: RecordData, p: Floats, start: Floats, sizes: Floats, n_samples: int
-) -> tuple[Floats, float, Floats]:
-    """Return the state that fits the first samples best, the root mean square of the weighted error there, and its slopes."""
-    n, place, beginning = start.size, np.zeros(start.size), record.first(n_samples)
+@dataclass(frozen=True)
+class _Fitted:
+    """End of a descent: the state, the root mean square of the weighted error, and its slopes."""
 
-    def errors(places: Floats) -> Floats:
-        lanes = start[:, None] + sizes[:, None] * places
+    state: Floats
+    error: float
+    slopes: Floats
+
+
+def _fitted(
+    data: FitData, record: RecordData, p: Floats, starts: Sequence[Floats], n_samples: int
+) -> list[_Fitted]:
+    """Return the state that fits the first samples best, from each start; all descents share their simulations."""
+    sizes = data.state_sizes(p[:, None])[:, 0]
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    beginning = record.first(n_samples)
+    n_measured = max(1, n_samples * int(np.count_nonzero(record.weights)))
+
+    def errors(asked: Mapping[int, Floats]) -> dict[int, Floats]:
+        """Return the errors of the places around each start, shape (n_errors, n_places)."""
+        lanes = np.hstack([starts[i][:, None] + sizes[:, None] * places for i, places in asked.items()])
         sets = np.repeat(p[:, None], lanes.shape[1], axis=1)
         with np.errstate(all="ignore"):
             out = simulate_sets(data.structure, beginning.held, sets, lanes, n_samples, _SUBSTEPS)
-            first, against = weighted(beginning, out)
-            left = np.column_stack([first, first[:, None] + against])
-        return np.vstack([np.clip(np.nan_to_num(left, nan=_LARGEST), -_LARGEST, _LARGEST), _PULL * places])
+            used = np.flatnonzero(beginning.weights > 0.0)
+            left = np.vstack(
+                [(beginning.measured[:, i, None] - out[:, i]) * beginning.weights[i] for i in used]
+            )
+        left = np.clip(np.nan_to_num(left, nan=_LARGEST), -_LARGEST, _LARGEST)
+        ends = np.cumsum([places.shape[1] for places in asked.values()])[:-1]
+        return {
+            i: np.vstack([own, _PULL * asked[i]])
+            for i, own in zip(asked, np.split(left, ends, axis=1), strict=True)
+        }
 
-    around = np.column_stack([np.zeros(n), _STEP * np.eye(n)])
-    lanes = errors(place[:, None] + around)
+    descents = [_descent(start.size) for start in starts]
+    asked = {i: next(descent) for i, descent in enumerate(descents)}
+    ends: dict[int, tuple[Floats, Floats]] = {}
+    while asked:
+        answers, asked = errors(asked), {}
+        for i, answer in answers.items():
+            try:
+                asked[i] = descents[i].send(answer)
+            except StopIteration as end:
+                ends[i] = end.value
+    return [
+        _Fitted(
+            state=start + sizes * ends[i][0],
+            error=float(np.linalg.norm(ends[i][1][:, 0]) / np.sqrt(n_measured)),
+            slopes=(ends[i][1][:, 1:] - ends[i][1][:, :1]) / _STEP,
+        )
+        for i, start in enumerate(starts)
+    ]
+
+
+def _descent(n: int) -> Generator[Floats, Floats, tuple[Floats, Floats]]:
+    """Ask for the errors of places, shape (n, n_places), on the way down; return the last place and the errors around it."""
+    around, place = np.column_stack([np.zeros(n), _STEP * np.eye(n)]), np.zeros(n)
+    lanes = yield place[:, None] + around
     for _ in range(_STEPS):
         cost, slopes = float(lanes[:, 0] @ lanes[:, 0]), (lanes[:, 1:] - lanes[:, :1]) / _STEP
         step = np.linalg.lstsq(slopes, -lanes[:, 0], rcond=None)[0]
         # A whole step is usually the best, so the slopes for the next step are computed with it.
         tried = np.column_stack([(place + step)[:, None] + around, place[:, None] + np.outer(step, _SHORTER)])
-        ahead = errors(tried)
+        ahead = yield tried
         costs = np.sum(ahead**2, axis=0)
         best = min((0, *range(n + 1, tried.shape[1])), key=lambda lane: costs[lane])
         if not costs[best] < cost:
             break
         place, gained = tried[:, best], cost - float(costs[best])
-        lanes = ahead[:, : n + 1] if best == 0 else errors(place[:, None] + around)
+        lanes = ahead[:, : n + 1] if best == 0 else (yield place[:, None] + around)
         if gained < _WORTH_A_STEP * cost:
             break
-    cost, slopes = float(lanes[:, 0] @ lanes[:, 0]), (lanes[:, 1:] - lanes[:, :1]) / _STEP
-    n_measured = max(1, n_samples * int(np.count_nonzero(record.weights)))
-    return start + sizes * place, float(np.sqrt(cost / n_measured)), slopes
+    return place, lanes
 
 
 def _dies_away(slopes: Floats, n_samples: int) -> bool:
