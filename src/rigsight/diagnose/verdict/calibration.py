@@ -133,7 +133,7 @@ class Calibration:
         order = np.argsort([-math.inf, *(-share for share in shares[1:])], kind="stable")
         probabilities = np.empty_like(separate)
         probabilities[order] = isotonic_regression(separate[order], increasing=False).x
-        return probabilities.tolist()
+        return [float(probability) for probability in probabilities]
 
     def without_effect(self, situation: Situation) -> float:
         """Return the probability that the equations need no effect."""
