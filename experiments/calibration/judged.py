@@ -1,11 +1,11 @@
 """Scores of the trials that judge the calibration, with the probabilities that the present calibration gives.
 
-    .venv/bin/python experiments/calibration/judged.py BENCH... --state 40f2704    # adds trials of benches to judged.jsonl
-    .venv/bin/python experiments/calibration/judged.py                             # prints the scores of all of them
+    .venv/bin/python experiments/calibration/judged.py BENCH... --state 40f2704    # adds trials to judged/40f2704.jsonl
+    .venv/bin/python experiments/calibration/judged.py --state 40f2704             # prints the scores of all of them
 
-A line of the file has of a trial what its scores depend on: the key without the numbers of the rig, and of the diagnosis verdict,
-ranking and errors. A calibration changes neither, so it may be trained while the trials that judge it run. All lines are of one
-state of the code, and a trial that is run again keeps its first outcome.
+A line of a file has of a trial what its scores depend on: the key without the numbers of the rig, and of the diagnosis verdict,
+ranking and errors. A calibration changes neither, so it may be trained while the trials that judge it run. All lines of a file
+are of one state of the code, and a trial that is run again keeps its first outcome.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rigsight.diagnose import Calibration
 from rigsight.diagnose.verdict.calibration import trained
 from rigsight.effects import AT
 
-FILE = Path(__file__).parent / "judged.jsonl"
+FOLDER = Path(__file__).parent / "judged"
 OF_KEY = (
     "schema_version", "design", "seed", "trial", "kind", "effects", "where", "rig", "noise", "gap", "condition",
 )  # fmt: skip
@@ -47,42 +47,35 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("bench", type=Path, nargs="*")
-    parser.add_argument("--state", help="commit of the code that ran the trials")
+    parser.add_argument("--state", required=True, help="commit of the code that ran the trials")
     given = parser.parse_args()
-    if not given.bench:
-        lines = read_lines()
-        if not lines:
-            sys.exit(f"There are no trials yet in {FILE}: name the benches to add.")
+    file = FOLDER / f"{given.state}.jsonl"
+    lines = read_lines(file) if file.exists() else []
+    if given.bench:
+        lines = with_benches(lines, given.bench)
+        file.write_text("".join(f"{json.dumps(line)}\n" for line in lines), encoding="utf-8")
+        print(f"{len(lines)} trials in {file}.")
+    elif lines:
         print(tables([scored(line, trained()) for line in lines]))
-        return
-    if not given.state:
-        parser.error("name the commit of the code that ran these trials: --state 40f2704")
-    lines = with_benches(read_lines(), given.bench, given.state)
-    FILE.write_text("".join(f"{json.dumps(line)}\n" for line in lines), encoding="utf-8")
-    print(f"{len(lines)} trials in {FILE}.")
+    else:
+        known = ", ".join(sorted(path.stem for path in FOLDER.glob("*.jsonl")))
+        sys.exit(f"There are no trials of state {given.state}: name benches to add, or one of {known}.")
 
 
-def with_benches(known: Sequence[Line], benches: Sequence[Path], state: str) -> list[Line]:
-    """Return the lines with those of benches that one state of the code ran; a trial that is there already stays as it is."""
-    others = {line["state"] for line in known} - {state}
-    if others:
-        sys.exit(
-            f"{FILE} has trials of {', '.join(sorted(others))}. Remove it before trials of {state} are added."
-        )
+def with_benches(known: Sequence[Line], benches: Sequence[Path]) -> list[Line]:
+    """Return the lines with those of benches; a trial that is there already stays as it is."""
     lines = {_name(line): line for line in known}
     for bench in benches:
-        found = list(_of_bench(bench, state))
+        found = list(_of_bench(bench))
         if not found:
             sys.exit(f"{bench} has no trials: name the folder that 'rigsight blind --out' wrote.")
         lines = {_name(line): line for line in found} | lines
     return [lines[name] for name in sorted(lines)]
 
 
-def read_lines() -> list[Line]:
-    """Return the lines of the file."""
-    return (
-        [json.loads(line) for line in FILE.read_text(encoding="utf-8").splitlines()] if FILE.exists() else []
-    )
+def read_lines(file: Path) -> list[Line]:
+    """Return the lines of a file."""
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
 
 
 def _name(line: Line) -> tuple[str, int, str]:
@@ -90,14 +83,13 @@ def _name(line: Line) -> tuple[str, int, str]:
     return (key["design"], key["seed"], str(key["trial"]).zfill(3))
 
 
-def _of_bench(bench: Path, state: str) -> Iterable[Line]:
+def _of_bench(bench: Path) -> Iterable[Line]:
     for run in sorted(bench.glob("results/*/run.json")):
         key = json.loads((bench / "keys" / f"{run.parent.name}.json").read_text(encoding="utf-8"))
         told = json.loads(run.read_text(encoding="utf-8"))
         result = run.with_name("diagnosis.json")
         diagnosis = json.loads(result.read_text(encoding="utf-8")) if result.exists() else None
         yield {
-            "state": state,
             "key": {name: key[name] for name in OF_KEY if name in key},
             "seconds": told["seconds"],
             "message": told["message"],
