@@ -148,7 +148,5 @@ def test_the_first_outcome_of_a_trial_counts(study: ModuleType, tmp_path: Path) 
     first = judged.with_benches([], [bench_of(tmp_path / "a", diagnosed({PLAY: 1.0}))])
     again = bench_of(tmp_path / "b", diagnosed({FRICTION: 1.0}))
     assert judged.with_benches(first, [again]) == first
-    with pytest.raises(SystemExit, match="has trials of abc"):
-        judged.with_benches(first, [again], "def")
     with pytest.raises(SystemExit, match="has no trials"):
         judged.with_benches(first, [tmp_path / "nowhere"])
