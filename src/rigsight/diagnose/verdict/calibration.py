@@ -118,8 +118,8 @@ class Calibration:
         situation
             The diagnosis.
         shares
-            Of the ranking, the first model's first; the others share in their proportion what the first one leaves, but none has
-            more than a model ahead of it.
+            Of the ranking, the first model's first. The others share in their proportion what the first one leaves; none becomes
+            more probable than the first, or than one with a larger share.
         """
         if not shares:
             return []

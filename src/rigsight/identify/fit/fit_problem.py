@@ -55,12 +55,15 @@ class Evaluation:
 
     @cached_property
     def compressed(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """R and c with R^T R = J^T J and R^T c = J^T r, also for linearly dependent derivatives."""
+        """R and c with R^T R = J^T J and R^T c = J^T r, also for linearly dependent derivatives.
+
+        For a column of zeros, J^T J has a one on its diagonal.
+        """
         size = np.sqrt(np.diag(self.normal))
         size[size == 0.0] = 1.0
         correlation = self.normal / np.outer(size, size)
-        # What has no effect, such as the velocity of a joint that sticks, keeps its value: with a column of zeros the steps of
-        # the optimizer break down.
+        # So what has no effect, such as the velocity of a joint that sticks, keeps its value; with a column of zeros the steps
+        # of the optimizer become tiny in all coordinates.
         np.fill_diagonal(correlation, 1.0)
         eigenvalues, vectors = symmetric_eigen(correlation)
         kept = np.maximum(eigenvalues, 0.0)

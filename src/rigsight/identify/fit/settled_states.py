@@ -178,9 +178,8 @@ def _fitted(
         with np.errstate(all="ignore"):
             out = simulate_sets(data.structure, beginning.held, sets, lanes, n_samples, _SUBSTEPS)
             used = np.flatnonzero(beginning.weights > 0.0)
-            left = np.vstack(
-                [(beginning.measured[:, i, None] - out[:, i]) * beginning.weights[i] for i in used]
-            )
+            left = (beginning.measured[:, used, None] - out[:, used]) * beginning.weights[used, None]
+        left = left.swapaxes(0, 1).reshape(-1, lanes.shape[1])
         left = np.clip(np.nan_to_num(left, nan=_LARGEST), -_LARGEST, _LARGEST)
         ends = np.cumsum([places.shape[1] for places in asked.values()])[:-1]
         return {
