@@ -12,6 +12,7 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.discover import JointForce, JointLaw
 from rigsight.report import render_report
 from rigsight.report.location import joint_maps, output_maps, path_rows
+from rigsight.report.sections import interval_text
 from rigsight.report.wording import missing_force_sentence
 
 
@@ -125,3 +126,8 @@ def test_at_the_floor_no_joint_has_a_map(diagnosis: Diagnosis) -> None:
     parts = tuple(replace(part, joint="load", **unknown) for part in diagnosis.localization.by_state)
     assert joint_maps(replace(diagnosis, localization=replace(diagnosis.localization, by_state=parts))) == []
     assert joint_maps(diagnosis) == []
+
+
+def test_an_interval_whose_ends_read_alike_is_one_number() -> None:
+    assert interval_text((0.9995, 0.9998), "closed") == "over 99.9 %"
+    assert interval_text((0.991, 0.9998), "closed") == "99.1 % to over 99.9 %"

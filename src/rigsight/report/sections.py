@@ -121,11 +121,11 @@ def budget_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def interval_text(limits: tuple[float, float], stage: str) -> str:
-    """Return a 95 % interval of a stage as text, ``"9.1 % to 9.9 %"``; empty where it is not finite."""
+    """Return a 95 % interval of a stage as text, ``"9.1 % to 9.9 %"``; one number for equal ends, empty if not finite."""
     if not all(map(math.isfinite, limits)):
         return ""
     low, high = map(percent if stage == "closed" else gap_percent, limits)
-    return f"{low} to {high}"
+    return low if low == high else f"{low} to {high}"
 
 
 def ranking_drawing(diagnosis: Diagnosis) -> Figure:
