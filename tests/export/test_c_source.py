@@ -56,7 +56,7 @@ def test_it_gives_the_outputs_of_the_engine_to_rounding(case, tmp_path: Path):
     assert max(case.errors(simulated, told=True).values()) <= TO_ROUNDING
 
 
-# One of each kind of text that the integrator has; every model is held to it as an FMU, with yet other options.
+# One of each kind of text that the integrator has; FMUs are compiled with yet other options.
 @pytest.mark.parametrize(
     "name",
     [

@@ -14,12 +14,9 @@ from rigsight.workflow.campaign.read_campaign import read_campaign
 # What comes nearest to the hidden effect, of all that the demo tries: the others leave as much as the given simulation.
 RIVALS = (
     "bouc_wen_hysteresis",
-    "coulomb_friction",
     "maxwell_branch",
     "power_law_stiffness",
     "presliding_friction",
-    "stribeck_friction",
-    "torque_ripple",
 )
 
 

@@ -13,7 +13,7 @@ from rigsight.diagnose.data_quality.checks import data_quality, with_best_model,
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of, start_values_of
+from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing, leading_output
 from rigsight.diagnose.noise.adequacy import Adequacy, Checks
 from rigsight.diagnose.noise.detection import noise_floors
@@ -307,7 +307,8 @@ def _cut(campaign: Campaign, noise: Mapping[str, float], models: _Singly) -> _Si
     """Return the models in windows of a few cycles."""
     leading = leading_output(campaign.rig, campaign.records)
     windowing = Windowing.by_cycles({leading: noise[leading], **noise})
-    context = fit_context_of(campaign, noise, windowing, models.context.memory, models.context.threads)
+    known = models.context
+    context = fit_context_of(campaign, noise, windowing, known.memory, known.threads, known.start)
     reidentified = reidentify(context, models.reidentified.fit.values)
     singles = fitted_in_windows(context, reidentified, models.singles)
     before = _before(campaign, context, reidentified) if reidentified.residuals else models.before
@@ -325,7 +326,7 @@ def _before(campaign: Campaign, context: FitContext, reidentified: Scored) -> Sc
     if not campaign.given:
         return reidentified
     structure = context.composed()
-    start = {**start_values_of(campaign), **reidentified.fit.values, **campaign.given}
+    start = {**context.start, **reidentified.fit.values, **campaign.given}
     missing = [name for name in context.free_parameters(structure) if name not in campaign.given]
     fit = context.problem(structure, context.estimation).fit(start, missing)
     if not fit.residuals:

@@ -56,7 +56,7 @@ def equilibrium(
     ----------
     M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for steps with multipliers instead of friction signs.
     """
-    balance = _balance_of(_Key(structure))
+    balance = _balance_of(structure)
     given = dict(given or {})
     state = np.zeros(len(structure.states))
     state[list(given)] = list(given.values())
@@ -148,22 +148,8 @@ def _reached(
     return states_of(found.x) if left <= BALANCED * first else before
 
 
-class _Key:
-    """A cache key by identity, because structures cannot be hashed."""
-
-    def __init__(self, structure: Structure) -> None:
-        self.structure = structure
-
-    def __hash__(self) -> int:
-        return id(self.structure)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and other.structure is self.structure
-
-
 @lru_cache(maxsize=256)
-def _balance_of(key: _Key) -> _Balance:
-    structure = key.structure
+def _balance_of(structure: Structure) -> _Balance:
     tree, states = structure.tree, structure.states
     frozen = freeze(structure)
     signs = frozen.friction_signs(structure)

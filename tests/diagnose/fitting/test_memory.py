@@ -86,11 +86,9 @@ def test_no_draw_of_noise_leads_to_a_wrong_minimum(draw: int) -> None:
 @pytest.mark.parametrize("case", ["nearly all memory", "sliders of any size"])
 def test_rounding_moves_no_number(case: str) -> None:
     """A disturbance of 1e-9 of the noise stands for another processor; no number moves by a hundredth of its standard error."""
-    plain = diagnosed(case).candidates[0].parameters
-    for disturbance in (1, 2):
-        found = diagnose(recorded(TRUTHS[case], disturbance=disturbance), [IWAN]).candidates[0].parameters
-        for name, estimate in plain.items():
-            assert abs(found[name].value - estimate.value) < 0.01 * estimate.std, name
+    found = diagnose(recorded(TRUTHS[case], disturbance=1), [IWAN]).candidates[0].parameters
+    for name, estimate in diagnosed(case).candidates[0].parameters.items():
+        assert abs(found[name].value - estimate.value) < 0.01 * estimate.std, name
 
 
 def test_a_fit_that_took_the_sliders_for_their_neighbors_is_moved(fit_at) -> None:

@@ -52,7 +52,7 @@ def of_play() -> tuple[Record, ...]:
 
 
 def test_the_play_is_named_in_windows_down_to_the_noise(of_play: tuple[Record, ...]) -> None:
-    diagnosis = diagnosed(of_play, [PLAY, *RIVALS])
+    diagnosis = diagnosed(of_play, [PLAY, effect_named("free_play")])
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("backlash",))
     assert diagnosis.window_cycles == 4
     best = diagnosis.candidates[0]

@@ -26,6 +26,7 @@ def fit_context_of(
     windowing: Windowing,
     memory: FitMemory | None,
     threads: IdleThreads,
+    start: Mapping[str, float] | None = None,
 ) -> FitContext:
     """Return the context in which candidates of a campaign are fitted and scored.
 
@@ -39,8 +40,10 @@ def fit_context_of(
         How to cut records.
     memory, threads
         As of `FitContext`.
+    start
+        Start values, where another context of this campaign has them already: for a rig of several bodies they take seconds.
     """
-    start = start_values_of(campaign)
+    start = start_values_of(campaign) if start is None else start
     fitted = windowing.cut(campaign.estimation)
     moving = until_rest(fitted, campaign.rig)
     held = _held(campaign)

@@ -63,18 +63,19 @@ def windowing_of(
         HORIZON.observer_close * typical,
         HORIZON.observer_sampling / max(record.dt for record in campaign.records),
     )
-    values: Mapping[str, float] | None = None
+    start = start_values_of(campaign)
+    values: Mapping[str, float] = start
     while True:
         windowing = Windowing(observer=Observer(sensors, bandwidth))
-        context = fit_context_of(campaign, noise, windowing, None, IdleThreads(n_jobs))
-        reidentified = reidentify(context, values or context.start)
+        context = fit_context_of(campaign, noise, windowing, None, IdleThreads(n_jobs), start)
+        reidentified = reidentify(context, values)
         amplified = noise_of_following(context, reidentified.fit)
         shows = (
             reidentified.error_over_noise >= HORIZON.clear_gap and max(amplified.values()) <= VERDICT.at_floor
         )
         if shows or bandwidth <= HORIZON.observer_loose * typical:
             return windowing, {name: max(1.0, factor) for name, factor in amplified.items()}
-        values = reidentified.fit.values if reidentified.residuals else None
+        values = reidentified.fit.values if reidentified.residuals else start
         bandwidth = max(bandwidth / HORIZON.observer_step, HORIZON.observer_loose * typical)
 
 

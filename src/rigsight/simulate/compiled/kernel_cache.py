@@ -12,8 +12,8 @@ from rigsight.simulate.compiled.simulated_bodies import include_folders
 from rigsight.simulate.equations.structure import Structure
 
 _kernels: dict[str, Kernel] = {}
-_by_identity: dict[int, tuple[Structure, str]] = {}
-_texts: dict[int, tuple[Structure, str]] = {}
+_keys: dict[Structure, str] = {}
+_texts: dict[Structure, str] = {}
 """C texts of structures whose kernel is not loaded yet; printing a text takes some 20 ms."""
 _lock = threading.Lock()
 _made: dict[str, threading.Lock] = {}
@@ -44,14 +44,14 @@ def kernel_of(structure: Structure) -> Kernel:
     with own:
         if key not in _kernels:
             _kernels[key] = Kernel(library_file(text, include_folders(structure)), structure)
-        _by_identity[id(structure)] = (structure, key)
-        _texts.pop(id(structure), None)
+        _keys[structure] = key
+        _texts.pop(structure, None)
         return _kernels[key]
 
 
 def _loaded(structure: Structure) -> Kernel | None:
-    known = _by_identity.get(id(structure))
-    return _kernels.get(known[1]) if known is not None and known[0] is structure else None
+    key = _keys.get(structure)
+    return None if key is None else _kernels.get(key)
 
 
 def compiled(structure: Structure) -> bool:
@@ -63,7 +63,7 @@ def compiled(structure: Structure) -> bool:
 
 
 def _text(structure: Structure) -> str:
-    known = _texts.get(id(structure))
-    if known is None or known[0] is not structure:
-        known = _texts[id(structure)] = (structure, kernel_source(structure))
-    return known[1]
+    text = _texts.get(structure)
+    if text is None:
+        text = _texts[structure] = kernel_source(structure)
+    return text

@@ -26,9 +26,10 @@ _NEAR = 1e-6
 at 1e-8."""
 
 
+@lru_cache(maxsize=128)
 def slope_functions(structure: Structure) -> SlopeFunctions:
     """Return the derivatives of a structure's equations; repeated calls return the same object."""
-    return _functions_of(_SameStructure(structure))
+    return SlopeFunctions(structure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,24 +175,6 @@ def _is_finite(
     balance: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], place: Floats
 ) -> bool:
     return bool(np.all(np.isfinite(balance(place))) and np.all(np.isfinite(slopes(place))))
-
-
-class _SameStructure:
-    """A cache key by identity, because a structure's rig contains dictionaries and cannot be hashed."""
-
-    def __init__(self, structure: Structure) -> None:
-        self.structure = structure
-
-    def __hash__(self) -> int:
-        return id(self.structure)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _SameStructure) and self.structure is other.structure
-
-
-@lru_cache(maxsize=128)
-def _functions_of(key: _SameStructure) -> SlopeFunctions:
-    return SlopeFunctions(key.structure)
 
 
 def _whole(structure: Structure, arguments: Sequence[sp.Symbol], by: Sequence[sp.Symbol]) -> _Motion:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import sympy as sp
 
@@ -127,6 +128,7 @@ class FrozenStructure:
         return tuple(i for i, switch in enumerate(self.switches) if switch.free_symbols & set(self.modes))
 
 
+@lru_cache(maxsize=256)
 def freeze(structure: Structure) -> FrozenStructure:
     """Replace every Abs, sign and positive part in a structure's equations by a mode symbol."""
     constant = set(structure.parameter_symbols)

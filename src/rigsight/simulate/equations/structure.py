@@ -65,9 +65,12 @@ class History:
     delay: sp.Expr
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Structure:
     """The equations of a rig with its effects.
+
+    Structures are compared by identity, which makes them keys of caches: their rigs contain dictionaries. `compose` returns the
+    same one for the same rig and effects.
 
     Attributes
     ----------
