@@ -18,7 +18,7 @@ import numpy as np
 
 from rigsight.blind import draw_trial
 from rigsight.campaign import Campaign
-from rigsight.diagnose.examination import fit_context_of
+from rigsight.diagnose.fitting.preparation import fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
 from rigsight.diagnose.noise.detection import noise_floors

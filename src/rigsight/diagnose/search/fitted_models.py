@@ -1,0 +1,236 @@
+"""Which models are fitted: the equations alone, with each effect, and with several; on whole records or in windows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigsight.campaign import Campaign
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
+from rigsight.diagnose.fitting.windows import Windowing, leading_output
+from rigsight.diagnose.noise.adequacy import Checks
+from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.search.places import Search, search_places
+from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
+from rigsight.diagnose.search.several.evidence_for_more import OtherForms
+from rigsight.diagnose.search.several.pairs import refit_singles
+from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
+from rigsight.diagnose.search.several.several_effects import several_effects
+from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.effects import Effect
+from rigsight.errors import InputError, SimulationError
+from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
+from rigsight.simulate import Structure
+
+
+@dataclass(frozen=True)
+class SingleModels:
+    """Models with at most one effect, fitted and scored on the same records.
+
+    Attributes
+    ----------
+    windowing
+        How records were cut.
+    context
+        Records, scales and noise.
+    before, reidentified
+        The given simulation, and its equations with refitted parameters.
+    singles
+        Every effect by itself.
+    search
+        Where and for which effects was searched.
+    """
+
+    windowing: Windowing
+    context: FitContext
+    before: Scored
+    reidentified: Scored
+    singles: list[Scored]
+    search: Search
+
+
+@dataclass(frozen=True)
+class AllModels:
+    """Models with any number of effects, fitted and scored on the same records.
+
+    Attributes
+    ----------
+    alone
+        Those with at most one effect.
+    several
+        Those with two and three effects.
+    are_in_windows
+        Whether they are fitted and scored in windows of a few cycles, because the motion is sensitive to small disturbances.
+    checks
+        Say whether the residual of a model is noise and disturbance.
+    forms
+        Say how much another form of an effect would explain; of whole records.
+    """
+
+    alone: SingleModels
+    several: list[Scored]
+    are_in_windows: bool
+    checks: Checks
+    forms: OtherForms
+
+
+def single_models(
+    campaign: Campaign,
+    noise: Mapping[str, float],
+    effects: Sequence[Effect],
+    windowing: Windowing,
+    n_jobs: int,
+    say: Callable[[str], None],
+    prepare: Prepare | None,
+    memory: FitMemory | None,
+) -> SingleModels:
+    """Fit and score the given simulation, its equations and every candidate.
+
+    Parameters
+    ----------
+    campaign
+        Records and the given simulation.
+    noise
+        Noise floor of each output.
+    effects
+        Candidates.
+    windowing
+        How to cut records.
+    n_jobs, say, prepare, memory
+        As of `diagnose`.
+
+    Raises
+    ------
+    InputError
+        If the given simulation cannot be run.
+    SimulationError
+        If the rig's own equations cannot be simulated near the records.
+    """
+    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs))
+    reidentified = reidentify(context, context.start)
+    if not reidentified.residuals:
+        raise SimulationError(
+            f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
+        )
+    bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
+    if bent or not campaign.rig.has_one_motion:
+        # Motion and forces between the sensors are known once the equations fit, or from the given simulation.
+        known = {**campaign.constants, **reidentified.fit.values, **(campaign.given if bent else {})}
+        context = replace(context, scales=characteristic_scales(campaign.rig, campaign.estimation, known))
+    say("re-identified")
+    before = _before(campaign, context, reidentified)
+    if campaign.given:
+        say("given simulation")
+    search = search_places(context, reidentified, context.offered(effects))
+    say("suspects")
+    if prepare is not None:
+        prepare([context.simplest((effect,)) for effect in search.effects])
+    singles = fit_candidates(context, reidentified, search.effects, say)
+    if (
+        search.others
+        and min((model.error_over_noise for model in singles), default=np.inf) > VERDICT.at_floor
+    ):
+        # A right model must not be lost because places or effects were ranked wrongly.
+        if prepare is not None:
+            prepare([context.simplest((effect,)) for effect in search.others])
+        singles = fit_candidates(context, reidentified, search.others, say, singles)
+    return SingleModels(windowing, context, before, reidentified, singles, search)
+
+
+def with_several_effects(
+    campaign: Campaign,
+    noise: Mapping[str, float],
+    models: SingleModels,
+    effects: Sequence[Effect],
+    lower_bound: bool,
+    allowed: float,
+    rng: np.random.Generator,
+    say: Callable[[str], None],
+    prepare: Prepare | None,
+) -> AllModels:
+    """Fit and score several effects together where one does not explain the records; all in windows where only these can decide.
+
+    Parameters
+    ----------
+    campaign, noise
+        As of `single_models`.
+    models
+        Those with at most one effect.
+    effects
+        Candidates.
+    lower_bound
+        True if the noise floor is only a lower bound.
+    allowed
+        Error that a named cause may leave, in units of the noise floor.
+    rng
+        Source of the small disturbances, and of the turned signs of the checks.
+    say, prepare
+        As of `diagnose`.
+    """
+    context, whole = models.context, models.windowing.whole
+    at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
+    most_left = np.inf if lower_bound else VERDICT.most_left
+    forms = OtherForms(context, lower_bound)
+    cut: SingleModels | None = None
+    if whole and not is_predictable(context, models.reidentified, models.singles, at_floor, rng):
+        cut = _in_windows(campaign, noise, models)
+        say("in windows")
+        if _explained(cut, cut.singles, at_floor):
+            return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_left), forms)
+    checks = Checks(context, rng, VERDICT.at_floor, most_left)
+    found = several_effects(
+        context, models.reidentified, models.singles, effects, forms, checks, lower_bound, prepare
+    )
+    models = replace(models, singles=refit_singles(context, models.singles, found))
+    if whole and not is_predictable(context, models.reidentified, found, allowed, rng):
+        cut = cut or _in_windows(campaign, noise, models)
+        pairs = pairs_in_windows(context, cut.context, models.reidentified, found)
+        say("pairs in windows")
+        if _explained(cut, pairs, VERDICT.at_floor):
+            return AllModels(cut, pairs, True, Checks(cut.context, rng, VERDICT.at_floor, most_left), forms)
+    return AllModels(models, found, False, checks, forms)
+
+
+def _in_windows(campaign: Campaign, noise: Mapping[str, float], models: SingleModels) -> SingleModels:
+    """Return the models in windows of a few cycles."""
+    leading = leading_output(campaign.rig, campaign.records)
+    windowing = Windowing.by_cycles({leading: noise[leading], **noise})
+    known = models.context
+    context = fit_context_of(campaign, noise, windowing, known.memory, known.threads, known.start)
+    reidentified = reidentify(context, models.reidentified.fit.values)
+    singles = fitted_in_windows(context, reidentified, models.singles)
+    before = _before(campaign, context, reidentified) if reidentified.residuals else models.before
+    return SingleModels(windowing, context, before, reidentified, singles, models.search)
+
+
+def _explained(cut: SingleModels, models: Sequence[Scored], at_floor: float) -> bool:
+    """Return True if one of the models explains the records in windows and the equations without an effect do not."""
+    best = min((model.error_over_noise for model in models), default=float("inf"))
+    return bool(cut.reidentified.residuals) and best <= at_floor < cut.reidentified.error_over_noise
+
+
+def _before(campaign: Campaign, context: FitContext, reidentified: Scored) -> Scored:
+    """Score the given simulation; parameters that were not given are identified with the given ones held."""
+    if not campaign.given:
+        return reidentified
+    structure = context.composed()
+    start = {**context.start, **reidentified.fit.values, **campaign.given}
+    missing = [name for name in context.free_parameters(structure) if name not in campaign.given]
+    fit = context.problem(structure, context.estimation).fit(start, missing)
+    if not fit.residuals:
+        raise InputError(_why_not_run(context, structure, start))
+    return context.score((), fit)
+
+
+def _why_not_run(context: FitContext, structure: Structure, values: Mapping[str, float]) -> str:
+    """Name the records that the given simulation cannot follow, with what decides it."""
+    failing = [r for r in context.estimation if not context.problem(structure, [r]).fit(values, ()).residuals]
+    told = ", ".join(f"'{record.name}' (sample time {record.dt:.3g} s)" for record in failing[:5])
+    where = f" in {told}" if told else ""
+    return (
+        f"The given simulation cannot be run: with the given parameters the motion{where} diverges or is too fast for the sample "
+        f"time. Check the units of time and input, and the given parameters."
+    )
