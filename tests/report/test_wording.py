@@ -8,7 +8,13 @@ import pytest
 from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.report.quantities import Written, estimate_text, gap_percent, written
-from rigsight.report.wording import percent, remainder_sentence, verdict_name, verdict_sentence
+from rigsight.report.wording import (
+    percent,
+    remainder_sentence,
+    verdict_name,
+    verdict_sentence,
+    what_is_probable,
+)
 
 
 @pytest.mark.parametrize(
@@ -45,6 +51,24 @@ def test_no_gap_far_above_the_floor_says_that_the_floor_seems_too_low(
     assert "correlates with no signal" in sentence
     assert "noise floor is probably too low" in sentence
     assert "too small" not in sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("effect", "Bouc-Wen hysteresis"), ("parameters", "no missing effect"), ("none", "no missing effect"),
+        ("unknown", "a cause not tried"),
+    ],
+)  # fmt: skip
+def test_every_verdict_has_the_probability_of_what_it_states(
+    variant: Callable[[str], Diagnosis], name: str, cause: str
+) -> None:
+    diagnosis = variant(name)
+    tried = {candidate.effects: candidate.probability for candidate in diagnosis.candidates}
+    stated = 1.0 - sum(tried.values()) if name == "unknown" else tried.get(diagnosis.effects, 0.0)
+    assert diagnosis.probability == pytest.approx(stated)
+    assert diagnosis.to_json()["probability"] == diagnosis.probability
+    assert what_is_probable(diagnosis) == cause
 
 
 def test_an_unknown_cause_says_with_what_the_rest_goes(variant: Callable[[str], Diagnosis]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -23,7 +22,14 @@ from rigsight.diagnose.noise.detection import AT_REST
 from rigsight.diagnose.noise.disturbance import disturbance
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, LikelyCauses, OutputGap
+from rigsight.diagnose.result import (
+    Candidate,
+    Diagnosis,
+    Estimate,
+    LikelyCauses,
+    OutputGap,
+    probability_not_tried,
+)
 from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.uncertainty.of_verdict import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
@@ -225,7 +231,7 @@ def _situation(found: Examination) -> Situation:
 
 def _likely(candidates: Sequence[Candidate], least: float) -> LikelyCauses:
     """Return the causes with at least the required probability, and always the most probable one."""
-    outside = max(0.0, 1.0 - math.fsum(candidate.probability for candidate in candidates))
+    outside = probability_not_tried(candidates)
     most = max(outside, *(candidate.probability for candidate in candidates))
     enough = min(least, most)
     sets = tuple(candidate.effects for candidate in candidates if candidate.probability >= enough)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
@@ -105,6 +106,11 @@ class Candidate:
     message: str
     grounds: Grounds | None = None
     std_method: StdMethod = "formula"
+
+
+def probability_not_tried(candidates: Sequence[Candidate]) -> float:
+    """Return the probability of a cause that is none of the candidates."""
+    return max(0.0, 1.0 - math.fsum(candidate.probability for candidate in candidates))
 
 
 @dataclass(frozen=True)
@@ -214,6 +220,13 @@ class Diagnosis:
     trust: Trust | None = None
     given: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def probability(self) -> float:
+        """Probability of what the verdict states: the named effects, no missing effect, or for ``unknown`` a cause not tried."""
+        if self.verdict == "unknown":
+            return probability_not_tried(self.candidates)
+        return next((c.probability for c in self.candidates if c.effects == self.effects), 0.0)
+
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
         return {
@@ -221,6 +234,7 @@ class Diagnosis:
             "title": self.title,
             "rig": self.rig,
             "verdict": self.verdict,
+            "probability": _number(self.probability),
             "effects": list(map(kind_of, self.effects)),
             "where": list(self.where),
             "adequate": self.adequate,

@@ -38,6 +38,7 @@ from rigsight.report.wording import (
     times_floor,
     verdict_name,
     verdict_sentence,
+    what_is_probable,
 )
 
 _SCRIPT = files("rigsight.report") / "templates" / "chart.js"
@@ -85,11 +86,8 @@ def render_report(
             rivals=[sentence_case(effects_label(effects)) for effects in diagnosis.ambiguous_with],
             effects=sections.effect_summaries(diagnosis, known),
             left={stage: times_floor(error_over_noise(diagnosis, stage)) for stage in STAGES},
-            probability=next(
-                (percent(c.probability) for c in diagnosis.candidates if c.effects == diagnosis.effects), ""
-            )
-            if diagnosis.effects
-            else "",
+            probability=percent(diagnosis.probability) if diagnosis.candidates else "",
+            what_is_probable=what_is_probable(diagnosis),
             rig_figure=rig_figure(diagnosis),
             budget=sections.budget_figure(diagnosis),
             budget_rows=sections.budget_rows(diagnosis),

@@ -29,12 +29,13 @@ from rigsight.report.wording import (
     stages_told,
     verdict_name,
     verdict_sentence,
+    what_is_probable,
 )
 
 _RANKED = 3
 _ADVICES = 1
 _FAULTS = 3
-"""Experiments told; the report holds all."""
+"""Candidates, experiments and faults shown; the report holds all."""
 _COLORS = {"effect": "bold green", "parameters": "bold green", "none": "bold green", "unknown": "bold yellow"}
 
 
@@ -99,6 +100,8 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         )
     if diagnosis.candidates:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
+        if not diagnosis.effects:
+            yield "probability", f"{percent(diagnosis.probability)} for {what_is_probable(diagnosis)}"
     named = named_candidate(diagnosis)
     if named is not None and named.parameters:
         own = diagnosis.model.get("effect_parameters", {}) if diagnosis.effects else named.parameters

@@ -37,6 +37,13 @@ _VERDICT_NAMES = {
 }
 
 
+_STATED = {
+    "parameters": "no missing effect",
+    "none": "no missing effect",
+    "unknown": "a cause not tried",
+}
+
+
 def listed(items: Iterable[str], last: str = "and") -> str:
     """Return ``"a, b and c"``."""
     texts = list(items)
@@ -314,6 +321,11 @@ def _deviations(separation: float) -> str:
         if separation >= 10.0
         else f"{separation:.2g} standard deviations"
     )
+
+
+def what_is_probable(diagnosis: Diagnosis) -> str:
+    """Return whose probability that of the diagnosis is: ``"a cause not tried"``."""
+    return effects_label(diagnosis.effects) if diagnosis.effects else _STATED[diagnosis.verdict]
 
 
 def basis_sentence(diagnosis: Diagnosis) -> str:
