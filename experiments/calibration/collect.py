@@ -2,7 +2,7 @@
 
     .venv/bin/python experiments/calibration/collect.py BENCH... [--left-out FOLDER...]
 
-A bench of another seed or design is added, one of the same is replaced. A folder of trials whose effect was left out of the
+A trial that is in the table keeps its first outcome. A folder of trials whose effect was left out of the
 candidates is one that `leave_one_out.py` wrote; its bench is named before it.
 """
 
@@ -29,7 +29,7 @@ def main() -> None:
     for folder in given.left_out:
         found += [trial for bench in given.bench for trial in _left_out(bench, folder)]
     known = {_name(trial): trial for trial in (read_table() if FILE.exists() else [])}
-    known |= {_name(trial): trial for trial in found}
+    known = {_name(trial): trial for trial in found} | known
     write_table(known.values())
     print(f"{len(found)} trials read, {len(known)} in {FILE}.")
 

@@ -247,6 +247,16 @@ def test_the_number_of_jobs_does_not_change_the_result(cubic: Diagnosis, cubic_r
     assert json.dumps(parallel.to_json()) == json.dumps(cubic.to_json())
 
 
+def test_a_given_simulation_that_cannot_follow_a_validation_record_is_told() -> None:
+    """Its spring softens so much that the strongest input, which only judges, carries it over the barrier."""
+    records = measured(AXIS, (), STAGE, [sweep(amplitude) for amplitude in (1.0, 0.5, 6.0)])
+    softening = effect_named("cubic_stiffness")
+    given = {**GIVEN, "k_3": -800.0 / 0.03**2}
+    campaign = Campaign("stage", AXIS, {"gain": 1.0}, given, records, (softening,))
+    with pytest.raises(InputError, match=r"The given simulation cannot be run: .*'run 2'.*diverges"):
+        diagnose(campaign, [effect_named("quadratic_damping")])
+
+
 def test_json_follows_the_contract(cubic: Diagnosis) -> None:
     content = json.loads(json.dumps(cubic.to_json(), allow_nan=False))
     assert content["schema_version"] == 1

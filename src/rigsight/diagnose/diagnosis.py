@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -141,7 +142,10 @@ def _assembled(
     measured = _measured(rig, context.scoring)
     traces = traces_of(context, before, reidentified, after)
     scored = [trace for trace in traces if trace.role == scored_on]
-    at_floor = {name: noise[name].std / float(np.std(values)) for name, values in measured.items()}
+    at_floor = {
+        name: noise[name].std / spread if (spread := float(np.std(values))) > 0.0 else math.inf
+        for name, values in measured.items()
+    }
     gap = {
         name: OutputGap(
             before=nrmse(_column(rig, before, name), measured[name]),
@@ -276,7 +280,7 @@ def _with_disturbance(
 
 def _up_to(floor: NoiseFloor, left: NDArray[np.float64]) -> NoiseFloor:
     """Return a lower bound with the upper limit that an adequate model's remainder gives it; another floor as it is."""
-    if not floor.lower_bound:
+    if not floor.lower_bound or not left.size:
         return floor
     return replace(floor, interval=(floor.interval[0], max(float(np.std(left)), floor.std)))
 

@@ -47,7 +47,7 @@ class Examination:
         Records, scales and noise.
     windowing
         How records were cut.
-    before, linear
+    before, reidentified
         The given simulation, and its equations with refitted parameters.
     ranking
         The candidates.

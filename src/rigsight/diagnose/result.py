@@ -305,9 +305,11 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         },
         "std_method": candidate.std_method,
         "n_fitted": len(candidate.parameters),
-        "ranking_share": None if candidate.grounds is None else candidate.grounds.share,
-        "held_out_share": None if candidate.grounds is None else candidate.grounds.held_out,
-        "log_evidence": None if candidate.grounds is None else candidate.grounds.evidence,
+        "ranking_share": None if candidate.grounds is None else _number(candidate.grounds.share),
+        "held_out_share": None if candidate.grounds is None else _number(candidate.grounds.held_out),
+        "log_evidence": None
+        if candidate.grounds is None or candidate.grounds.evidence is None
+        else _number(candidate.grounds.evidence),
         "success": candidate.success,
         "message": candidate.message,
     }

@@ -12,9 +12,10 @@ from scipy.signal import lfilter
 from scipy.stats import kstest
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
+from rigsight.diagnose.noise.adequacy import Adequacy, Agreement, adequacy
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.single_effects import reidentify
+from rigsight.diagnose.verdict.remainder import remainder_of
 from rigsight.effects import Effect, effect_named, placed
 from rigsight.identify import characteristic_scales
 from rigsight.records.record import Record
@@ -170,6 +171,28 @@ def test_what_stands_in_a_few_stretches_is_no_noise() -> None:
     found = asked(struck, reidentify(struck, VALUES))
     assert not found.adequate
     assert not found.is_spread
+
+
+def test_of_a_residual_in_a_few_stretches_the_whole_remains() -> None:
+    """What a small part of it correlates with by chance is not told, nor how probable that is."""
+    by_chance = Agreement("velocity of dynamics", "dynamics", 0.4, 0.002)
+    found = Adequacy(0.4, (by_chance,), is_spread=False)
+    model = reidentify(axis_bench(), VALUES)
+    without, model = (replace(model, error_over_noise=left) for left in (20.0, 6.0))
+    for lower_bound, share in ((True, 36.0 / 400.0), (False, 35.0 / 399.0)):
+        left = remainder_of(without, model, found, lower_bound, beside_a_cause=True)
+        assert left.share == pytest.approx(share)
+        assert "concentrated in a few stretches of the records" in left.text
+        assert "p = " not in left.text
+
+
+def test_a_record_without_a_sensor_has_no_quieter_residual(train: Any) -> None:
+    """Records of small motion that lack one of two sensors: white noise does not grow with the motion."""
+    gentle, middle, strong = sorted(train.records(), key=lambda record: float(np.std(record["load_angle"])))
+    alone = replace(gentle, signals={n: s for n, s in gentle.signals.items() if n != "motor_angle"})
+    context = train_bench(train, [replace(alone, role="validation"), middle, strong])
+    model = reidentify(context, train.values)
+    assert adequacy(context, model, np.random.default_rng(1), of_steady_size=True).adequate
 
 
 def test_a_rounded_sign_is_another_form_and_no_second_effect() -> None:

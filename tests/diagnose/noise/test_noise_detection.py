@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +13,7 @@ from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
-from rigsight.rigs import AXIS, RUNNING_GEAR
+from rigsight.rigs import AXIS, RIGS, RUNNING_GEAR
 from rigsight.simulate import compose, simulate
 
 DT = 5e-3
@@ -84,6 +87,47 @@ def test_repeated_records_that_start_in_different_motion() -> None:
     floor = floor_of(*records)
     assert "repeated" in floor.method
     assert floor.std == pytest.approx(SIGMA, rel=3.0 / np.sqrt(2.0 * 2000))
+
+
+@pytest.mark.parametrize("change", [{"constants": {"payload": 2.0}}, {"dt": 0.5 * DT}])
+def test_the_same_input_to_another_rig_is_no_repeat(change: dict[str, Any]) -> None:
+    """Another payload, or the same samples played twice as fast."""
+    rng = np.random.default_rng(11)
+    u = linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)
+    one, other = (axis_record(u, a * driven(u) + SIGMA * rng.standard_normal(u.size)) for a in (1.0, 1.2))
+    assert "repeated" in floor_of(one, other).method
+    assert "repeated" not in floor_of(one, replace(other, **change)).method
+
+
+def test_repeated_records_of_a_rig_with_two_inputs() -> None:
+    rng = np.random.default_rng(12)
+    chirp = linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)
+    rig = next(rig for rig in RIGS.values() if len(rig.inputs) == 2)
+    answer = rng.standard_normal(chirp.size)
+    records = [
+        Record(
+            name=f"r{i}",
+            dt=DT,
+            signals={source.name: chirp for source in rig.inputs}
+            | {sensor.name: answer + SIGMA * rng.standard_normal(chirp.size) for sensor in rig.outputs},
+            units={},
+        )
+        for i in range(2)
+    ]
+    for floor in noise_floors(rig, records):
+        assert "repeated" in floor.method
+        assert floor.std == pytest.approx(SIGMA, rel=3.0 / np.sqrt(2.0 * 750))
+
+
+def test_two_repeats_are_one_difference() -> None:
+    """Their deviations from the mean are equal and opposite; 95 % of the intervals contain the truth."""
+    rng = np.random.default_rng(13)
+    u = linear_sweep(DT * np.arange(2000), 4.0, 3.0, 50.0)
+    contained = []
+    for _ in range(200):
+        floor = floor_of(*(axis_record(u, SIGMA * rng.standard_normal(u.size)) for _ in range(2)))
+        contained.append(floor.interval[0] <= SIGMA <= floor.interval[1])
+    assert 0.88 <= np.mean(contained) <= 0.99
 
 
 def test_repetitions_see_the_disturbance_too() -> None:

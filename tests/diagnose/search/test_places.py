@@ -65,3 +65,12 @@ def test_a_record_may_lack_a_sensor(train: Any) -> None:
     )
     assert found.verdict == "none"
     assert np.isfinite(found.gap["motor_angle"].after)
+
+
+def test_a_sensor_may_stand_still_in_the_validation_record(train: Any) -> None:
+    """Relative to a motion of nothing no error has a size."""
+    records = train.records()
+    still = records[2].with_signals(load_angle=np.zeros(records[2].n_samples))
+    found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, (*records[:2], still)), EFFECTS[:1])
+    assert found.gap["load_angle"].noise_floor == np.inf
+    assert found.to_json()["gap"]["load_angle"]["noise_floor"] is None

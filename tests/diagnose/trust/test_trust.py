@@ -137,6 +137,10 @@ def test_a_stiffness_that_drifts_from_record_to_record_differs_with_time() -> No
     found = asked(axis_records((1.0,) * 4, by_record=drift))
     stiffness = number(found, "k")
     assert (stiffness.pattern, stiffness.direction) == (Pattern.TIME, 1)
+    assert stiffness.points_to is not None
+    assert "changes slowly" in stiffness.points_to.cause, (
+        "and not what stands for mass, stiffness and damping together"
+    )
     for i, one in enumerate(stiffness.groups["record"]):
         assert abs(one.value - drift[i]["k"]) < 4.0 * one.std
     assert all(number(found, name).stable for name in ("m", "d"))

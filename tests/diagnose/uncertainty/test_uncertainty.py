@@ -172,6 +172,18 @@ def test_sizes_of_forces_and_noise_are_found_again() -> None:
     assert found.force_std[0, 0] < 0.3
 
 
+def test_a_force_that_no_sensor_shows_leaves_the_others_as_they_are() -> None:
+    rng, dt, corners = np.random.default_rng(5), 0.01, np.array([np.inf])
+    white = rng.standard_normal((2000, 4))
+    left = 2.0 * white[:, :1] + 0.1 * rng.standard_normal((2000, 1))
+    own = rng.standard_normal((2000, 4))
+    noise = [[(own, own[:, None])]]
+    shown = [[(white, white[:, None])], [(np.ones((2000, 1)), np.zeros((2000, 1, 1)))]]
+    alone, beside = (likeliest_sources([left], noise, forces, [dt], corners) for forces in (shown[:1], shown))
+    np.testing.assert_allclose(beside.noise_std, alone.noise_std)
+    np.testing.assert_allclose(beside.force_std, [*alone.force_std, [0.0]])
+
+
 def test_colored_forces_have_variance_one_from_the_first_sample() -> None:
     drawn = colored((400, 3000), 0.05, np.random.default_rng(0))
     assert np.var(drawn[0]) == pytest.approx(1.0, rel=0.1)

@@ -38,7 +38,7 @@ def asked_offsets(
     ----------
     context
         Records as they were fitted, without free offsets.
-    linear, singles
+    reidentified, singles
         The re-identified equations, and every effect by itself.
     allowed
         Error that a named cause may leave, in units of the noise floor.

@@ -43,6 +43,8 @@ _PORTIONS = 10
 """Turns are counted a tenth at a time, so that they need no more than some ten megabytes."""
 _SINGULAR = 1e-9
 """Keeps a turn that parameters could follow whole from a division by zero."""
+CONCENTRATED = "a few stretches of the records"
+"""Where a residual is found that correlates with nothing and yet is not noise."""
 _TOO_FAST = "motion that is too fast for the sample time"
 """What a model is blamed for whose steps between samples cannot be as short as its motion needs: nothing can be compared."""
 
@@ -101,7 +103,7 @@ class Adequacy:
         if self.adequate:
             return ""
         if self.p_value >= self.significance:
-            return "a few stretches of the records"
+            return CONCENTRATED
         return self.agreements[0].what
 
     @property
@@ -258,13 +260,14 @@ def _smallest(found: Sequence[_Turned]) -> float:
 
 def _is_spread(answers: Answers) -> bool:
     stretches = _stretches(answers, VERDICT.stretches // 2)
-    powers = np.array([float(np.mean(answers.seen_left[part] ** 2)) for part in stretches])
-    return float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= VERDICT.least_spread * len(stretches)
+    powers = np.array([_power_left(answers, part) for part in _measured_in(answers, stretches)])
+    return float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= VERDICT.least_spread * powers.size
 
 
 def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:
     """Return the dependence of the size of the residual on the size of the motion: the most significant of several."""
-    left = [float(np.mean(answers.seen_left[part] ** 2)) for part in stretches]
+    stretches = _measured_in(answers, stretches)
+    left = [_power_left(answers, part) for part in stretches]
     rig = answers.context.rig
     moving: list[tuple[str, str, Sequence[Floats]]] = []
     for joint in motion_columns(rig):
@@ -281,6 +284,16 @@ def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:
         return None
     p_value, what, place = min(told)
     return Agreement(what, place, min(1.0, len(told) * p_value), 1.0)
+
+
+def _measured_in(answers: Answers, stretches: Sequence[slice]) -> list[slice]:
+    """Return the stretches in which a sensor was recorded."""
+    return [part for part in stretches if np.any(answers.is_measured[part])]
+
+
+def _power_left(answers: Answers, part: slice) -> float:
+    """Return the mean square of the residual of the readings that were measured."""
+    return float(np.mean(answers.seen_left[part][answers.is_measured[part]] ** 2))
 
 
 def _powers(answers: Answers, signals: Sequence[Floats], stretches: Sequence[slice]) -> list[float]:

@@ -12,9 +12,11 @@ to that floor.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import helmert
 
 from rigsight.diagnose.noise.block_means import block_means
 from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
@@ -50,7 +52,7 @@ def noise_floors(
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]
         if holding:
-            std, method, stretches = _noise_floor(rig, signal.name, holding, drifts, at_rest)
+            std, method, stretches, independent = _noise_floor(rig, signal.name, holding, drifts, at_rest)
             lower_bound = method == _WHITE_ONLY or (not rig.is_driven and method == AT_REST)
             spread = max(float(np.std(record[signal.name])) for record in holding)
             size = spread or max(float(np.max(np.abs(record[signal.name]))) for record in holding) or 1.0
@@ -61,18 +63,20 @@ def noise_floors(
                     max(std, _SMALLEST * size),
                     method,
                     lower_bound=lower_bound,
-                    interval=_interval(std, stretches, lower_bound),
+                    interval=_interval(std, independent, lower_bound),
                     stretches=stretches,
                 )
             )
     return tuple(floors)
 
 
-def _interval(std: float, stretches: Stretches, lower_bound: bool) -> tuple[float, float]:
-    """Return 95 % limits of a standard deviation: those of blocks of the pieces of noise that it was estimated from."""
-    if lower_bound or not stretches:
+def _interval(
+    std: float, independent: Sequence[NDArray[np.float64]], lower_bound: bool
+) -> tuple[float, float]:
+    """Return 95 % limits of a standard deviation: those of blocks of independent pieces of the noise."""
+    if lower_bound or not independent:
         return std, np.inf
-    squares = block_means([samples**2 for samples, _ in stretches])
+    squares = block_means([samples**2 for samples in independent])
     degrees, mean = squares.size, float(np.mean(squares))
     if mean == 0.0:
         return std, np.inf
@@ -83,7 +87,8 @@ def _interval(std: float, stretches: Stretches, lower_bound: bool) -> tuple[floa
 
 def _noise_floor(
     rig: Rig, output: str, records: Sequence[Record], drifts: bool, at_rest: bool
-) -> tuple[float, str, Stretches]:
+) -> tuple[float, str, Stretches, list[NDArray[np.float64]]]:
+    """Return standard deviation, method, pieces of noise, and as many independent pieces as they hold."""
     sources = [signal.name for signal in rig.inputs]
     repeated = _repeated(sources, output, records)
     if drifts:
@@ -94,7 +99,9 @@ def _noise_floor(
         squares = [np.var(group, axis=0, ddof=1) for group, _ in repeated]
         left = [(row - np.mean(group, axis=0), dt) for group, dt in repeated for row in group]
         scatter = float(np.sqrt(np.mean([float(np.mean(square)) for square in squares])))
-        return scatter, "repeated periods of the input", tuple(left)
+        # n deviations from their mean are n - 1 independent ones.
+        independent = [row for group, _ in repeated for row in helmert(len(group)) @ group]
+        return scatter, "repeated periods of the input", tuple(left), independent
     top = float(np.median([_top_of_spectrum(record[output]) for record in records]))
     if not rig.is_driven:
         # A measured force is not smoothed by a mass: jumps due to friction fill the whole spectrum.
@@ -102,48 +109,61 @@ def _noise_floor(
     quiet = [q for record in records if at_rest for q in _quiet_stretches(record, sources, output)]
     if quiet:
         deviations = [float(np.std(stretch)) for stretch, _ in quiet]
-        return max(float(np.median(deviations)), top), AT_REST, tuple(quiet)
-    return top, _WHITE_ONLY, ()
+        independent = [stretch for stretch, _ in quiet]
+        return max(float(np.median(deviations)), top), AT_REST, tuple(quiet), independent
+    return top, _WHITE_ONLY, (), []
+
+
+class _Segment(NamedTuple):
+    """A whole record, or one period of its input, with shapes (n_samples, n_inputs) and (n_samples,)."""
+
+    record: Record
+    driven: NDArray[np.float64]
+    output: NDArray[np.float64]
+    settled: bool
+
+    def repeats(self, other: _Segment, size: NDArray[np.float64]) -> bool:
+        """Return True if the rig was the same and was driven alike, up to noise of inputs of this size."""
+        return (
+            self.driven.shape == other.driven.shape
+            and bool(np.isclose(self.record.dt, other.record.dt))
+            and self.record.constants == other.record.constants
+            and all(map(differ_by_noise, other.driven.T, self.driven.T, size))
+        )
 
 
 def _repeated(
     sources: Sequence[str], output: str, records: Sequence[Record]
 ) -> list[tuple[NDArray[np.float64], float]]:
     """Return groups of answers to the same input, shape (n_repetitions, n_samples), within records and from one to the next."""
-    segments = []
+    segments: list[_Segment] = []
     for record in records:
         driven = inputs_of(record, sources)
         if not np.any(np.ptp(driven, axis=0)):
             continue  # of a rig left alone each motion is another
         period = _common_period(driven)
         if period is None:
-            segments.append((driven, record[output], False, record.dt))
+            segments.append(_Segment(record, driven, record[output], settled=False))
             continue
         count = record.n_samples // period
         # The first period still holds the transient.
         for i in range(1 if count > 1 else 0, count):
             part = slice(i * period, (i + 1) * period)
-            segments.append((driven[part], record[output][part], count > 1, record.dt))
+            segments.append(_Segment(record, driven[part], record[output][part], settled=count > 1))
     groups: list[tuple[NDArray[np.float64], float]] = []
     used: set[int] = set()
-    for i, (first_input, first_output, first_settled, dt) in enumerate(segments):
+    for i, first in enumerate(segments):
         if i in used:
             continue
-        size = np.std(first_input, axis=0)
+        size = np.std(first.driven, axis=0)
         size[size == 0.0] = 1.0
-        group, settled = [first_output], first_settled
-        for j in range(i + 1, len(segments)):
-            other_input, other_output, other_settled, _ = segments[j]
-            if other_input.shape != first_input.shape or j in used:
-                continue
-            if all(map(differ_by_noise, other_input.T, first_input.T, size)):
-                group.append(other_output)
-                settled = settled and other_settled
-                used.add(j)
-        if len(group) > 1:
+        alike = [j for j in range(i + 1, len(segments)) if j not in used and first.repeats(segments[j], size)]
+        used.update(alike)
+        if alike:
+            group = [first, *(segments[j] for j in alike)]
             # Whole records may start with different motion; it has decayed by their second half.
-            start = 0 if settled else first_input.size // 2
-            groups.append((np.array(group)[:, start:], dt))
+            start = 0 if all(segment.settled for segment in group) else len(first.output) // 2
+            groups.append((np.array([segment.output for segment in group])[:, start:], first.record.dt))
     return groups
 
 

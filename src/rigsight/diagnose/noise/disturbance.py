@@ -70,11 +70,12 @@ def disturbance(
     if not (rig.has_one_motion and rig.is_driven):
         return None
     motion, follows = rig.motion, bandwidth or 0.0
-    inertia, damping, stiffness = (
-        evaluated(p, values) for p in (motion.inertia, motion.damping, motion.stiffness)
-    )
     variances, highest = [], 0.0
     for record, residual in zip(records, left, strict=True):
+        own = {**values, **record.constants}
+        inertia, damping, stiffness = (
+            evaluated(part, own) for part in (motion.inertia, motion.damping, motion.stiffness)
+        )
         omega, power = _power(residual, record.dt)
         covered = np.flatnonzero(power < NOTES.disturbance_above * noise**2)
         stop = int(covered[0]) if covered.size else omega.size
@@ -85,7 +86,7 @@ def disturbance(
         variances.append((2.0 * float(np.sum(force)) / residual.size, residual.size))
         highest = max(highest, float(omega[-1]) if stop else 0.0)
     total = sum(size for _, size in variances)
-    variance = sum(own * size for own, size in variances) / total
+    variance = sum(single * size for single, size in variances) / total
     return Disturbance(float(np.sqrt(variance)), rig.units["force"], highest) if variance > 0.0 else None
 
 

@@ -196,7 +196,9 @@ def _most_likely(seen: Sequence[tuple[Floats, Floats]]) -> Floats:
     power = np.concatenate([own for own, _ in seen])
     gains = np.concatenate([own for _, own in seen])
     size = float(np.mean(power)) or 1.0
-    unit = size / np.maximum(np.mean(gains, axis=0), 1e-300)
+    gain = np.mean(gains, axis=0)
+    # A source that no reading shows has any power: it changes no spectrum.
+    unit = np.divide(size, gain, out=np.zeros_like(gain), where=gain > 0.0)
 
     def cost(logarithms: Floats) -> tuple[float, Floats]:
         own = np.exp(logarithms) * unit

@@ -262,11 +262,14 @@ class Answers:
         return np.concatenate([(part * w).ravel() for part, w in zip(parts, self._weights, strict=True)])
 
     @cached_property
+    def is_measured(self) -> NDArray[np.bool_]:
+        """Which of the stacked readings were measured: the others stand as zeros, shape (n,)."""
+        return self.stacked([np.ones_like(residual) for residual in self._residuals]) > 0.0
+
+    @property
     def n_measured(self) -> int:
         """Number of readings that were measured."""
-        return sum(
-            int(np.count_nonzero(w)) * r.n_samples for w, r in zip(self._weights, self.records, strict=True)
-        )
+        return int(np.count_nonzero(self.is_measured))
 
     def without_free(self, columns: Floats) -> Floats:
         """Return columns, shape (n,) or (n, m), after projecting out parameters and initial states."""

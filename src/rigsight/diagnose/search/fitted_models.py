@@ -220,14 +220,15 @@ def _before(campaign: Campaign, context: FitContext, reidentified: Scored) -> Sc
     start = {**context.start, **reidentified.fit.values, **campaign.given}
     missing = [name for name in context.free_parameters(structure) if name not in campaign.given]
     fit = context.problem(structure, context.estimation).fit(start, missing)
-    if not fit.residuals:
-        raise InputError(_why_not_run(context, structure, start))
-    return context.score((), fit)
+    scored = context.score((), fit) if fit.residuals else None
+    if scored is None or not scored.residuals:
+        raise InputError(_why_not_run(context, structure, fit.values if fit.residuals else start))
+    return scored
 
 
 def _why_not_run(context: FitContext, structure: Structure, values: Mapping[str, float]) -> str:
     """Name the records that the given simulation cannot follow, with what decides it."""
-    failing = [r for r in context.estimation if not context.problem(structure, [r]).fit(values, ()).residuals]
+    failing = [r for r in context.records if not context.problem(structure, [r]).fit(values, ()).residuals]
     told = ", ".join(f"'{record.name}' (sample time {record.dt:.3g} s)" for record in failing[:5])
     where = f" in {told}" if told else ""
     return (

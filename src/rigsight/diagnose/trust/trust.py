@@ -109,7 +109,12 @@ def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) 
     """
     moved = [n for n in numbers if own.get(n.name) in (Role.MASS, Role.STIFFNESS, Role.DAMPING)]
     directions = {n.direction if n.pattern is Pattern.AMPLITUDE else 0 for n in moved}
-    if Role.MASS not in {own.get(n.name) for n in moved} or len(moved) < 2 or len(directions) > 1:
+    if (
+        Role.MASS not in {own.get(n.name) for n in moved}
+        or len(moved) < 2
+        or len(directions) > 1
+        or 0 in directions
+    ):
         return numbers
     told = meaning(Pattern.AMPLITUDE, Role.DRIVE, -directions.pop())
     return tuple(replace(n, points_to=told) if told and n in moved and not n.stable else n for n in numbers)

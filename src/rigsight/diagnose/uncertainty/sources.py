@@ -174,7 +174,9 @@ def _power(columns: Floats) -> Floats:
 
 def _gain(drawn: Floats, left: Floats) -> Floats:
     """Return the power of each line over that which was drawn and not the expected one: a linear response then has no scatter."""
-    return np.asarray(_power(left) / _power(drawn[:, None, :]))
+    seen, whole = _power(left), _power(drawn[:, None, :])
+    # A force that no sensor shows has no gain, also at a line that was not drawn.
+    return np.divide(seen, whole, out=np.zeros_like(seen), where=seen > 0.0)
 
 
 def _starts(n_lines: int) -> list[int]:

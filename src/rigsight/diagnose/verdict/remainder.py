@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigsight.diagnose.fitting.fit_context import Scored
-from rigsight.diagnose.noise.adequacy import Adequacy
+from rigsight.diagnose.noise.adequacy import CONCENTRATED, Adequacy
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import BY_RECORD
 
@@ -23,7 +23,7 @@ class Remainder:
     where
         Joint, drive or sensor at which it arises; empty where it correlates with nothing, or with no place.
     goes_with
-        Signal, time or record with which it correlates; empty where there is none.
+        Signal, time or record with which it correlates, or that it is concentrated in a few stretches; empty where there is none.
     p_value
         Probability that noise and disturbance alone correlate this well with anything that was tested.
     beside_a_cause
@@ -50,9 +50,11 @@ class Remainder:
                 f"{self.p_value:.2g}): parameters may be off by more than their standard errors."
             )
         percent = float(f"{100.0 * self.share:.2g}")
+        told = f"The remaining error, {percent:g} % of the squared gap,"
         left = (
-            f"The remaining error, {percent:g} % of the squared gap, still correlates with {_in_words(self.goes_with)} (p = "
-            f"{self.p_value:.2g})"
+            f"{told} is concentrated in {CONCENTRATED}, unlike noise"
+            if self.goes_with == CONCENTRATED
+            else f"{told} still correlates with {_in_words(self.goes_with)} (p = {self.p_value:.2g})"
         )
         if self.share > VERDICT.larger_part:
             return f"{left}: more than half of the gap is not explained."
@@ -97,7 +99,8 @@ def remainder_of(
     """
     if found.adequate:
         return Remainder(0.0, (), "", found.p_value, beside_a_cause)
-    share = found.agreements[0].share if found.agreements else 1.0
+    # What is concentrated in a few stretches remains whole, whatever small part correlates with something by chance.
+    share = 1.0 if found.goes_with == CONCENTRATED or not found.agreements else found.agreements[0].share
     above = share * model.error_over_noise**2 if lower_bound else max(model.error_over_noise**2 - 1.0, 0.0)
     whole = (
         reidentified.error_over_noise**2

@@ -183,8 +183,7 @@ def _sizes(
         [max((float(np.std(r[s.name])) for r in records if s.name in r), default=0.0) for s in rig.outputs]
     )
     n, n_states = len(rig.mechanism.free), seen.shape[1]
-    with np.errstate(divide="ignore"):
-        shown = np.where(seen > 0.0, spreads[:, None] / seen, 0.0)
+    shown = np.divide(spreads[:, None], seen, out=np.zeros_like(seen), where=seen > 0.0)
     size = np.max(shown, axis=0, initial=0.0)
     size[:n] = np.maximum(size[:n], size[n : 2 * n] / omega)
     moving = size[:n][size[:n] > 0.0]
