@@ -11,6 +11,7 @@ R. J. Tibshirani et al., NeurIPS (2019), for conformal quantiles of weighted tri
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def main() -> None:
 def calibrated(trials: Sequence[TrainingTrial]) -> Calibration:
     """Return the calibration that a table gives."""
     least = _least_probability(probabilities_unseen(trials), weights_of(trials))
-    return _fitted(trials, round(least, DIGITS))
+    return _fitted(trials, math.floor(least * 10**DIGITS) / 10**DIGITS)
 
 
 def _least_probability(unseen: np.ndarray, weights: np.ndarray) -> float:
@@ -83,6 +84,7 @@ def _fitted(trials: Sequence[TrainingTrial], least: float) -> Calibration:
         ),
         least,
         len(trials),
+        max(trial.situation.gap for trial in trials),
     )
 
 

@@ -28,6 +28,7 @@ STATED = (
     ("verdict.window_cycles", 4, "windows of four cycles"),
     ("verdict.comparable", 1.5, "(within 1.5 times)"),
     ("search.beam", 1.3, "within 1.3 times the best error"),
+    ("search.most_effects", 3, "A verdict names three effects at most"),
     ("verdict.exact", 1.03, "leaves more than 1.03 of the floor"),
     ("search.finest_steps", 4, "more than 4 integration steps per sample"),
     ("verdict.larger_part", 0.5, "at least half of what the best single effect leaves"),

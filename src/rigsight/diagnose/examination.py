@@ -19,7 +19,7 @@ from rigsight.diagnose.noise.adequacy import Adequacy
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
-from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.fitted_models import AllModels, single_models, with_several_effects
 from rigsight.diagnose.search.horizon import brings_back, preparing, windowing_of
 from rigsight.diagnose.search.places import SuspectedPlace
@@ -242,12 +242,14 @@ def _with_offset_rivals(
         if name in released
         and abs(best.fit.values[name]) > VERDICT.standard_errors * best.fit.standard_errors[name]
     ]
-    if not needed:
+    if not needed or len(best.effects) == SEARCH.most_effects:
         return ranking
+    known = {frozenset(model.names) for model in ranking.order}
     rivals = []
     for effect in effects:
         is_even = effect.signature.even_harmonics and not effect.holds_constant_force
-        if is_even and context.rig.offers(effect) and effect not in best.effects:
+        is_new = frozenset((*best.names, effect.name)) not in known
+        if is_even and is_new and context.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(context, (*best.effects, effect), base, hold=frozenset(needed)))
     return rank([*ranking.order, *rivals], noise, rng, gap, criterion, evidence_counts)

@@ -84,3 +84,17 @@ def test_no_rival_is_more_probable_than_the_doubted_first_model() -> None:
     assert first == pytest.approx(second)
     assert third < 0.1 * second
     assert first + second + third == pytest.approx(calibration.probability_listed(doubted))
+
+
+def test_less_noise_than_in_any_training_trial_takes_nothing_from_a_main_cause() -> None:
+    """A law that leaves a sixtieth of the gap; a tenth of the noise raises error and gap alike."""
+    quiet = replace(CLEAR, left=50.0, gap=3000.0, adequate=False)
+    quieter = replace(quiet, left=500.0, gap=30_000.0)
+    assert stated(quiet) > 0.5
+    assert stated(quieter) == pytest.approx(stated(quiet), rel=1e-3)
+
+
+def test_a_gap_beyond_the_training_trials_says_no_more_than_their_largest() -> None:
+    assert stated(replace(CLEAR, gap=1e6)) == pytest.approx(
+        stated(replace(CLEAR, gap=trained().largest_gap, left=1.0)), rel=1e-3
+    )

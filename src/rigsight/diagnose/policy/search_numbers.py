@@ -206,6 +206,11 @@ class SearchNumbers:
         "budget",
         "Number of times that an effect of the best pair is replaced by a more general or similar one: once for each of the two.",
     )
+    most_effects: int = number(
+        3,
+        "convention",
+        "Number of effects that a model has at most: no blind trial hides more.",
+    )
     finest_steps: int = number(
         4,
         "budget",

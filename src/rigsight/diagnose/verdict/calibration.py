@@ -16,7 +16,7 @@ import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from typing import Any
 
@@ -63,6 +63,14 @@ class Situation:
     lower_bound: bool
     several_places: bool
 
+    def with_noise(self, largest_gap: float) -> Situation:
+        """Return the same with so much noise added to the sensors that the gap is at most `largest_gap` noise floors."""
+        if not self.gap > largest_gap:
+            return self
+        fewer_floors = (largest_gap**2 - 1.0) / (self.gap**2 - 1.0)
+        left = math.sqrt(1.0 + max(self.left**2 - 1.0, 0.0) * fewer_floors)
+        return replace(self, left=left, gap=largest_gap)
+
     def figures(self) -> dict[str, float]:
         """Return the inputs of the logistic models by name."""
         has_effect = self.verdict in ("effect", "unknown")
@@ -95,20 +103,24 @@ class Calibration:
         Models with at least this probability belong to the set, which contains the cause in nine trials of ten.
     n_trials
         Training trials.
+    largest_gap
+        Of them, in units of the noise floor. A larger gap is seen as if noise were added until it is as large: what can be
+        concluded with more noise holds with less.
     """
 
     listed: Mapping[str, float]
     first: Mapping[str, float]
     least_probability: float
     n_trials: int
+    largest_gap: float
 
     def probability_listed(self, situation: Situation) -> float:
         """Return the probability that the cause is among the models tried."""
-        return _logistic(self.listed, situation.figures())
+        return _logistic(self.listed, situation.with_noise(self.largest_gap).figures())
 
     def probability_first(self, situation: Situation) -> float:
         """Return the probability that the cause is the first model if it is among those tried."""
-        return _logistic(self.first, situation.figures())
+        return _logistic(self.first, situation.with_noise(self.largest_gap).figures())
 
     def probabilities(self, situation: Situation, shares: Sequence[float]) -> list[float]:
         """Return the probability of each model with an effect; the rest to 1 is that of all other causes.
@@ -148,6 +160,7 @@ class Calibration:
             "first": dict(self.first),
             "least_probability": self.least_probability,
             "n_trials": self.n_trials,
+            "largest_gap": self.largest_gap,
         }
 
 
