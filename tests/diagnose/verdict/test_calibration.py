@@ -67,7 +67,9 @@ def test_of_an_unknown_cause_the_nearest_model_is_less_probable_than_if_it_were_
 
 def test_a_model_that_is_endlessly_far_is_not_the_cause() -> None:
     for left in (1e300, float("inf")):
-        assert stated(replace(CLEAR, verdict="unknown", left=left, adequate=False)) == 0.0
+        far = replace(CLEAR, verdict="unknown", left=left, adequate=False)
+        assert stated(far) == 0.0
+        assert stated(replace(far, gap=3000.0)) == 0.0, "and beyond the gaps of the training trials"
 
 
 def test_one_model_alone_takes_what_the_first_has() -> None:

@@ -67,9 +67,8 @@ class Situation:
         """Return the same with so much noise added to the sensors that the gap is at most `largest_gap` noise floors."""
         if not self.gap > largest_gap:
             return self
-        fewer_floors = (largest_gap**2 - 1.0) / (self.gap**2 - 1.0)
-        left = math.sqrt(1.0 + max(self.left**2 - 1.0, 0.0) * fewer_floors)
-        return replace(self, left=left, gap=largest_gap)
+        smaller = _above_floor(largest_gap) / _above_floor(self.gap)
+        return replace(self, left=math.hypot(1.0, smaller * _above_floor(self.left)), gap=largest_gap)
 
     def figures(self) -> dict[str, float]:
         """Return the inputs of the logistic models by name."""
@@ -169,6 +168,11 @@ def trained() -> Calibration:
     """Return the calibration included in the package."""
     text = resources.files(__package__).joinpath(FILE).read_text(encoding="utf-8")
     return Calibration(**json.loads(text))
+
+
+def _above_floor(error: float) -> float:
+    """Return the part of an error that is not noise, in units of the noise. The square of a large one may overflow."""
+    return math.sqrt(error - 1.0) * math.sqrt(error + 1.0) if error > 1.0 else 0.0
 
 
 def _logistic(coefficients: Mapping[str, float], figures: Mapping[str, float]) -> float:
