@@ -187,6 +187,19 @@ def test_an_element_shows_its_force_over_its_motion(page_of: Callable[[str], str
     assert 'id="loops"' not in page_of("effect")
 
 
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("effect", "<dt>Probability</dt>"), ("none", "<dt>Probability of no missing effect</dt>"),
+        ("unknown", "<dt>Probability of a cause not tried</dt>"),
+    ],
+)  # fmt: skip
+def test_the_probability_is_labelled_by_what_the_verdict_states(
+    page_of: Callable[[str], str], name: str, label: str
+) -> None:
+    assert label in page_of(name)
+
+
 def test_an_unknown_gap_is_described_by_the_force_that_is_lacking(page_of: Callable[[str], str]) -> None:
     assert "14.3 v^3 (N m s^3/rad^3)" in page_of("unknown")
     assert "v^3" not in page_of("effect")

@@ -35,7 +35,7 @@ from rigsight.report.wording import (
 _RANKED = 3
 _ADVICES = 1
 _FAULTS = 3
-"""Candidates, experiments and faults shown; the report holds all."""
+"""Numbers of candidates, experiments and faults shown; the report holds all."""
 _COLORS = {"effect": "bold green", "parameters": "bold green", "none": "bold green", "unknown": "bold yellow"}
 
 

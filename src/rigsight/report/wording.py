@@ -324,7 +324,7 @@ def _deviations(separation: float) -> str:
 
 
 def what_is_probable(diagnosis: Diagnosis) -> str:
-    """Return whose probability that of the diagnosis is: ``"a cause not tried"``."""
+    """Return what the probability of a diagnosis is that of: the named effects, or ``"a cause not tried"``."""
     return effects_label(diagnosis.effects) if diagnosis.effects else _STATED[diagnosis.verdict]
 
 
