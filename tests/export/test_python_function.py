@@ -12,9 +12,11 @@ import pytest
 
 from rigsight.export import export_model
 from rigsight.records import Record
-from rigsight.simulate import rest_state
+from rigsight.rigs import read_rig_file
+from rigsight.simulate import compose, rest_state
 from rigsight.simulate import simulate as simulate_engine
 from rigsight.simulate.input_hold import hold_input
+from rigsight.simulate.model import Model
 
 
 def module_of(text: str) -> dict[str, Any]:
@@ -108,3 +110,30 @@ def test_an_equilibrium_under_load_is_that_of_the_engine(case_named):
     assert module["_rest"](module["PARAMETERS"], [first]) == pytest.approx(
         expected.tolist(), rel=1e-9, abs=1e-12
     )
+
+
+def test_a_rig_without_a_damper_starts_where_the_engine_does(tmp_path: Path):
+    path = tmp_path / "stage.toml"
+    path.write_text(
+        """name = "stage"
+summary = "A mass on a spring."
+inputs.u.unit = "N"
+parameters.m.unit = "kg"
+parameters.k.unit = "N/m"
+coordinates.x.unit = "m"
+energy.kinetic = "m*d(x)^2/2"
+joints.spring = {motion = "x", stiffness = "k"}
+drives.motor = {signal = "u", force = "motor", along = "x"}
+sensors.x = {reads = "x", unit = "m"}
+""",
+        encoding="utf-8",
+    )
+    values = {"m": 1.0, "k": 100.0}
+    model = Model(compose(read_rig_file(path)), values, "foh")
+    record = Record(name="pulled", dt=0.01, signals={"u": 2.0 + np.sin(np.arange(100.0))}, units={"u": "N"})
+    simulated = module_of(export_model(model, "python", source="model.json"))["simulate"](
+        0.01 * np.arange(100), record["u"]
+    )
+    expected = simulate_engine(model.structure, values, record)["x"]
+    assert expected[0] == pytest.approx(0.02, rel=1e-6)
+    np.testing.assert_allclose(simulated["x"], expected, atol=1e-6 * np.ptp(expected))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rigsight.effects import effect_named
-from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs import RUNNING_GEAR, read_rig_file
 from rigsight.simulate import compose, parameter_vector, record_input, rest_state, simulate
 
 
@@ -72,3 +74,45 @@ def test_a_chain_of_states_starts_from_exactly_zero(make_record):
     psi = simulate(structure, values, make_record(np.sin(5.0 * time)))["psi"]
     near = simulate(structure, {**values, "psi_off": 1e-9}, make_record(np.sin(5.0 * time)))["psi"] - 1e-9
     np.testing.assert_allclose(psi, near, atol=1e-6 * np.std(psi))
+
+
+STAGE = """
+name = "stage"
+summary = "A mass on a spring with a preload."
+[inputs.u]
+unit = "N"
+[parameters.m]
+unit = "kg"
+[parameters.k]
+unit = "N/m"
+{parameter}
+[parameters.preload]
+unit = "N"
+[coordinates.x]
+unit = "m"
+[energy]
+kinetic = "m*d(x)^2/2"
+[joints.spring]
+motion = "x"
+stiffness = "k"
+force = "preload"
+{damping}
+[drives.motor]
+signal = "u"
+force = "motor"
+along = "x"
+[sensors.x]
+reads = "x"
+unit = "m"
+"""
+
+
+@pytest.mark.parametrize("damping", ["", 'damping = "2*d_0"', 'damping = "d_0"'])
+def test_it_rests_whatever_its_damping_is_written_as(damping: str, tmp_path: Path, make_record):
+    path = tmp_path / "stage.toml"
+    parameter = '[parameters.d_0]\nunit = "N s/m"' if damping else ""
+    path.write_text(STAGE.format(damping=damping, parameter=parameter), encoding="utf-8")
+    structure = compose(read_rig_file(path), [effect_named("coulomb_friction")])
+    values = {"m": 1.0, "k": 100.0, "preload": -3.0, "T_c": 0.5, **({"d_0": 0.5} if damping else {})}
+    simulated = simulate(structure, values, make_record(np.full(100, 2.0)))["x"]
+    np.testing.assert_allclose(simulated, 0.045, rtol=1e-6)

@@ -20,6 +20,7 @@ from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
+from rigsight.simulate.rest import has_raisable_damping
 from rigsight.units import unit_text
 
 
@@ -235,7 +236,7 @@ def _state_units(structure: Structure) -> dict[sp.Symbol, str]:
 
 
 def _rest(structure: Structure, names: dict[str, str]) -> Rest | Balance | None:
-    if not structure.rig.has_one_motion or structure.rig.mechanism.initial:
+    if not has_raisable_damping(structure.rig) or structure.rig.mechanism.initial:
         return balance(structure)
     motion = structure.rig.motion
     if motion.inertia is None:

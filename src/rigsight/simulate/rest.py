@@ -9,6 +9,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.effects import Place
+from rigsight.rigs import Rig
 from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.equilibrium import equilibrium
@@ -53,13 +54,18 @@ def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) ->
         if symbol in states
     }
     moving = {states.index(rate) for rate in structure.tree.motion.velocities}
-    if structure.rig.has_one_motion and not set(given) - moving:
+    if has_raisable_damping(structure.rig) and not set(given) - moving:
         state = _risen(structure, p, held)
     else:
         inputs = held.coefficients.reshape(held.n_pieces + 1, -1, 4)[0, : len(structure.rig.inputs), 0]
         state = equilibrium(structure, p, inputs, given)
     state[list(given)] = list(given.values())
     return state
+
+
+def has_raisable_damping(rig: Rig) -> bool:
+    """Return True for a rig with one motion whose damping is a parameter of its own, so that a slow rise can be simulated."""
+    return rig.has_one_motion and (rig.motion.inertia is None or isinstance(rig.motion.damping, sp.Symbol))
 
 
 def _risen(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
