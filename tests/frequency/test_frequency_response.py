@@ -28,6 +28,12 @@ def test_a_lag_beyond_half_a_turn_is_one_falling_phase() -> None:
     np.testing.assert_allclose(10.0 ** (lag.magnitude_db / 20.0), lag.magnitude)
 
 
+def test_a_whole_turn_away_from_another_curve_is_no_difference() -> None:
+    lag = response()
+    np.testing.assert_allclose(lag.phase_next_to(OMEGA[::4], lag.phase[::4] + 0.2), lag.phase)
+    np.testing.assert_allclose(lag.phase_next_to(OMEGA, lag.phase - 2.0 * np.pi), lag.phase - 2.0 * np.pi)
+
+
 def test_a_band_keeps_values_and_variance_together() -> None:
     part = response().band(10.0, 20.0)
     assert 10.0 <= part.omega[0] < part.omega[-1] <= 20.0

@@ -129,6 +129,21 @@ class FrequencyResponse:
         """Phase [rad] unwrapped from the lowest frequency on, shape (n_frequencies,); negative for a lag."""
         return np.unwrap(np.angle(self.values))
 
+    def phase_next_to(self, omega: NDArray[np.float64], phase: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the phase on the branch next to that of another curve: a turn of 2 pi is no difference.
+
+        Parameters
+        ----------
+        omega, phase
+            Frequencies [rad/s], ascending, and phase [rad] of the other curve, shape (n,) each.
+
+        Returns
+        -------
+        Phase [rad], shape (n_frequencies,).
+        """
+        near = np.interp(self.omega, omega, phase)
+        return near + (np.angle(self.values) - near + np.pi) % (2.0 * np.pi) - np.pi
+
     def band(self, lower: float, upper: float) -> FrequencyResponse:
         """Return the part from `lower` to `upper` [rad/s], both included.
 

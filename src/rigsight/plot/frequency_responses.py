@@ -216,13 +216,13 @@ def draw_phase(ax: Axes, panel: Panel) -> None:
     from matplotlib.ticker import MultipleLocator
 
     measured = panel.measured
-    phase = np.degrees(np.unwrap(np.angle(measured.values)))
+    phase = np.degrees(measured.phase)
     if panel.fitted is not None:
         fitted = panel.fitted
-        own = np.degrees(np.unwrap(np.angle(fitted.values)))
-        # The branch of each line is the one next to the fit: a noisy line cannot turn all that follow by 360 degrees.
-        near = np.interp(measured.omega, fitted.omega, own)
-        phase = near + (np.degrees(np.angle(measured.values)) - near + 180.0) % 360.0 - 180.0
+        branch = np.unwrap(np.angle(fitted.values))
+        own = np.degrees(branch)
+        # A noisy line cannot turn all that follow by 360 degrees.
+        phase = np.degrees(measured.phase_next_to(fitted.omega, branch))
         reach = np.degrees(TWO_SIDED * np.sqrt(0.5) * fitted.std / np.abs(fitted.values))
         ax.fill_between(fitted.omega, own - reach, own + reach, color=WITH_EFFECT, alpha=0.3, linewidth=0)
         ax.plot(fitted.omega, own, color=WITH_EFFECT, linewidth=1.3, zorder=3)

@@ -151,10 +151,8 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
         for name, response in panel.simulated.items():
             curve = thinned(response)
             top.plot(curve.omega, curve.magnitude_db, label=name, linewidth=1.3, **styles[name])
-            near = np.interp(curve.omega, measured.omega, phase)
-            # The branch next to the measured phase: a turn of 360 degrees is no difference.
-            own = near + (np.degrees(curve.phase) - near + 180.0) % 360.0 - 180.0
-            bottom.plot(curve.omega, own, linewidth=1.3, **styles[name])
+            own = curve.phase_next_to(measured.omega, measured.phase)
+            bottom.plot(curve.omega, np.degrees(own), linewidth=1.3, **styles[name])
             shown.append(curve.magnitude_db)
         limit(top, np.concatenate(shown))
         low, high = np.percentile(phase, [1.0, 99.0])

@@ -129,7 +129,8 @@ def response_drawing(
     for stage, curve in simulated.items():
         color, dashes = str(STAGE_STYLES[stage]["color"]), stage_dashes(stage)
         above.append(Line(curve.omega, curve.magnitude_db, color, 1.3, dashes, label=stages[stage]))
-        below.append(Line(curve.omega, beside(curve, omega, phase), color, 1.3, dashes))
+        turned = np.degrees(curve.phase_next_to(omega, measured.phase))
+        below.append(Line(curve.omega, turned, color, 1.3, dashes))
     low, high = np.percentile(phase, [1.0, 99.0])
     turns = (45.0 * math.floor(low / 45.0) - 20.0, 45.0 * math.ceil(high / 45.0) + 20.0)
     in_size, in_phase = _bands(measured, phase)
@@ -177,14 +178,6 @@ def overlaid_drawing(
         [DrawnPanel(f"magnitude [dB re 1 {unit}]", 1, limits, lines)],
         "angular frequency [rad/s]", key, alt, _OVERLAID, log=True, title=title,
     )  # fmt: skip
-
-
-def beside(
-    curve: FrequencyResponse, omega: NDArray[np.float64], phase: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the phase of a curve [deg] on the branch next to a given one: a turn of 360 degrees is no difference."""
-    near = np.interp(curve.omega, omega, phase)
-    return np.asarray(near + (np.degrees(curve.phase) - near + 180.0) % 360.0 - 180.0)
 
 
 def stage_dashes(stage: Stage) -> tuple[float, ...]:

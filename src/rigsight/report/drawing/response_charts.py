@@ -13,7 +13,7 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.plot.frequency_responses import TWO_SIDED, decibel, thinned
 from rigsight.report.drawing.charts import Chart, ChartPanel, Curve, chart_data, curve_names
 from rigsight.report.drawing.figures import PageFigure
-from rigsight.report.drawing.record_drawings import beside, overlaid_drawing, response_drawing
+from rigsight.report.drawing.record_drawings import overlaid_drawing, response_drawing
 from rigsight.report.responses import PathResponse
 from rigsight.report.wording import sentence_case, told_unit
 
@@ -62,7 +62,7 @@ def response_chart(record: str, response: PathResponse, names: Mapping[str, str]
             [
                 *_band(measured, phase, degrees=True),
                 Curve("measured", measured.omega, phase),
-                *(_phase(stage, response.simulated[stage], measured.omega, phase) for stage in stages),
+                *(_phase(stage, response.simulated[stage], measured) for stage in stages),
             ],
             cap=(float(phase.min()) - 90.0, float(phase.max()) + 90.0),
             degrees=True,
@@ -161,8 +161,6 @@ def _cap(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(low - reach), float(high + reach)
 
 
-def _phase(
-    stage: Stage, simulated: FrequencyResponse, omega: NDArray[np.float64], phase: NDArray[np.float64]
-) -> Curve:
+def _phase(stage: Stage, simulated: FrequencyResponse, measured: FrequencyResponse) -> Curve:
     curve = thinned(simulated)
-    return Curve(stage, curve.omega, beside(curve, omega, phase))
+    return Curve(stage, curve.omega, np.degrees(curve.phase_next_to(measured.omega, measured.phase)))
