@@ -114,11 +114,6 @@ class Exported:
         return tuple(quantity for source in self.sources for quantity in source.quantities)
 
     @property
-    def is_held(self) -> bool:
-        """True if an input has a hold; False where all of them prescribe motions, or there is none."""
-        return any(source.rate is None for source in self.sources)
-
-    @property
     def follows_motion(self) -> bool:
         """True if an input prescribes a motion."""
         return any(source.rate is not None for source in self.sources)
