@@ -130,7 +130,7 @@ def export_model(
     name
         Name of the function, model or prefix.
     hold
-        How the input behaves between samples; default is the model's.
+        How the input behaves between samples, of a target that goes from sample to sample; default is the model's.
     step
         Longest internal step [s] of a target with a fixed one; default follows from the model's own time scales.
     source_only
@@ -223,7 +223,7 @@ def _check_expressible(target: Target, content: Exported) -> None:
 def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
     hold = model.hold if wished is None else wished
     if wished is not None:
-        check_option("--hold", wished, ("foh", "zoh"))
+        _check_hold(target, wished)
     mechanism = model.structure.rig.mechanism
     prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
     if set(mechanism.inputs) <= prescribing or not target.steps:
@@ -235,6 +235,15 @@ def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
             "sample faster for the same accuracy) or --hold zoh."
         )
     return hold
+
+
+def _check_hold(target: Target, hold: Hold) -> None:
+    if not target.steps:
+        able = ", ".join(t.name for t in TARGETS.values() if t.steps)
+        raise InputError(
+            f"--hold is of {able}; what is written for {target.name} leaves the input between samples to others. Leave it out."
+        )
+    check_option("--hold", hold, ("foh", "zoh"))
 
 
 def _check_step(target: Target, step: float) -> None:
