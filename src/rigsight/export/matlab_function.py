@@ -23,6 +23,11 @@ WORDS = words(
     switch try while"""
 )
 """Of the language."""
+INPUT_WORDS = words(
+    """advance c cubics_of diff dt error fieldnames floor given i initial_state input_pieces isempty lines_of motion_from n
+    nargin numel p parameters pieces read_outputs read_signs reshape rest steps_of t zeros"""
+)
+"""Of the template where inputs are arguments and not read yet, beside what no name in any export is."""
 
 _ALL_PIECES = """function c = input_pieces(n, dt{inputs}) %#ok<INUSL>
 % Inputs between samples as cubics of the time since each sample [s]: rows of c(:, :, sample), one for each input.

@@ -14,12 +14,15 @@ from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.internal_step import is_linear
 from rigsight.export.precomputed import equations_of
+from rigsight.export.reserved_words import words
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.python import PYTHON
 
 WORDS = frozenset(keyword.kwlist)
 """Of the language."""
+INPUT_WORDS = words("t n dt parameters initial_state PARAMETERS ValueError float list range zip")
+"""Of the template where inputs are arguments and not read yet, beside what no name in any export is."""
 MIN_STEPS = 4
 """Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
 MIN_STEPS_PRESCRIBED = 32
