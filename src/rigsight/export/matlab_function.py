@@ -11,7 +11,7 @@ from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
-from rigsight.export.precomputed import equations_of
+from rigsight.export.precomputed import constant_names, equations_of
 from rigsight.export.python_function import min_steps
 from rigsight.export.reserved_words import words
 from rigsight.simulate.equations.structure import TIME, input_symbols
@@ -230,10 +230,11 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         Name of the function; its file must have the same.
     """
     structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
-    names = _names(exported) | {symbol: f"p.{symbol.name}" for symbol in equations.constants}
+    constants = {symbol: f"p.{name}" for symbol, name in constant_names(equations).items()}
+    names = _names(exported) | constants
+    prepare = MATLAB.statements(list(constants.values()), list(equations.constants.values()), names)
     modes = {mode: f"s({i + 1})" for i, mode in enumerate(frozen.modes)}
     inputs = [quantity.name for quantity in exported.inputs]
-    friction = _friction(exported)
     head = header_lines(exported, source, with_parameters=False)
     late = structure.first_shown_late
     fragments = {
@@ -252,13 +253,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
             f"p.{q.name} = {value!r};   % [{q.unit}] {q.description}"
             for q, value in zip(exported.parameters, exported.values, strict=True)
         ),
-        "PREPARE": "\n".join(
-            MATLAB.statements(
-                [f"p.{symbol.name}" for symbol in equations.constants],
-                list(equations.constants.values()),
-                names,
-            )
-        ),
+        "PREPARE": "\n".join(prepare),
         "STEP": repr(exported.step),
         "MIN_STEPS": min_steps(exported),
         "RATES": _body("r", equations.rates, {**names, **modes}, equations.steps),
@@ -271,7 +266,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         ),
         "PIECES": _pieces(exported, inputs),
         "WITHOUT_MODES": "" if frozen.modes else "  m.x = x_new;\n  return\n",
-        **friction,
+        **_friction(exported),
         "LIMITS": _limits(exported),
         "REST": _rest(exported),
         "N_STATES": len(exported.states),
