@@ -156,6 +156,17 @@ def test_equations_alone_need_no_hold(target: str, case_named):
         ("fmu3", {"step": 0.001}, "--step is of python, matlab"),
         ("latex", {"step": 0.001}, "--step is of python, matlab.*latex leaves the steps to others"),
         ("c", {"source_only": True}, "--source-only is of an FMU"),
+        (
+            "modelica",
+            {"hold": "zoh", "name": "Rig"},
+            "--hold is of python, c, fmu, fmu3, matlab; .*modelica leaves the input",
+        ),
+        (
+            "control",
+            {"hold": "zoh"},
+            "--hold is of python, c.*control leaves the input between samples to others",
+        ),
+        ("latex", {"hold": "foh"}, "--hold is of python, c"),
     ],
 )
 def test_what_cannot_be_used_is_told(target, options, message, case_named):

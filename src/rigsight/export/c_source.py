@@ -10,6 +10,7 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import Balance
+from rigsight.export.reserved_words import words
 from rigsight.simulate.compiled.c_functions import FUNCTIONS
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.kernel_source import accurate_integrator
@@ -19,6 +20,12 @@ from rigsight.simulate.printing.c import C
 from rigsight.simulate.rest import INTERVALS, RAMP_PERIODS, SETTLED, TOLERANCE, WAITS
 from rigsight.simulate.simulation import DEFAULT_ACCURACY, LOCAL_PER_GLOBAL
 
+_MACROS_OF_HEADERS = words(
+    """BIG_ENDIAN BYTE_ORDER DOMAIN FD_SETSIZE FP_ILOGB0 FP_ILOGBNAN HUGE LITTLE_ENDIAN L_ctermid MAXFLOAT MB_CUR_MAX M_1_PI
+    M_2_PI M_2_SQRTPI M_E M_LN10 M_LN2 M_LOG10E M_LOG2E M_PI M_PI_2 M_PI_4 M_SQRT1_2 M_SQRT2 NFDBITS OVERFLOW PDP_ENDIAN PLOSS
+    P_tmpdir SING TLOSS UNDERFLOW WCONTINUED WEXITED WNOHANG WNOWAIT WSTOPPED WUNTRACED"""
+)
+"""What compilers define beyond the standard, beside what no name in any export is."""
 HISTORY = 4096
 """Samples that a delay may last; more cost memory in every instance."""
 _SPARE = 8
@@ -161,6 +168,18 @@ _AS_MEASURED = """    {{
         }}
     }}
 """
+
+
+def macros(name: str) -> frozenset[str]:
+    """Return the macros of a file, which replace even the names of members.
+
+    Parameters
+    ----------
+    name
+        What every name that others see begins with.
+    """
+    own = "ACCURACY DECLARATIONS DECLARED HISTORY MAIN N_INPUTS N_OUTPUTS N_STATES"
+    return _MACROS_OF_HEADERS | {f"{name.upper()}_{word}" for word in own.split()}
 
 
 def c_source(exported: Exported, source: str, name: str) -> str:

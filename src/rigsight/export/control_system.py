@@ -12,6 +12,7 @@ from rigsight.export.equations import Exported
 from rigsight.export.python_function import (
     code_names,
     parameter_entries,
+    results,
     sequence,
     unpacked_parameters,
     unpacked_states,
@@ -39,7 +40,7 @@ def control_system(exported: Exported, source: str, name: str) -> str:
     """
     structure = exported.structure
     inputs = [quantity.name for quantity in exported.inputs]
-    unpack = indented(unpacked_parameters(exported))
+    unpack = indented(unpacked_parameters(exported, _own_words(exported)))
     template = files("rigsight.export").joinpath("templates/control.py.txt").read_text("utf-8")
     return filled(
         template,
@@ -73,10 +74,16 @@ def _unpacked_input(exported: Exported) -> str:
 
 
 def _array(exported: Exported, expressions: list[sp.Expr]) -> str:
-    targets = [f"result{i}" for i in range(len(expressions))]
+    targets, own = results(len(expressions)), _own_words(exported)
     steps = exported.structure.steps
     lines = [
-        *unpacked_states(exported),
-        *PYTHON.statements(targets, expressions, code_names(exported), steps),
+        *unpacked_states(exported, own),
+        *PYTHON.statements(targets, expressions, code_names(exported, own), steps),
     ]
     return indented([*lines, f"return np.array([{', '.join(targets)}])"])
+
+
+def _own_words(exported: Exported) -> frozenset[str]:
+    """Return what the template calls its own where parameters and states stand, beside what no name in any export is."""
+    count = max(len(exported.states), len(exported.outputs))
+    return frozenset({"PARAMETERS", "params", *results(count)})

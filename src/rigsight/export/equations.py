@@ -115,11 +115,6 @@ class Exported:
         return tuple(quantity for source in self.sources for quantity in source.quantities)
 
     @property
-    def is_held(self) -> bool:
-        """True if an input has a hold; False where all of them prescribe motions, or there is none."""
-        return any(source.rate is None for source in self.sources)
-
-    @property
     def follows_motion(self) -> bool:
         """True if an input prescribes a motion."""
         return any(source.rate is not None for source in self.sources)
@@ -167,7 +162,9 @@ def _check_delays(structure: Structure) -> None:
         )
 
 
-def exported(model: Model, hold: Hold, step: float, reserved: Set[str]) -> Exported:
+def exported(
+    model: Model, hold: Hold, step: float, reserved: Set[str], of_inputs: Set[str] = frozenset()
+) -> Exported:
     """Return a model in the form that every target prints.
 
     Parameters
@@ -179,7 +176,9 @@ def exported(model: Model, hold: Hold, step: float, reserved: Set[str]) -> Expor
     step
         Longest internal step [s].
     reserved
-        Words that no name can be, those of all targets: a name is the same in each of them.
+        Words that no name can be.
+    of_inputs
+        Words that the name of an input cannot be, either.
 
     Raises
     ------
@@ -189,7 +188,7 @@ def exported(model: Model, hold: Hold, step: float, reserved: Set[str]) -> Expor
     structure, values = without_vanished_effects(model.structure, model.values)
     _check_delays(structure)
     names = _Names(reserved)
-    sources = _sources(structure.rig, names)
+    sources = _sources(structure.rig, names, of_inputs)
     shown = _Names(reserved)
     outputs = [shown.quantity(s.name, s.name, s.unit, s.description) for s in structure.rig.outputs]
     parameters = tuple(names.quantity(p.name, p.name, p.unit, p.description) for p in structure.parameters)
@@ -211,14 +210,15 @@ def exported(model: Model, hold: Hold, step: float, reserved: Set[str]) -> Expor
     )
 
 
-def _sources(rig: Rig, names: _Names) -> tuple[Source, ...]:
+def _sources(rig: Rig, names: _Names, of_inputs: Set[str]) -> tuple[Source, ...]:
     prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
     found = []
     for signal in rig.inputs:
-        value, rate = names.quantity(signal.name, signal.name, signal.unit, signal.description), None
+        value = names.quantity(signal.name, signal.name, signal.unit, signal.description, of_inputs)
+        rate = None
         if signal.name in prescribing:
             wished = f"{signal.name}_rate"
-            rate = names.quantity(wished, wished, f"{signal.unit}/s", f"rate of {signal.name}")
+            rate = names.quantity(wished, wished, f"{signal.unit}/s", f"rate of {signal.name}", of_inputs)
         found.append(Source(value, rate))
     return tuple(found)
 
@@ -271,14 +271,17 @@ class _Names:
         self._reserved = reserved
         self._used: set[str] = set()
 
-    def quantity(self, wished: str, source: str, unit: str, description: str) -> Quantity:
-        """Return a quantity under the wished name, or one like it."""
+    def quantity(
+        self, wished: str, source: str, unit: str, description: str, refused: Set[str] = frozenset()
+    ) -> Quantity:
+        """Return a quantity under the wished name, or one like it that is not refused."""
         name = re.sub(r"[^0-9A-Za-z_]+", "_", wished).strip("_") or "value"
         if name[0].isdigit():
             name = f"n_{name}"
         while (
             name in self._used
             or name in self._reserved
+            or name in refused
             or re.fullmatch(r"(part|constant_)\d+|part(_[a-z]+)+(_\d+)+", name)
         ):
             name += "_"

@@ -28,7 +28,7 @@ def held_velocity(exported: Exported) -> int | None:
 
 def slope_symbol(index: int) -> sp.Symbol:
     """Return the symbol of the rate of a state, where it is given."""
-    return sp.Symbol(f"slope_{index}", real=True)
+    return sp.Symbol(f"slope {index}", real=True)
 
 
 def slip_rate(exported: Exported) -> sp.Expr:

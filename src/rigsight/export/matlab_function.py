@@ -11,7 +11,7 @@ from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
-from rigsight.export.precomputed import equations_of
+from rigsight.export.precomputed import constant_names, equations_of
 from rigsight.export.python_function import min_steps
 from rigsight.export.reserved_words import words
 from rigsight.simulate.equations.structure import TIME, input_symbols
@@ -23,6 +23,11 @@ WORDS = words(
     switch try while"""
 )
 """Of the language."""
+INPUT_WORDS = words(
+    """advance c cubics_of diff dt error fieldnames floor given i initial_state input_pieces isempty lines_of motion_from n
+    nargin numel p parameters pieces read_outputs read_signs reshape rest steps_of t zeros"""
+)
+"""Of the template where inputs are arguments and not read yet, beside what no name in any export is."""
 
 _ALL_PIECES = """function c = input_pieces(n, dt{inputs}) %#ok<INUSL>
 % Inputs between samples as cubics of the time since each sample [s]: rows of c(:, :, sample), one for each input.
@@ -225,10 +230,11 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         Name of the function; its file must have the same.
     """
     structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
-    names = _names(exported) | {symbol: f"p.{symbol.name}" for symbol in equations.constants}
+    constants = {symbol: f"p.{name}" for symbol, name in constant_names(equations).items()}
+    names = _names(exported) | constants
+    prepare = MATLAB.statements(list(constants.values()), list(equations.constants.values()), names)
     modes = {mode: f"s({i + 1})" for i, mode in enumerate(frozen.modes)}
     inputs = [quantity.name for quantity in exported.inputs]
-    friction = _friction(exported)
     head = header_lines(exported, source, with_parameters=False)
     late = structure.first_shown_late
     fragments = {
@@ -247,13 +253,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
             f"p.{q.name} = {value!r};   % [{q.unit}] {q.description}"
             for q, value in zip(exported.parameters, exported.values, strict=True)
         ),
-        "PREPARE": "\n".join(
-            MATLAB.statements(
-                [f"p.{symbol.name}" for symbol in equations.constants],
-                list(equations.constants.values()),
-                names,
-            )
-        ),
+        "PREPARE": "\n".join(prepare),
         "STEP": repr(exported.step),
         "MIN_STEPS": min_steps(exported),
         "RATES": _body("r", equations.rates, {**names, **modes}, equations.steps),
@@ -266,7 +266,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         ),
         "PIECES": _pieces(exported, inputs),
         "WITHOUT_MODES": "" if frozen.modes else "  m.x = x_new;\n  return\n",
-        **friction,
+        **_friction(exported),
         "LIMITS": _limits(exported),
         "REST": _rest(exported),
         "N_STATES": len(exported.states),

@@ -20,6 +20,8 @@ WORDS = words(
     redeclare replaceable return stream then time true type when while within"""
 )
 """Of the language."""
+FUNCTIONS = words("Real acos asin atan atan2 cos cosh entry exp log log10 sin sinh sqrt tan tanh")
+"""Names that are built in and that the text uses, beside those that no name in any export is; sympy's printer alters `entry`."""
 
 
 def modelica(exported: Exported, source: str, name: str) -> str:

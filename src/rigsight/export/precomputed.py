@@ -8,8 +8,6 @@ import sympy as sp
 
 from rigsight.export.equations import Exported
 
-PREFIX = "constant_"
-
 
 @dataclass(frozen=True)
 class Equations:
@@ -51,7 +49,7 @@ def equations_of(exported: Exported) -> Equations:
         if not expression.args:
             return expression
         if expression.free_symbols and expression.free_symbols <= fixed and _costly(expression):
-            return found.setdefault(expression, sp.Symbol(f"{PREFIX}{len(found)}", real=True))
+            return found.setdefault(expression, sp.Symbol(f"constant {len(found)}", real=True))
         return expression.func(*map(walk, expression.args))
 
     signs = exported.frozen.friction_signs(exported.structure)
@@ -62,6 +60,11 @@ def equations_of(exported: Exported) -> Equations:
     shown_steps = {symbol: walk(step.xreplace(signs)) for symbol, step in exported.structure.steps.items()}
     constants = {symbol: expression for expression, symbol in found.items()}
     return Equations(rates, switches, outputs, constants, steps, shown_steps)
+
+
+def constant_names(equations: Equations) -> dict[sp.Symbol, str]:
+    """Return the names of the constants in code, which in exports differ from all names of rigs and effects."""
+    return {symbol: symbol.name.replace(" ", "_") for symbol in equations.constants}
 
 
 def _costly(expression: sp.Expr) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from importlib.resources import files
 
 import sympy as sp
@@ -13,13 +13,17 @@ from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.internal_step import is_linear
-from rigsight.export.precomputed import equations_of
-from rigsight.simulate.equations.structure import TIME, input_symbols
+from rigsight.export.local_names import local_names
+from rigsight.export.precomputed import constant_names, equations_of
+from rigsight.export.reserved_words import words
+from rigsight.simulate.equations.structure import input_symbols
 from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.python import PYTHON
 
 WORDS = frozenset(keyword.kwlist)
 """Of the language."""
+INPUT_WORDS = words("t n dt parameters initial_state PARAMETERS ValueError float list range zip")
+"""Of the template where inputs are arguments and not read yet, beside what no name in any export is."""
 MIN_STEPS = 4
 """Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
 MIN_STEPS_PRESCRIBED = 32
@@ -91,9 +95,13 @@ def _settled(numbers, state, last, length):
         piece, duration = [(last, 0.0, 0.0, 0.0)], length * 2.0**wait
     state[{velocity}] = 0.0
     return state'''
+_OWN_WORDS_OF_REST = words("first inertia stiffness")
+"""Of `_REST` where parameters stand, beside what no name in any export is."""
 _NO_REST = '''def _rest(numbers, given):
     """Return the states without memory."""
     return [0.0] * N_STATES'''
+_OWN_WORDS_OF_START = words("x any len ValueError")
+"""The same of the template of the equilibrium of several motions."""
 
 
 def min_steps(exported: Exported) -> int:
@@ -114,11 +122,13 @@ def python_function(exported: Exported, source: str) -> str:
         The file it comes from.
     """
     structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
-    names = code_names(exported)
+    own = _own_words_of_equations(exported)
+    constants = constant_names(equations)
+    names = code_names(exported, own) | constants
     modes = {mode: f"modes[{i}]" for i, mode in enumerate(frozen.modes)}
     every = {**names, **modes}
     inputs = [quantity.name for quantity in exported.inputs]
-    unpack = unpacked_states(exported)
+    unpack = unpacked_states(exported, own)
     limits = [PYTHON.expression(limit, names) for limit in exported.limits.values()]
     template = files("rigsight.export").joinpath("templates/model.py.txt").read_text("utf-8")
     fragments = {
@@ -140,10 +150,8 @@ def python_function(exported: Exported, source: str) -> str:
         "N_OUTPUTS": len(structure.computed_outputs),
         "UNPACK_PARAMETERS": indented(
             [
-                *unpacked_parameters(exported),
-                *PYTHON.statements(
-                    [symbol.name for symbol in equations.constants], list(equations.constants.values()), names
-                ),
+                *unpacked_parameters(exported, own),
+                *PYTHON.statements(list(constants.values()), list(equations.constants.values()), names),
             ]
         ),
         "RATES": _returned(unpack, list(equations.rates), every, equations.steps),
@@ -170,9 +178,21 @@ def python_function(exported: Exported, source: str) -> str:
     return text.replace("else before\n\n        motion", "else before\n        motion")
 
 
-def code_names(exported: Exported) -> dict[sp.Symbol, str]:
-    """Return the names of the symbols inside generated functions, where inputs are elements of arrays."""
-    names = {**exported.names(), TIME: "time"}
+def _own_words_of_equations(exported: Exported) -> frozenset[str]:
+    """Return what the template calls its own where parameters and states stand, beside what no name in any export is."""
+    counts = map(len, (exported.frozen.rates, exported.frozen.switches, exported.structure.computed_outputs))
+    return frozenset({"slip_rate", "slopes", "result", *results(max(counts))})
+
+
+def results(count: int) -> list[str]:
+    """Return the names of so many results."""
+    return [f"result{i}" for i in range(count)]
+
+
+def code_names(exported: Exported, own: Set[str]) -> dict[sp.Symbol, str]:
+    """Return the names of the symbols inside a function with names of its own, where inputs are elements of arrays."""
+    local = local_names(exported, own)
+    names = {symbol: local.get(name, name) for symbol, name in exported.names().items()}
     for index in range(len(exported.sources)):
         arrays = ("input_value", "input_rate", "input_curvature")
         names |= {s: f"{a}[{index}]" for s, a in zip(input_symbols(index), arrays, strict=True)}
@@ -185,14 +205,16 @@ def parameter_entries(exported: Exported) -> list[str]:
     return [f'"{q.name}": {value!r},  # [{q.unit}] {q.description}' for q, value in pairs]
 
 
-def unpacked_parameters(exported: Exported) -> list[str]:
-    """Return statements that give every parameter its name."""
-    return [f'{q.name} = numbers["{q.name}"]' for q in exported.parameters]
+def unpacked_parameters(exported: Exported, own: Set[str]) -> list[str]:
+    """Return statements that give every parameter its name inside a function with names of its own."""
+    local = local_names(exported, own)
+    return [f'{local[q.name]} = numbers["{q.name}"]' for q in exported.parameters]
 
 
-def unpacked_states(exported: Exported) -> list[str]:
-    """Return the statement that gives every state its name."""
-    return [f"{sequence([q.name for q in exported.states])} = state"] if exported.states else []
+def unpacked_states(exported: Exported, own: Set[str]) -> list[str]:
+    """Return the statement that gives every state its name inside a function with names of its own."""
+    local = local_names(exported, own)
+    return [f"{sequence([local[q.name] for q in exported.states])} = state"] if exported.states else []
 
 
 def sequence(items: list[str]) -> str:
@@ -206,7 +228,7 @@ def _returned(
     names: Mapping[sp.Symbol, str],
     steps: Mapping[sp.Symbol, sp.Expr] | None = None,
 ) -> str:
-    targets = [f"result{i}" for i in range(len(expressions))]
+    targets = results(len(expressions))
     lines = PYTHON.statements(targets, expressions, names, steps or {})
     return indented([*unpack, *lines, f"return [{', '.join(targets)}]"], 2)
 
@@ -250,11 +272,15 @@ def _rest(exported: Exported) -> str:
     if isinstance(rest, Balance):
         return _balance(exported, rest)
     wanted = {"state[0]": rest.displacement, "inertia": rest.inertia, "stiffness": rest.stiffness}
-    names = exported.names()
+    names, local = exported.names(), local_names(exported, _OWN_WORDS_OF_REST)
     used = sorted({names[s] for expression in wanted.values() for s in expression.free_symbols})
     return _REST.format(
-        unpack=indented([f'{name} = numbers["{name}"]' for name in used]),
-        values=indented(PYTHON.statements(list(wanted), list(wanted.values()), names)),
+        unpack=indented([f'{local[name]} = numbers["{name}"]' for name in used]),
+        values=indented(
+            PYTHON.statements(
+                list(wanted), list(wanted.values()), {s: local.get(name, name) for s, name in names.items()}
+            )
+        ),
         damping=rest.damping,
         velocity=exported.structure.velocity_index,
         silenced="".join(f', "{name}": 0.0' for name in rest.silenced),
@@ -262,22 +288,29 @@ def _rest(exported: Exported) -> str:
 
 
 def _balance(exported: Exported, rest: Balance) -> str:
-    names = code_names(exported)
-    numbers = unpacked_parameters(exported)
     n = len(rest.unknown)
     targets = [f"r{i}" for i in range(n)] + [f"s{i}" for i in range(n * n)]
+    own = frozenset(targets)
     lines = PYTHON.statements(
-        targets, [*rest.residuals, *(slope for row in rest.slopes for slope in row)], names
+        targets,
+        [*rest.residuals, *(slope for row in rest.slopes for slope in row)],
+        code_names(exported, own),
     )
     rows = ", ".join(f"[{', '.join(targets[n * (i + 1) : n * (i + 2)])}]" for i in range(n))
     result = f"return np.array([{', '.join(targets[:n])}]), np.array([{rows}])"
-    starts = PYTHON.statements([f"x[{i}]" for i in rest.start], list(rest.start.values()), names)
+    starts = PYTHON.statements(
+        [f"x[{i}]" for i in rest.start], list(rest.start.values()), code_names(exported, _OWN_WORDS_OF_START)
+    )
     text = files("rigsight.export").joinpath("templates/equilibrium.py.txt").read_text("utf-8")
     return filled(
         text,
         {
-            "UNBALANCED": indented([*numbers, *unpacked_states(exported), *lines, result]),
-            "START": indented([*(numbers if starts else ()), *starts]),
+            "UNBALANCED": indented(
+                [*unpacked_parameters(exported, own), *unpacked_states(exported, own), *lines, result]
+            ),
+            "START": indented(
+                [*(unpacked_parameters(exported, _OWN_WORDS_OF_START) if starts else ()), *starts]
+            ),
             "UNKNOWN": ", ".join(map(str, rest.unknown)),
             "BALANCED": repr(BALANCED),
             "UNDER_INPUT": f"        raise ValueError({NO_START!r})"

@@ -11,16 +11,19 @@ import sympy as sp
 
 from rigsight.effects import symbols
 from rigsight.errors import InputError, check_in_range, check_option
-from rigsight.export.c_source import c_source
+from rigsight.export.c_source import c_source, macros
 from rigsight.export.control_system import control_system
 from rigsight.export.equations import Exported, exported, harmless
 from rigsight.export.fmu import Version, fmu
 from rigsight.export.internal_step import LONGEST, internal_step
 from rigsight.export.latex import latex
+from rigsight.export.matlab_function import INPUT_WORDS as MATLAB_INPUTS
 from rigsight.export.matlab_function import WORDS as MATLAB
 from rigsight.export.matlab_function import matlab_function
+from rigsight.export.modelica import FUNCTIONS as MODELICA_FUNCTIONS
 from rigsight.export.modelica import WORDS as MODELICA
 from rigsight.export.modelica import modelica
+from rigsight.export.python_function import INPUT_WORDS as PYTHON_INPUTS
 from rigsight.export.python_function import WORDS as PYTHON
 from rigsight.export.python_function import python_function
 from rigsight.export.reserved_words import SHARED
@@ -55,6 +58,10 @@ class Target:
         What it is written without.
     words
         Words of its language, which no name in any export is; those of C are in `rigsight.export.reserved_words`.
+    own_words
+        From its own name: words that its text uses itself, which no name in this export is.
+    input_words
+        Words that its text uses itself where inputs stand as arguments, which no input's name in this export is.
     steps
         True if it goes from sample to sample itself, so that the hold of the input is its business.
     fixed_step
@@ -69,6 +76,8 @@ class Target:
     write: Callable[[Exported, str, str], str | bytes]
     lacks: frozenset[str] = frozenset()
     words: frozenset[str] = frozenset()
+    own_words: Callable[[str], frozenset[str]] = lambda _: frozenset()
+    input_words: frozenset[str] = frozenset()
     steps: bool = True
     fixed_step: bool = False
     named: bool = True
@@ -79,32 +88,41 @@ TARGETS: dict[str, Target] = {
     for target in (
         Target(
             "python", ".py", "a Python function; needs numpy", lambda e, s, _: python_function(e, s),
-            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), words=PYTHON, fixed_step=True, named=False,
+            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), words=PYTHON, input_words=PYTHON_INPUTS, fixed_step=True,
+            named=False,
         ),
         Target(
             "control", ".py", "a python-control NonlinearIOSystem", control_system,
             lacks=frozenset({STICKING, DELAY, SENSOR_DELAY, ACCELERATION, FELT_ACCELERATION}), words=PYTHON, steps=False,
             named=False,
         ),
-        Target("c", ".c", "one C99 file without dependencies", c_source, lacks=frozenset({FELT_ACCELERATION})),
-        Target("fmu", ".fmu", "an FMU: FMI 2.0, co-simulation", fmu, lacks=frozenset({FELT_ACCELERATION})),
         Target(
-            "fmu3", ".fmu", "an FMU: FMI 3.0, co-simulation", partial(fmu, version=3), lacks=frozenset({FELT_ACCELERATION})
+            "c", ".c", "one C99 file without dependencies", c_source, lacks=frozenset({FELT_ACCELERATION}), own_words=macros,
+        ),
+        Target(
+            "fmu", ".fmu", "an FMU: FMI 2.0, co-simulation", fmu, lacks=frozenset({FELT_ACCELERATION}), own_words=macros,
+        ),
+        Target(
+            "fmu3", ".fmu", "an FMU: FMI 3.0, co-simulation", partial(fmu, version=3), lacks=frozenset({FELT_ACCELERATION}),
+            own_words=macros,
         ),
         Target(
             "matlab", ".m", "a MATLAB function; Octave runs it too", matlab_function,
-            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), words=MATLAB, fixed_step=True,
+            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), words=MATLAB, input_words=MATLAB_INPUTS,
+            fixed_step=True,
         ),
         Target("latex", ".tex", "equations and numbers for a document", lambda e, s, _: latex(e, s), steps=False, named=False),
         Target(
             "modelica", ".mo", "a Modelica model", modelica,
-            lacks=frozenset({STICKING, ACCELERATION, FELT_ACCELERATION}), words=MODELICA, steps=False,
+            lacks=frozenset({STICKING, ACCELERATION, FELT_ACCELERATION}), words=MODELICA,
+            own_words=lambda _: MODELICA_FUNCTIONS, steps=False,
         ),
     )
 }  # fmt: skip
 """In the order in which they are shown."""
 RESERVED = SHARED.union(*(target.words for target in TARGETS.values()))
-"""A name inside an export is none of these, so that it is the same in all of them."""
+"""A name inside an export is none of these, so that it is the same in all of them; what the text of a single target uses itself
+costs a name in that target alone."""
 
 
 def export_model(
@@ -130,7 +148,7 @@ def export_model(
     name
         Name of the function, model or prefix.
     hold
-        How the input behaves between samples; default is the model's.
+        How the input behaves between samples, of a target that goes from sample to sample; default is the model's.
     step
         Longest internal step [s] of a target with a fixed one; default follows from the model's own time scales.
     source_only
@@ -155,7 +173,13 @@ def export_model(
         _check_name(chosen, name)
     if step is not None:
         _check_step(chosen, step)
-    content = exported(model, _hold(chosen, model, hold), step or LONGEST, RESERVED)
+    content = exported(
+        model,
+        _hold(chosen, model, hold),
+        step or LONGEST,
+        RESERVED | chosen.own_words(name),
+        chosen.input_words,
+    )
     _check_expressible(chosen, content)
     if step is None and chosen.fixed_step:
         content = replace(content, step=internal_step(model))
@@ -223,7 +247,7 @@ def _check_expressible(target: Target, content: Exported) -> None:
 def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
     hold = model.hold if wished is None else wished
     if wished is not None:
-        check_option("--hold", wished, ("foh", "zoh"))
+        _check_hold(target, wished)
     mechanism = model.structure.rig.mechanism
     prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
     if set(mechanism.inputs) <= prescribing or not target.steps:
@@ -235,6 +259,15 @@ def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
             "sample faster for the same accuracy) or --hold zoh."
         )
     return hold
+
+
+def _check_hold(target: Target, hold: Hold) -> None:
+    if not target.steps:
+        able = ", ".join(t.name for t in TARGETS.values() if t.steps)
+        raise InputError(
+            f"--hold is of {able}; what is written for {target.name} leaves the input between samples to others. Leave it out."
+        )
+    check_option("--hold", hold, ("foh", "zoh"))
 
 
 def _check_step(target: Target, step: float) -> None:
