@@ -60,7 +60,7 @@ def test_another_declaration_is_regressed_without_new_code() -> None:
     force += np.random.default_rng(0).normal(scale=1e-3 * np.std(force), size=force.size)
     record = Record(name="run", dt=dt, signals={"u": x}, units={})
     motion = Motion(record, x, v, np.gradient(v, dt), x, x)
-    found = force_equation(law, [motion], Rows.weak(0.1, dt), [force], {"n": 1.0}, np.random.default_rng(0))
+    found = force_equation(law, [motion], Rows.weak(0.1), [force], {"n": 1.0}, np.random.default_rng(0))
     shown = {name for name, share in found.inclusion.items() if share > 0.9}
     assert shown == {"x'", "|x'| F^3"}
     assert found.coefficients["x'"] == pytest.approx(stiffness, rel=0.02)

@@ -40,3 +40,11 @@ def test_nothing_is_seen_where_nothing_is_lacking(make_data) -> None:
     assert found.terms == ()
     assert found.to_json()["terms"] == []
     assert found.sentence.startswith("No product")
+
+
+@pytest.mark.parametrize("dt", [2.5e-3, 1e-2])
+def test_records_of_different_sample_times_show_the_same_force(make_data, dt: float) -> None:
+    values, data = make_data("cubic", 2e-5, sample_times={0.6: dt})
+    (term,) = shape_of(data).terms
+    assert term.term == "x^3"
+    assert term.coefficient == pytest.approx(values["k_3"], rel=0.05)

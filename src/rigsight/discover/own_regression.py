@@ -22,7 +22,7 @@ def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> 
     """Return the form of the rows: windows for a rig whose angular frequency is ``1 / time``, or single points."""
     if pointwise:
         return Rows.pointwise(max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
-    return Rows.weak(_WINDOW * 2.0 * np.pi * time, motions[0].dt)
+    return Rows.weak(_WINDOW * 2.0 * np.pi * time)
 
 
 def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], rows: Rows) -> Projected:
@@ -43,20 +43,22 @@ def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], row
     rests = all(is_constant(motion.u) for motion in motions)
     blocks, targets = [], []
     for motion in motions:
-        velocity, displacement = rows.velocity(motion), rows.of(motion.x)
+        velocity, displacement = rows.velocity(motion), rows.of(motion.x, motion.dt)
         one = np.ones_like(displacement)
         if not rig.is_driven:
             blocks.append(np.column_stack([velocity, displacement, one]))
-            targets.append(rows.of(motion.measured))
+            targets.append(rows.of(motion.measured, motion.dt))
             continue
         # A constant drive is part of the constant term; its column is kept as zeros, so that the others keep their positions.
-        drive = np.zeros_like(one) if rests else rows.of(motion.u)
+        drive = np.zeros_like(one) if rests else rows.of(motion.u, motion.dt)
         own = (drive, -velocity, -displacement, one) if has_stiffness else (drive, -velocity, one)
         blocks.append(np.column_stack(own))
         targets.append(rows.acceleration(motion))
-    target = np.concatenate(targets)
-    independent = max(target.size * rows.independent_share(order), 10.0)
-    return Projected(np.concatenate(blocks), target, independent)
+    independent = sum(
+        target.size * rows.independent_share(order, motion.dt)
+        for target, motion in zip(targets, motions, strict=True)
+    )
+    return Projected(np.concatenate(blocks), np.concatenate(targets), max(independent, 10.0))
 
 
 def own_terms(rig: Rig, has_stiffness: bool, projected: Projected) -> dict[str, NDArray[np.float64]]:
