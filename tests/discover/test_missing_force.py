@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rigsight.discover import RegressionData, missing_force
 from rigsight.discover.missing_force import MissingForce
+from rigsight.errors import InputError
 from rigsight.identify import characteristic_scales, linear_start
+from rigsight.records import Record
 
 
-def shape_of(data: RegressionData) -> MissingForce:
+def shape_of(data: RegressionData, records: Sequence[Record] | None = None) -> MissingForce:
+    """Return the shape on some records, with the linear values of all of them."""
     estimation = [record for record in data.records if record.role == "estimation"]
     values = {**data.campaign.constants, **linear_start(data.rig, estimation, data.campaign.constants, {})}
     scales = characteristic_scales(data.rig, estimation, values)
-    return missing_force(data.rig, estimation, values, scales, data.noise["x"], np.random.default_rng(0))
+    rng = np.random.default_rng(0)
+    return missing_force(data.rig, records or estimation, values, scales, data.noise["x"], rng)
 
 
 def test_a_cube_is_seen_as_a_cube(make_data) -> None:
@@ -48,3 +55,15 @@ def test_records_of_different_sample_times_show_the_same_force(make_data, dt: fl
     (term,) = shape_of(data).terms
     assert term.term == "x^3"
     assert term.coefficient == pytest.approx(values["k_3"], rel=0.05)
+
+
+def test_a_record_shorter_than_a_window_changes_nothing(make_data) -> None:
+    _, data = make_data("cubic", 2e-5, validation=False)
+    tail = replace(data.records[0].slice(-40, None), name="tail")
+    assert shape_of(data, [*data.records, tail]).terms == shape_of(data).terms
+
+
+def test_records_that_are_all_too_short_are_refused(make_data) -> None:
+    _, data = make_data("cubic", 2e-5, validation=False)
+    with pytest.raises(InputError, match=r"too short for a regression: the longest has 0\.2 s"):
+        shape_of(data, [record.slice(-40, None) for record in data.records])

@@ -110,6 +110,11 @@ def missing_force(
         Source of the ensemble.
     has_stiffness
         False for an axis without a spring.
+
+    Raises
+    ------
+    InputError
+        If the records are too short for a regression.
     """
     motions = [motion_of(rig, record, values, noise) for record in records]
     rows = rows_of(motions, scales["time"])

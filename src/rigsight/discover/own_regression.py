@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected
 from rigsight.discover.weak_form import Rows
+from rigsight.errors import InputError
 from rigsight.records.plausibility import is_constant
 from rigsight.rigs import Rig
 
@@ -38,6 +39,11 @@ def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], row
         Of all records.
     rows
         The form of the rows.
+
+    Raises
+    ------
+    InputError
+        If the records are too short: they give no more rows than there are terms.
     """
     order = 2 if rig.is_driven else 0
     rests = all(is_constant(motion.u) for motion in motions)
@@ -58,7 +64,14 @@ def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], row
         target.size * rows.independent_share(order, motion.dt)
         for target, motion in zip(targets, motions, strict=True)
     )
-    return Projected(np.concatenate(blocks), np.concatenate(targets), max(independent, 10.0))
+    base = np.concatenate(blocks)
+    if base.shape[0] <= base.shape[1]:
+        longest = max(motion.x.size * motion.dt for motion in motions)
+        raise InputError(
+            f"The records are too short for a regression: the longest has {longest:.3g} s, and the equations are integrated over "
+            f"windows of {rows.width:.3g} s. Add a longer record."
+        )
+    return Projected(base, np.concatenate(targets), max(independent, 10.0))
 
 
 def own_terms(rig: Rig, has_stiffness: bool, projected: Projected) -> dict[str, NDArray[np.float64]]:

@@ -40,7 +40,13 @@ class Windows:
     step: int
 
     def against(self, signal: NDArray[np.float64], order: int) -> NDArray[np.float64]:
-        """Return the integrals of a signal with the test function or one of its derivatives, shape (n_rows,)."""
+        """Return the integrals of a signal with the test function or one of its derivatives, shape (n_rows,).
+
+        There are none if the signal is shorter than a window.
+        """
+        if signal.size < self.weights.shape[1]:
+            # numpy would exchange the two, and slide the signal along the test function.
+            return np.zeros(0)
         return np.asarray(np.correlate(signal, self.weights[order], "valid")[:: self.step])
 
 
