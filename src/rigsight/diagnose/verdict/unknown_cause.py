@@ -19,8 +19,8 @@ def force_of_one_motion(
 ) -> MissingForce | None:
     """Return the shape of the force missing on a rig with one motion; None for any other rig.
 
-    There is none beside effects that are modelled already either: the rig's own terms do not stand alone there. Records that
-    are too short for a regression show none.
+    There is none beside effects that are modelled already either: the rig's own terms do not stand alone there. Nor is there
+    one from records that are too short for a regression, or whose own constants change inertia, spring or damper.
 
     Parameters
     ----------
@@ -34,11 +34,10 @@ def force_of_one_motion(
     if context.modelled or not context.rig.has_one_motion:
         return None
     noise = context.noise[context.rig.outputs[0].name]
+    centered = without_offsets(context.estimation, reidentified.fit)
     values = reidentified.fit.values
     try:
-        return missing_force(
-            context.rig, context.estimation, values, context.scales, noise, rng, has_stiffness
-        )
+        return missing_force(context.rig, centered, values, context.scales, noise, rng, has_stiffness)
     except InputError:
         return None
 
