@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,13 @@ import pytest
 
 from rigsight.cli import app
 from rigsight.discover import MONOMIALS
+from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.discover import run_discover
+from rigsight.workflow.discover import regression_data, run_discover
 from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
@@ -59,6 +61,12 @@ def test_an_unknown_method_is_told_with_those_allowed(axis_campaign: Path, tmp_p
     with pytest.raises(InputError, match=r"'fulll'.*Did you mean 'full'.*'discrepancy'"):
         run_discover(axis_campaign, tmp_path / "out", method="fulll")
     assert not (tmp_path / "out").exists()
+
+
+def test_effects_that_are_modelled_already_are_refused(axis_campaign: Path) -> None:
+    campaign = replace(read_campaign(axis_campaign), modelled=(effect_named("sensor_delay"),))
+    with pytest.raises(InputError, match=r"declares sensor_delay\. Leave them out of its effects"):
+        regression_data(campaign)
 
 
 def test_the_command_says_the_equation_and_where_it_is(axis_campaign: Path, tmp_path: Path) -> None:

@@ -147,7 +147,8 @@ def regression_data(campaign: Campaign) -> RegressionData:
     Raises
     ------
     InputError
-        If its rig of one motion has other symbols than the built-in rigs, or records have constants of their own.
+        If its rig of one motion has other symbols than the built-in rigs, it models effects already, or records have constants
+        of their own.
     """
     _check_can_be_discovered(campaign)
     drifts = not has_stiffness(campaign)
@@ -177,13 +178,20 @@ def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
 
 
 def _check_can_be_discovered(campaign: Campaign) -> None:
-    """Refuse what a discovery does not support: rigs of one motion with other symbols than the built-in ones, own constants."""
+    """Refuse what a discovery does not support: symbols that no built-in rig has, effects modelled already, own constants."""
     rig = campaign.rig
     if rig.has_one_motion and not is_built_in_motion(rig):
         listed = ", ".join(name for name, built_in in RIGS.items() if built_in.has_one_motion)
         raise InputError(
             f"'rigsight discover' does not support your rig '{rig.name}': for rigs of one motion it supports only {listed}. "
             "If yours has the same equation, use one of these."
+        )
+    if campaign.modelled:
+        listed = ", ".join(effect.name for effect in campaign.modelled)
+        raise InputError(
+            "'rigsight discover' does not support effects that are modelled already, and the campaign declares "
+            f"{listed}. Leave them out of its effects, so that they are searched for like any other, or use 'rigsight diagnose', "
+            "which keeps them."
         )
     for record in campaign.records:
         if record.constants:
