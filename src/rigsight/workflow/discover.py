@@ -11,7 +11,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import cut, window_length
+from rigsight.diagnose.fitting.windows import WINDOW, cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
@@ -159,6 +159,24 @@ def regression_data(campaign: Campaign) -> RegressionData:
     )
 
 
+def only(data: RegressionData, record: Record) -> RegressionData:
+    """Return the data with one estimation record alone, whole or in windows, and with all validation records.
+
+    Parameters
+    ----------
+    data
+        Of the whole campaign.
+    record
+        One of the campaign's estimation records.
+    """
+    own = tuple(
+        r
+        for r in data.records
+        if r.role == "validation" or r.name == record.name or r.name.startswith(f"{record.name}{WINDOW}")
+    )
+    return replace(data, windows=own)
+
+
 def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
     """Write all results of a discovery into a folder, all or none.
 
@@ -214,9 +232,8 @@ def _one_by_one(
     """Discover on each estimation record alone; if that fails, the result is the reason."""
 
     def alone(record: Record) -> tuple[str, Discovery | str]:
-        own = [r for r in data.records if r.role == "validation" or r.name.startswith(record.name)]
         try:
-            return record.name, discover(replace(data, windows=tuple(own)), method, pointwise, seed)
+            return record.name, discover(only(data, record), method, pointwise, seed)
         except RigsightError as error:
             return record.name, str(error)
 
