@@ -20,7 +20,7 @@ from rigsight.discover.regression import information_criterion
 from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import STRONG, independent_samples
-from rigsight.discover.terms.equations import equations
+from rigsight.discover.terms.equations import equations, held_numbers
 from rigsight.effects import effect_named, placed
 from rigsight.effects.placed import kind_of
 from rigsight.errors import SimulationError
@@ -199,9 +199,7 @@ def _assembled(
     own_joints = {str(term.effect.at) for term in chosen.terms}
     joints = tuple(sorted(joints, key=lambda force: force.joint not in own_joints))
     structure, values = chosen.fit.structure, chosen.fit.values
-    constants = {p.name for p in rig.constants}
-    numbers = {n: v for n, v in values.items() if n not in chosen.fit.free and n not in constants}
-    text, latex = equations(structure, numbers)
+    text, latex = equations(structure, held_numbers(chosen.fit))
     units = {p.name: p.unit for p in structure.parameters}
     coefficients = {
         name: Coefficient(values[name], chosen.fit.standard_errors[name], units[name])
