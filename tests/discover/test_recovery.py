@@ -11,6 +11,8 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery, RegressionData, discover
+from rigsight.discover.bench import Bench
+from rigsight.discover.selection import Selection, select
 from rigsight.effects import effect_named
 from rigsight.records import Record
 from rigsight.rigs import ELEMENT, RUNNING_GEAR, Rig
@@ -163,6 +165,20 @@ def test_the_held_out_error_is_that_of_the_polished_equation(
     (run,) = found.runs
     left = np.sqrt(np.mean((run.measured - run.simulated) ** 2)) / data.noise["x"]
     assert left == pytest.approx(found.held_out_error)
+
+
+def test_a_chosen_equation_whose_score_stayed_rough_is_scored(
+    make_data: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def rough(bench: Bench, progress: Callable[[str], None]) -> Selection:
+        selection = select(bench, progress)
+        return replace(selection, best=replace(selection.best, residuals=np.zeros(0)))
+
+    monkeypatch.setattr("rigsight.discover.discovery.select", rough)
+    _, data = make_data("linear", 2e-5, seconds=5.0, validation=False)
+    found = discover(data)
+    assert found.held_out_error == pytest.approx(1.0, abs=0.1)
+    assert [run.record for run in found.runs] == list(found.held_out)
 
 
 def test_without_validation_a_record_is_set_aside_and_this_is_said(make_data: Make) -> None:

@@ -129,6 +129,9 @@ def discover(
     final, held = _polished(data, bench, chosen)
     # A record that was set aside is used in the final fit too: it is unseen only for the selection of the equation.
     judged = chosen if how else bench.scored(chosen.support, final)
+    if math.isfinite(judged.error_over_noise) and judged.residuals.size == 0:
+        # A short equation may be chosen although its error is so far above that of a longer one that its score stayed rough.
+        judged = bench.scored(chosen.support, judged.fit)
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     say("polished")
