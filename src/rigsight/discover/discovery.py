@@ -121,10 +121,6 @@ def discover(
         threads=threads,
     )
     selection = select(bench, say)
-    if not math.isfinite(selection.best.error_over_noise):
-        raise SimulationError(
-            f"The equations of {data.rig.name} cannot be simulated near these records: {selection.best.fit.message}"
-        )
     chosen = _without_damper(bench, selection, say)
     final, held = _polished(data, bench, chosen)
     # A record that was set aside is used in the final fit too: it is unseen only for the selection of the equation.
