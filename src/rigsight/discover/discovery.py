@@ -224,7 +224,7 @@ def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], Non
     damping = bench.rig.motion.damping.name
     if damping not in bench.own_terms:
         return chosen
-    special = {name for effect in chosen.fit.structure.effects for name in effect.special_cases}
+    special = {(e.name, own) for e in chosen.fit.structure.effects for own in e.special_cases}
     without = bench.trial(
         Attempt(
             chosen.support,

@@ -45,10 +45,12 @@ def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, sam
     """
     found = []
     for name, coefficient in own.items():
+        # Beside another effect with such a parameter its name is qualified.
+        counts_from_zero = name.removeprefix(f"{effect.name}.") not in effect.special_cases
         size = abs(coefficient.value)
         if not math.isfinite(coefficient.std):
             found.append(f"{name} is not determined by these records")
-        elif name not in effect.special_cases and coefficient.std > size / _ZERO:
+        elif counts_from_zero and coefficient.std > size / _ZERO:
             found.append(f"{name} is not significantly different from zero")
         elif coefficient.std > _VAGUE * size:
             found.append(f"{name} is known to {100.0 * coefficient.std / size:.0f} % only")

@@ -111,11 +111,10 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
             lambda support: progress(", ".join(sorted(support)) or "linear"),
         )
         enough = HOPELESS * min(trial.error_over_noise for trial in bench.trials.values())
-        special = {trial.support: dict(trial.fit.structure.fixed) for trial in trials}
         releases = [
-            Attempt(t.support, frozenset(own), {**t.fit.values, **own})
+            Attempt(t.support, special, {**t.fit.values, **dict(t.fit.structure.fixed)})
             for t in trials
-            if (own := special[t.support]) and t.error_over_noise < enough and not at_floor(t)
+            if (special := t.fit.structure.special_cases) and t.error_over_noise < enough and not at_floor(t)
         ]
         released = {trial.support: trial for trial in bench.trials_of(releases)}
         return [_better(trial, released.get(trial.support)) for trial in trials]
