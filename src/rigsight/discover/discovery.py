@@ -16,10 +16,10 @@ from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_discovery import discover_at_joints
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.own_regression import own_regression, own_terms, rows_of
-from rigsight.discover.regression import Projected, alike
+from rigsight.discover.regression import STRONG, Projected, alike
 from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Discovery
-from rigsight.discover.selection import STRONG, Selection, criterion, select
+from rigsight.discover.selection import Selection, criterion, select
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate, candidates, offered_effects
 from rigsight.discover.weak_form import Rows

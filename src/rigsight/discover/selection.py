@@ -16,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
-from rigsight.discover.regression import information_criterion, sparse_path
+from rigsight.discover.regression import STRONG, information_criterion, sparse_path
 from rigsight.errors import SimulationError
 
-STRONG = 10.0
-"""Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
 _SEEDS = 5
 _LONGEST_SEED = 3
 _MOST_TERMS = 5

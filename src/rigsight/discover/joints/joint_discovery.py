@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.discover.doubts import still_missing
 from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_force import JointForce, missing_forces, not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm
-from rigsight.discover.regression import information_criterion
+from rigsight.discover.regression import STRONG, information_criterion
 from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
-from rigsight.discover.selection import STRONG, independent_samples
+from rigsight.discover.selection import independent_samples
 from rigsight.discover.terms.equations import equations, held_numbers
 from rigsight.effects import effect_named, placed
 from rigsight.effects.placed import kind_of
@@ -41,8 +42,6 @@ from rigsight.simulate.model import Model
 Floats = NDArray[np.float64]
 
 _EVALUATIONS = 100
-_FLOOR = 1.5
-"""Error in noise floors above which an effect is still missing."""
 _NO_WORSE = 1.05
 """Factor of the held-out error up to which an equation with fewer terms is shortened further."""
 _VAGUE = 3.0
@@ -340,11 +339,7 @@ def _warnings(
         found.append(
             f"{listed} does not increase the held-out error, but does not lower it significantly either."
         )
-    if chosen.error_over_noise > _FLOOR:
-        found.append(
-            f"The equations leave {chosen.error_over_noise:.1f} times the noise floor in free run on the held-out records: "
-            "an effect is still missing, or disturbances are larger than the noise floor."
-        )
+    found += still_missing(chosen.error_over_noise)
     unknown = [name for name, c in coefficients.items() if not math.isfinite(c.std)]
     if unknown:
         found.append(f"These records do not determine {', '.join(unknown)}.")
