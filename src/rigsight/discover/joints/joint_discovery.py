@@ -79,7 +79,7 @@ def discover_at_joints(
     InputError
         If there is no estimation record, one is too short, or none moves the rig.
     SimulationError
-        If the rig's own equations cannot be simulated near the records.
+        If the rig's own equations cannot be simulated near the records, or its linearized responses cannot be regressed.
     """
     say = progress or (lambda _: None)
     polisher = _Polisher(data, IdleThreads(n_jobs))
@@ -91,7 +91,12 @@ def discover_at_joints(
     say("re-identified")
     known = {**data.campaign.constants, **alone.fit.values}
     centered = without_offsets(polisher.estimation, alone.fit)
-    joints = missing_forces(data.rig, centered, known, data.noise, np.random.default_rng(seed))
+    try:
+        joints = missing_forces(data.rig, centered, known, data.noise, np.random.default_rng(seed))
+    except np.linalg.LinAlgError as error:
+        raise SimulationError(
+            f"The missing forces of {data.rig.name} cannot be found from its responses linearized about these records ({error})."
+        ) from error
     say("missing forces")
     found = [alone]
     # The law of a joint that is ruled out is not refitted.
