@@ -64,7 +64,8 @@ class Truth:
             for i, e in enumerate(structure.equations)
             if e.limit is not None
         }
-        self._friction, self._velocity = frozen.friction_mode, structure.velocity_index
+        single = frozen.single_friction
+        self._friction, self._velocity = None if single is None else single.mode, structure.velocity_index
         self._dependent = frozen.dependent_modes
         self._held = held
         self._atol = RTOL * np.maximum(sizes, 1e-290)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,8 +45,8 @@ TRUTHS = {
 }
 
 
-def _sweep(amplitude: float, seconds: float) -> np.ndarray:
-    t = DT * np.arange(round(seconds / DT))
+def _sweep(amplitude: float, seconds: float, dt: float = DT) -> np.ndarray:
+    t = dt * np.arange(round(seconds / dt))
     ratio = 60.0
     return amplitude * np.sin(seconds / np.log(ratio) * (ratio ** (t / seconds) - 1.0))
 
@@ -60,7 +60,10 @@ def _multisine(amplitude: float, seconds: float, rng: np.random.Generator) -> np
 
 @pytest.fixture(scope="session")
 def make_data() -> Callable[..., tuple[dict[str, float], RegressionData]]:
-    """Return the true values and the data of an axis: sweeps of several amplitudes, and a multisine that is held out."""
+    """Return the true values and the data of an axis: sweeps of several amplitudes, and a multisine that is held out.
+
+    Sweeps have the sample time `DT` unless another is given by their amplitude.
+    """
 
     def make(
         truth: str,
@@ -69,18 +72,20 @@ def make_data() -> Callable[..., tuple[dict[str, float], RegressionData]]:
         seconds: float = 10.0,
         seed: int = 0,
         validation: bool = True,
+        sample_times: Mapping[float, float] | None = None,
     ) -> tuple[dict[str, float], RegressionData]:
         rng = np.random.default_rng(seed)
         known = known_terms()
         structure = compose(AXIS, [known[name] for name in TRUTHS[truth].effects])
         values = {**LINEAR, **TRUTHS[truth].values}
-        inputs = [(f"sweep_{a}", "estimation", _sweep(a, seconds)) for a in amplitudes]
+        dts = {a: (sample_times or {}).get(a, DT) for a in amplitudes}
+        inputs = [(f"sweep_{a}", "estimation", dts[a], _sweep(a, seconds, dts[a])) for a in amplitudes]
         if validation:
-            inputs.append(("multisine", "validation", _multisine(0.45, 0.6 * seconds, rng)))
+            inputs.append(("multisine", "validation", DT, _multisine(0.45, 0.6 * seconds, rng)))
         records = []
-        for name, role, u in inputs:
+        for name, role, dt, u in inputs:
             record = simulate(
-                structure, values, Record(name=name, dt=DT, signals={"u": u}, units={}, role=role)
+                structure, values, Record(name=name, dt=dt, signals={"u": u}, units={}, role=role)
             )
             records.append(record.with_signals(x=record["x"] + rng.normal(scale=noise, size=u.size)))
         return values, RegressionData(Campaign("axis", AXIS, {"gain": 0.8}, {}, tuple(records)), {"x": noise})

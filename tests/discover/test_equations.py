@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
+import numpy as np
 import pytest
 import sympy as sp
 
-from rigsight.discover.terms.equations import equations
+from rigsight.discover.terms.equations import equations, held_numbers
 from rigsight.effects import effect_named
 from rigsight.effects.iwan_hysteresis import N_ELEMENTS
+from rigsight.identify import FitResult
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose
 from rigsight.simulate.printing.shown import flat_equations
@@ -47,6 +49,20 @@ def test_a_number_takes_the_place_of_the_parameter_of_a_limit() -> None:
     text, latex = equations(structure, {"x_s": 0.5})
     assert text[1] == "z_0' = x' within |z_0| <= 0.001675"
     assert latex[1].endswith(r"\left|z_{0}\right| \leq 0.001675")
+
+
+def test_a_number_is_written_with_its_digits() -> None:
+    text, latex = equations(compose(RIGS["drive_train"], []), {"J_m": 0.0314159265358979 / 3.7, "d_m": 0.0})
+    assert text[0] == "0.008491 phi_m'' = k_t u - d_s (phi_m' - phi_l') - k_s (phi_m - phi_l)"
+    assert latex[0].startswith(r"0.008491 \ddot{\phi}_{m} = k_{t} u")
+
+
+def test_of_held_parameters_only_those_that_shorten_the_equations_are_written_as_numbers() -> None:
+    structure = compose(RIGS["drive_train"], [effect_named("power_law_stiffness@shaft")])
+    values = dict.fromkeys(structure.names, 0.5) | {"x_r": 0.1234567890123, "k_l": 0.0, "n": 1.0, "k_t": 1.0}
+    free = ("k_p", "n")
+    fit = FitResult(structure, True, "", values, {}, (), 1.0, 1, 1, free, np.eye(2), (), ())
+    assert held_numbers(fit) == {"k_l": 0.0}
 
 
 def test_the_drive_stands_first_and_what_vanishes_does_not_stand() -> None:

@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from rigsight.discover.bench import Bench
+from rigsight.discover.ensembles import regressed_force
 from rigsight.discover.motion import Motion
+from rigsight.discover.regression import Projected
 from rigsight.discover.terms.force_law import ForceLaw, force_equation
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.weak_form import Rows
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.effects.symbols import deflection_rate
+from rigsight.identify import FitResult
 from rigsight.records import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose
 
 BOUC_WEN = effect_named("bouc_wen_hysteresis")
 (Z,) = BOUC_WEN.states
@@ -60,8 +66,29 @@ def test_another_declaration_is_regressed_without_new_code() -> None:
     force += np.random.default_rng(0).normal(scale=1e-3 * np.std(force), size=force.size)
     record = Record(name="run", dt=dt, signals={"u": x}, units={})
     motion = Motion(record, x, v, np.gradient(v, dt), x, x)
-    found = force_equation(law, [motion], Rows.weak(0.1, dt), [force], {"n": 1.0}, np.random.default_rng(0))
+    found = force_equation(law, [motion], Rows.weak(0.1), [force], {"n": 1.0}, np.random.default_rng(0))
     shown = {name for name, share in found.inclusion.items() if share > 0.9}
     assert shown == {"x'", "|x'| F^3"}
     assert found.coefficients["x'"] == pytest.approx(stiffness, rel=0.02)
     assert found.coefficients["|x'| F^3"] == pytest.approx(softening, rel=0.02)
+
+
+def test_springs_act_about_the_rest_that_was_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever rest the motion was smoothed about, the force that is left for the loop is the same."""
+    seen: list[np.ndarray] = []
+
+    def kept(_law: ForceLaw, _motions: object, _rows: object, forces: list[np.ndarray], *_: object) -> None:
+        seen.extend(forces)
+
+    monkeypatch.setattr("rigsight.discover.ensembles.force_equation", kept)
+    structure = compose(AXIS, [BOUC_WEN, effect_named("cubic_stiffness")])
+    values = {"gain": 0.8, "m": 0.5, "d": 1.5, "k": 120.0, "x_off": 2e-3, "force_off": 0.0}
+    values |= {"k_3": 4e5, "a": 0.25, "A": 1.0, "beta": 1200.0, "gamma": 500.0, "n": 1.0}
+    fit = FitResult(structure, True, "", values, {}, (), 1.0, 1, 1, (), np.zeros((0, 0)), ())
+    x, v, acceleration, u = np.random.default_rng(0).normal(scale=5e-3, size=(4, 50))
+    for rest in (0.0, 2e-3):
+        projected = Projected(np.ones((4, 1)), np.ones(4), 4.0)
+        bench = Bench(AXIS, (), (), {**values, "x_off": rest}, {}, {}, frozenset(), {}, projected)
+        motion = Motion(Record("run", 1e-3, {"u": u}, {}), x - rest, v, acceleration, u, x - rest)
+        regressed_force(bench, fit, [motion], Rows.weak(0.1), np.random.default_rng(0))
+    np.testing.assert_allclose(seen[0], seen[1], rtol=1e-9)

@@ -11,7 +11,7 @@ import pytest
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery, RegressionData, discover
 from rigsight.effects import effect_named, placed
-from rigsight.errors import InputError
+from rigsight.errors import InputError, SimulationError
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records.record import Record
@@ -78,6 +78,20 @@ def test_results_say_where(found: Discovery) -> None:
     assert "quadratic_damping at motor_bearing" in subjects
     assert "missing at motor_bearing" in subjects
     assert "Missing at motor bearing" in svg_text(discovery_figure(found), "discovery.svg")
+
+
+def test_responses_that_cannot_be_regressed_are_told(
+    drive_train: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr("rigsight.discover.joints.joint_discovery.missing_forces", singular)
+    data = campaign(drive_train, {**TRAIN, "k_t": 0.05, "c_2": DAMPING})
+    with pytest.raises(
+        SimulationError, match=r"missing forces of drive_train cannot be found .*Singular matrix"
+    ):
+        discover(data)
 
 
 @pytest.mark.parametrize(("method", "pointwise"), [("full", False), ("discrepancy", True)])

@@ -35,4 +35,6 @@ def test_a_column_is_the_term_along_the_motion(
     projected = own_regression(data.rig, True, [motion], rows)
     (found,) = candidates([effect_named(name)], [motion], rows, projected, scales, True)
     # A force that resists: it takes acceleration away.
-    np.testing.assert_allclose(found.column, -rows.of(term(motion.x, motion.v)), rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(
+        found.column, -rows.of(term(motion.x, motion.v), motion.dt), rtol=1e-6, atol=1e-15
+    )

@@ -9,7 +9,7 @@ import pytest
 
 from rigsight.discover import RegressionData
 from rigsight.discover.motion import motion_of
-from rigsight.discover.weak_form import Rows
+from rigsight.discover.weak_form import Rows, windows
 
 Make = Callable[..., tuple[dict[str, float], RegressionData]]
 
@@ -33,11 +33,11 @@ def test_the_missing_force_is_seen_through_the_noise(noise: float, make_data: Ma
 def test_windows_give_the_derivatives_of_a_sine() -> None:
     dt, omega = 1e-3, 12.0
     t = dt * np.arange(4000)
-    rows = Rows.weak(0.05, dt)
-    assert rows.weights is not None
-    middle = t[rows.weights.shape[1] // 2 :][: t.size - rows.weights.shape[1] + 1][:: rows.step]
+    rows = Rows.weak(0.05)
+    own = windows(0.05, dt)
+    middle = t[own.weights.shape[1] // 2 :][: t.size - own.weights.shape[1] + 1][:: own.step]
     # A window averages the sine; value and rate are averaged alike.
-    shrunk = rows.of(np.sin(omega * t)) / np.where(
+    shrunk = rows.of(np.sin(omega * t), dt) / np.where(
         np.abs(np.sin(omega * middle)) > 0.1, np.sin(omega * middle), np.nan
     )
     factor = np.nanmedian(shrunk)

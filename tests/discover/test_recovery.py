@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery, RegressionData, discover
+from rigsight.discover.bench import Bench, Trial
+from rigsight.discover.selection import Selection, select
 from rigsight.effects import effect_named
+from rigsight.errors import SimulationError
 from rigsight.records import Record
 from rigsight.rigs import ELEMENT, RUNNING_GEAR, Rig
 from rigsight.simulate import compose, simulate
@@ -163,6 +167,33 @@ def test_the_held_out_error_is_that_of_the_polished_equation(
     (run,) = found.runs
     left = np.sqrt(np.mean((run.measured - run.simulated) ** 2)) / data.noise["x"]
     assert left == pytest.approx(found.held_out_error)
+
+
+def test_equations_that_cannot_be_simulated_are_told(
+    make_data: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diverged(self: Bench, trial: Any, tolerance: float = 0.0) -> Trial:
+        return Trial(trial.support, trial.fit, float("inf"), np.zeros(0))
+
+    monkeypatch.setattr(Bench, "_finely_scored", diverged)
+    monkeypatch.setattr("rigsight.discover.bench._RoughTrial.error_over_noise", float("inf"))
+    _, data = make_data("linear", 2e-5, amplitudes=(0.3, 0.6), seconds=2.0)
+    with pytest.raises(SimulationError, match="equations of axis cannot be simulated near these records"):
+        discover(data)
+
+
+def test_a_chosen_equation_whose_score_stayed_rough_is_scored(
+    make_data: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def rough(bench: Bench, progress: Callable[[str], None]) -> Selection:
+        selection = select(bench, progress)
+        return replace(selection, best=replace(selection.best, residuals=np.zeros(0)))
+
+    monkeypatch.setattr("rigsight.discover.discovery.select", rough)
+    _, data = make_data("linear", 2e-5, seconds=5.0, validation=False)
+    found = discover(data)
+    assert found.held_out_error == pytest.approx(1.0, abs=0.1)
+    assert [run.record for run in found.runs] == list(found.held_out)
 
 
 def test_without_validation_a_record_is_set_aside_and_this_is_said(make_data: Make) -> None:

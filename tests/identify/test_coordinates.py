@@ -191,7 +191,7 @@ def test_special_values_go_by_the_names_of_the_structure() -> None:
     structure = compose(AXIS, effects, special_values(AXIS, effects))
     assert dict(structure.fixed) == {"bouc_wen_hysteresis.n": 1.0}
     assert "power_law_stiffness.n" in structure.names
-    assert structure.special_cases == {"n"}
+    assert structure.special_cases == {("bouc_wen_hysteresis", "n")}
 
 
 def test_a_parameter_that_was_freed_in_one_structure_stays_free_in_a_larger_one() -> None:

@@ -190,6 +190,28 @@ def test_isaac_settings_hold_friction_and_delay_of_each_joint() -> None:
 
 
 @pytest.mark.parametrize(
+    ("force_range", "limit", "left_out"),
+    [
+        ("-40 40", 40.0, []),
+        ("-10 40", 40.0, ["shoulder_motor_weakest = -10, unlike the upper end"]),
+        ("0 40", 40.0, ["lower limit of shoulder_motor = 0, unlike the upper end"]),
+    ],
+)
+def test_isaac_settings_have_one_limit_for_both_directions(
+    force_range: str, limit: float, left_out: list[str], tmp_path: Path
+) -> None:
+    arm = tmp_path / ARM.name
+    text = ARM.read_text(encoding="utf-8").replace('forcerange="-40 40"', f'forcerange="{force_range}"')
+    arm.write_text(text, encoding="utf-8")
+    draft = draft_rig(load_model(arm), arm.stem)
+    values = {p.name: p.default for p in (*draft.rig.constants, *draft.rig.parameters)}
+    found = isaac_settings(Model(compose(draft.rig, []), values, "zoh"), arm)
+    assert yaml.safe_load(found.text)["actuators"]["shoulder"]["actuator_effort_limit"] == limit
+    assert [one for one in found.without_field if "shoulder" in one and "upper" in one] == left_out
+    assert all(one in found.text for one in left_out)
+
+
+@pytest.mark.parametrize(
     ("controls", "dt", "said"),
     [(np.zeros((5, 3)), STEP, "shape"), (np.zeros((5, 2)), 1.5 * STEP, "multiple of the model's step")],
 )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
@@ -23,6 +26,20 @@ def test_noise_is_smoothed_as_by_exact_cross_validation(noise):
     assert np.std(rate - slope) < 1.2 * np.std(exact.derivative()(t) - slope)
     assert np.std(value - clean) < 1.2 * np.std(exact(t) - clean)
     assert np.std(value - clean) < 0.5 * noise
+
+
+def test_threads_smooth_more_motions_than_are_kept(monkeypatch):
+    interval = sys.getswitchinterval()
+    monkeypatch.setattr("rigsight.simulate.prescribed_motion._CACHED_SAMPLES", 100)
+    monkeypatch.setattr("rigsight.simulate.prescribed_motion._spline", lambda samples: (samples,) * 3)
+    motions = np.random.default_rng(0).standard_normal((10_000, 20))
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            smoothed = list(threads.map(lambda motion: smooth_motion(motion, DT)[0], motions))
+    finally:
+        sys.setswitchinterval(interval)
+    np.testing.assert_array_equal(smoothed, motions)
 
 
 def test_a_motion_without_noise_stays_what_it_is():

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rigsight.campaign import Campaign
 from rigsight.cli import app
-from rigsight.discover import MONOMIALS
+from rigsight.diagnose.fitting.windows import WINDOW, cut
+from rigsight.discover import MONOMIALS, RegressionData
+from rigsight.effects import effect_named
 from rigsight.errors import InputError
+from rigsight.records import Record
+from rigsight.records.record import Role
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.discover import run_discover
+from rigsight.workflow.discover import only, regression_data, run_discover
 from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
@@ -55,10 +61,29 @@ def test_each_record_alone_is_reported_beside_all_together(axis_campaign: Path) 
     assert set(found.to_json()["by_record"]) == {record.name for record in campaign.estimation}
 
 
+def test_a_record_alone_is_not_joined_by_one_whose_name_begins_alike() -> None:
+    def named(name: str, role: Role = "estimation") -> Record:
+        t = 0.01 * np.arange(300)
+        return Record(name, 0.01, {"u": np.sin(t), "x": np.cos(t)}, {}, role=role)
+
+    whole = (named("sine_1"), named("sine_10"), named("other", "validation"))
+    data = RegressionData(Campaign("axis", AXIS, {"gain": 1.0}, {}, whole), {"x": 1e-3})
+    assert [r.name for r in only(data, whole[0]).records] == ["sine_1", "other"]
+    cut_up = replace(data, windows=cut(whole, 1.0))
+    assert {r.name.split(WINDOW)[0] for r in only(cut_up, whole[0]).records} == {"sine_1", "other"}
+    assert len(only(cut_up, whole[0]).records) == 6
+
+
 def test_an_unknown_method_is_told_with_those_allowed(axis_campaign: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"'fulll'.*Did you mean 'full'.*'discrepancy'"):
         run_discover(axis_campaign, tmp_path / "out", method="fulll")
     assert not (tmp_path / "out").exists()
+
+
+def test_effects_that_are_modelled_already_are_refused(axis_campaign: Path) -> None:
+    campaign = replace(read_campaign(axis_campaign), modelled=(effect_named("sensor_delay"),))
+    with pytest.raises(InputError, match=r"declares sensor_delay\. Leave them out of its effects"):
+        regression_data(campaign)
 
 
 def test_the_command_says_the_equation_and_where_it_is(axis_campaign: Path, tmp_path: Path) -> None:

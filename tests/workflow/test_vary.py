@@ -53,6 +53,29 @@ def test_a_linear_model_shows_its_closed_form(write_model: Callable[..., Path]) 
         assert variant.features["static_gain"] == pytest.approx(1.0 / (variant.value - 8.0), rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("effect", "values"), [("coulomb_friction", {"T_c": 2.0}), ("input_dead_zone", {"u_0": 2.0})]
+)
+def test_a_sweep_that_does_not_move_the_rig_is_told(
+    effect: str, values: dict[str, float], write_model: Callable[..., Path]
+) -> None:
+    def held(content: dict[str, Any]) -> None:
+        content.update(effects=[effect], effect_parameters=values, units={})
+
+    (variation,) = run_vary(write_model(held), ["d"], steps=2)
+    assert [variant.features["static_gain"] for variant in variation.variants] == [0.0, 0.0]
+    assert "does not move 'x'; give a larger amplitude" in table_text(variation)
+
+
+def test_a_lag_without_a_time_constant_is_swept(write_model: Callable[..., Path]) -> None:
+    def quick(content: dict[str, Any]) -> None:
+        content.update(effects=["actuator_lag"], effect_parameters={"T_a": 0.0}, units={})
+
+    (variation,) = run_vary(write_model(quick), ["T_a"], low=0.0, high=0.1, steps=2)
+    prompt, slow = (variant.features for variant in variation.variants)
+    assert prompt["peak_magnitude"] > 1.5 * slow["peak_magnitude"]
+
+
 def larger_model(folder: Path, rig: str, values: dict[str, float]) -> Path:
     structure = compose(RIGS[rig])
     model = Model(structure, {name: values[name] for name in structure.names}, "foh")

@@ -13,7 +13,7 @@ from rigsight.discover.doubts import doubts, warnings_of
 from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
-from rigsight.discover.terms.equations import equations
+from rigsight.discover.terms.equations import equations, held_numbers
 from rigsight.discover.terms.force_law import ForceEquation
 from rigsight.identify import FitResult
 from rigsight.records.record import Record
@@ -42,11 +42,7 @@ def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, 
     rig, final, selection = data.rig, found.final, found.selection
     output = rig.outputs[0].name
     structure = final.structure
-    constants = {p.name for p in rig.constants}
-    # The value of a held parameter is written only if it makes the equation shorter.
-    held = {n: v for n, v in final.values.items() if n not in final.free and n not in constants}
-    numbers = {name: value for name, value in held.items() if value in (0.0, 1.0)}
-    text, latex = equations(structure, numbers)
+    text, latex = equations(structure, held_numbers(final))
     own = {p.name for p in rig.parameters}
     units = {p.name: p.unit for p in structure.parameters}
     coefficients = {

@@ -17,6 +17,8 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over, compose, unique_names
 
 Support = frozenset[str]
+Release = frozenset[tuple[str, str]]
+"""Parameters as effect and own name, which is the same whatever other effects a structure has."""
 Progress = Callable[[Support], None]
 _EVALUATIONS = 40
 _FIRST_EVALUATIONS = 12
@@ -79,13 +81,13 @@ class Attempt:
     """
 
     support: Support
-    release: Support = frozenset()
+    release: Release = frozenset()
     start: Mapping[str, float] | None = None
     left_out: Support = frozenset()
     to_beat: float | None = None
 
     @property
-    def key(self) -> tuple[Support, Support, Support]:
+    def key(self) -> tuple[Support, Release, Support]:
         """Key under which the trial is stored."""
         return self.support, self.release, self.left_out
 
@@ -156,7 +158,7 @@ class Bench:
     projected: Projected
     own_terms: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     threads: IdleThreads = field(default_factory=IdleThreads)
-    trials: dict[tuple[Support, Support, Support], Trial] = field(default_factory=dict)
+    trials: dict[tuple[Support, Release, Support], Trial] = field(default_factory=dict)
 
     @property
     def starts(self) -> SupportStarts:
@@ -181,7 +183,7 @@ class Bench:
         """Return the column of a term, one of the library or of the rig's own."""
         return self.own_terms[name] if name in self.own_terms else self.candidates[name].column
 
-    def structure(self, support: Support, release: frozenset[str] = frozenset()) -> Structure:
+    def structure(self, support: Support, release: Release = frozenset()) -> Structure:
         """Return the equations of a support; special values of its effects are inserted unless released."""
         effects = [self.candidates[name].effect for name in sorted(support)]
         names = unique_names(self.rig, tuple(effects))
@@ -189,7 +191,8 @@ class Bench:
             names[effect.name, own]: value
             for effect in effects
             for own, value in effect.special_cases.items()
-            if own not in release and self.candidates[effect.name].inner.get(own, value) == value
+            if (effect.name, own) not in release
+            and self.candidates[effect.name].inner.get(own, value) == value
         }
         return compose(self.rig, effects, fixed)
 
@@ -229,12 +232,12 @@ class Bench:
         Parameters that the longer one released from their special values are released here, too; those of terms that it lacks
         keep them.
         """
-        moved = {name for e in longer.fit.structure.effects for name in e.special_cases}
+        moved = {(e.name, own) for e in longer.fit.structure.effects for own in e.special_cases}
         moved -= longer.fit.structure.special_cases
         before = self.trials_of([Attempt(support) for support in supports])
         attempts = []
         for support, first in zip(supports, before, strict=True):
-            special = {name for n in support for name in self.candidates[n].effect.special_cases}
+            special = {(n, own) for n in support for own in self.candidates[n].effect.special_cases}
             release = frozenset(special & moved)
             structure = self.structure(support, release)
             start = {

@@ -16,10 +16,10 @@ from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_discovery import discover_at_joints
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.own_regression import own_regression, own_terms, rows_of
-from rigsight.discover.regression import Projected, alike
+from rigsight.discover.regression import STRONG, Projected, alike
 from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Discovery
-from rigsight.discover.selection import STRONG, Selection, criterion, select
+from rigsight.discover.selection import Selection, criterion, select
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate, candidates, offered_effects
 from rigsight.discover.weak_form import Rows
@@ -121,14 +121,13 @@ def discover(
         threads=threads,
     )
     selection = select(bench, say)
-    if not math.isfinite(selection.best.error_over_noise):
-        raise SimulationError(
-            f"The equations of {data.rig.name} cannot be simulated near these records: {selection.best.fit.message}"
-        )
     chosen = _without_damper(bench, selection, say)
     final, held = _polished(data, bench, chosen)
     # A record that was set aside is used in the final fit too: it is unseen only for the selection of the equation.
     judged = chosen if how else bench.scored(chosen.support, final)
+    if math.isfinite(judged.error_over_noise) and judged.residuals.size == 0:
+        # A short equation may be chosen although its error is so far above that of a longer one that its score stayed rough.
+        judged = bench.scored(chosen.support, judged.fit)
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     say("polished")
@@ -225,7 +224,7 @@ def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], Non
     damping = bench.rig.motion.damping.name
     if damping not in bench.own_terms:
         return chosen
-    special = {name for effect in chosen.fit.structure.effects for name in effect.special_cases}
+    special = {(e.name, own) for e in chosen.fit.structure.effects for own in e.special_cases}
     without = bench.trial(
         Attempt(
             chosen.support,

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigsight.discover.bench import Trial
+from rigsight.discover.regression import STRONG
 from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Coefficient, Term
-from rigsight.discover.selection import STRONG, Selection, criterion
+from rigsight.discover.selection import Selection, criterion
 from rigsight.discover.terms.force_law import ForceEquation
 from rigsight.effects import Effect
 from rigsight.records.periods import same_signal
@@ -20,6 +21,7 @@ _SURE = 0.9
 _ZERO = 3.0
 _VAGUE = 0.05
 _FLOOR = 1.5
+"""Held-out error in noise floors above which an effect is still missing."""
 _NOISY = 0.1
 """Noise floor, relative to the motion, from which it may mask terms."""
 _MOST_NAMED = 3
@@ -45,10 +47,12 @@ def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, sam
     """
     found = []
     for name, coefficient in own.items():
+        # Beside another effect with such a parameter its name is qualified.
+        counts_from_zero = name.removeprefix(f"{effect.name}.") not in effect.special_cases
         size = abs(coefficient.value)
         if not math.isfinite(coefficient.std):
             found.append(f"{name} is not determined by these records")
-        elif name not in effect.special_cases and coefficient.std > size / _ZERO:
+        elif counts_from_zero and coefficient.std > size / _ZERO:
             found.append(f"{name} is not significantly different from zero")
         elif coefficient.std > _VAGUE * size:
             found.append(f"{name} is known to {100.0 * coefficient.std / size:.0f} % only")
@@ -108,11 +112,7 @@ def warnings_of(
             f"less: every omitted term is in doubt. Regression would select {likeliest} next, which proves nothing at this noise "
             f"level."
         )
-    if error_over_noise > _FLOOR:
-        found.append(
-            f"The equations leave {error_over_noise:.1f} times the noise floor in free run on the held-out records: "
-            "an effect is still missing, or disturbances are larger than the noise floor."
-        )
+    found += still_missing(error_over_noise)
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
     if force is not None:
         fitted = {p.name for p in force.law.effect.parameters if p.fitted}
@@ -128,6 +128,22 @@ def warnings_of(
                 f"{'its' if len(blind) == 1 else 'their'} value comes from the free-run fit alone."
             )
     return tuple(found)
+
+
+def still_missing(error_over_noise: float) -> list[str]:
+    """Return a warning about an error that the noise does not explain; empty if it does.
+
+    Parameters
+    ----------
+    error_over_noise
+        RMS of the held-out free-run error in units of the noise floor.
+    """
+    if error_over_noise <= _FLOOR:
+        return []
+    return [
+        f"The equations leave {error_over_noise:.1f} times the noise floor in free run on the held-out records: "
+        "an effect is still missing, or disturbances are larger than the noise floor."
+    ]
 
 
 def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Record]) -> list[str]:

@@ -99,19 +99,21 @@ def regressed_force(
     own_values = final.structure.values_of(law.effect, values)
     assert law.effect.post_yield_stiffness_ratio is not None
     without_memory = own_values[law.effect.post_yield_stiffness_ratio] * number(motion.stiffness)
+    # Springs act about the polished rest position, not about the one about which the motion was smoothed.
     shift = _rest_shift(bench, final)
+    moved = [replace(own, x=own.x - shift) for own in motions]
     forces = []
-    for own in motions:
+    for own in moved:
         force = (
             number(motion.drive_gain) * own.u
             + number(motion.bias)
             - number(motion.inertia) * own.acceleration
         )
-        force -= number(motion.damping) * own.v + without_memory * (own.x - shift)
+        force -= number(motion.damping) * own.v + without_memory * own.x
         for effect in others:
             force -= torque_along(effect, final.structure.values_of(effect, values), own)
         forces.append(force)
-    return force_equation(law, motions, rows, forces, own_values, rng)
+    return force_equation(law, moved, rows, forces, own_values, rng)
 
 
 def _ancestors(bench: Bench, name: str) -> set[str]:

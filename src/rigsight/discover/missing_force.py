@@ -6,17 +6,18 @@ No cause is named and nothing is simulated: the terms describe the missing force
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.discover.motion import motion_of
+from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.own_regression import own_regression, rows_of
 from rigsight.discover.regression import Projected, alike, inclusion_probabilities
 from rigsight.discover.terms.library import candidates, plain_terms
+from rigsight.errors import InputError
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated
 
@@ -99,7 +100,7 @@ def missing_force(
     rig
         The rig.
     records
-        Estimation records.
+        Estimation records without the offsets of their sensors; constants of their own count only there.
     values
         Constants and re-identified parameters.
     scales
@@ -110,8 +111,13 @@ def missing_force(
         Source of the ensemble.
     has_stiffness
         False for an axis without a spring.
+
+    Raises
+    ------
+    InputError
+        If the records are too short for a regression, or if inertia, spring, damper or constant force differ between them.
     """
-    motions = [motion_of(rig, record, values, noise) for record in records]
+    motions = _driven_by_force(rig, records, values, noise)
     rows = rows_of(motions, scales["time"])
     projected = own_regression(rig, has_stiffness, motions, rows)
     library = candidates(plain_terms(rig, has_stiffness), motions, rows, projected, scales, rig.is_driven)
@@ -132,9 +138,9 @@ def missing_force(
     force = 1.0
     if rig.is_driven:
         # The force of the drive is known: its ratio to the acceleration gives the inertia for these terms.
-        gain = evaluated(rig.motion.drive_gain, values)
         drive, *_ = projected.solved(columns[:, taken])[0]
-        force = gain / drive if gain * drive > 0.0 else evaluated(rig.motion.inertia, values)
+        own = {**values, **records[0].constants}
+        force = 1.0 / drive if drive > 0.0 else evaluated(rig.motion.inertia, own)
     terms = []
     for i, coefficient in zip(taken, coefficients, strict=True):
         (parameter,) = library[i].effect.parameters
@@ -142,6 +148,27 @@ def missing_force(
         unit = rig.with_unit(parameter).unit
         terms.append(ShapeTerm(_text(shape), float(coefficient) * force, unit, float(inclusion[i])))
     return MissingForce(tuple(terms), share)
+
+
+def _driven_by_force(
+    rig: Rig, records: Sequence[Record], values: Mapping[str, float], noise: float
+) -> list[Motion]:
+    """Return the motion of each record, with the force of the drive as its input: records may have different drive gains."""
+    motion = rig.motion
+    common = {**values, **records[0].constants}
+    found = []
+    for record in records:
+        own = {**values, **record.constants}
+        for part in (motion.inertia, motion.damping, motion.stiffness, motion.rest, motion.bias):
+            # One regression with the same coefficients in all records would be wrong.
+            if part is not None and evaluated(part, own) != evaluated(part, common):
+                raise InputError(
+                    f"The constants of record '{record.name}' change the coefficients of the motion."
+                )
+        found.append(motion_of(rig, record, own, noise))
+        if rig.is_driven:
+            found[-1] = replace(found[-1], u=evaluated(motion.drive_gain, own) * found[-1].u)
+    return found
 
 
 def _worth_telling(projected: Projected, columns: NDArray[np.float64], taken: Sequence[int]) -> list[int]:

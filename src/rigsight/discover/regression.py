@@ -24,6 +24,8 @@ N_BLOCKS = 40
 """Number of contiguous stretches of rows that an ensemble draws from; stretches because neighboring rows share their noise."""
 _CLEARLY = 1.1
 """Factor by which a larger support must lower the residual: columns from a smoothed motion are not more accurate than this."""
+STRONG = 10.0
+"""Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
 _TINY = 1e-10
 _RIDGE = 1e-12
 

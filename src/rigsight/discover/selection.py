@@ -8,6 +8,7 @@ kept.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
-from rigsight.discover.regression import information_criterion, sparse_path
+from rigsight.discover.regression import STRONG, information_criterion, sparse_path
+from rigsight.errors import SimulationError
 
-STRONG = 10.0
-"""Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
 _SEEDS = 5
 _LONGEST_SEED = 3
 _MOST_TERMS = 5
@@ -96,6 +96,11 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         Library, records and scales.
     progress
         Called with the terms of each support that has been polished.
+
+    Raises
+    ------
+    SimulationError
+        If no equation can be simulated on the held-out records.
     """
 
     def tried(supports: Sequence[Support]) -> list[Trial]:
@@ -104,11 +109,10 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
             lambda support: progress(", ".join(sorted(support)) or "linear"),
         )
         enough = HOPELESS * min(trial.error_over_noise for trial in bench.trials.values())
-        special = {trial.support: dict(trial.fit.structure.fixed) for trial in trials}
         releases = [
-            Attempt(t.support, frozenset(own), {**t.fit.values, **own})
+            Attempt(t.support, special, {**t.fit.values, **dict(t.fit.structure.fixed)})
             for t in trials
-            if (own := special[t.support]) and t.error_over_noise < enough and not at_floor(t)
+            if (special := t.fit.structure.special_cases) and t.error_over_noise < enough and not at_floor(t)
         ]
         released = {trial.support: trial for trial in bench.trials_of(releases)}
         return [_better(trial, released.get(trial.support)) for trial in trials]
@@ -121,7 +125,12 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
     if not any(at_floor(trial) for trial in pool):
         # The regression may prefer a complex term to a simple one, although only the fit of the complex one gets stuck.
         pool += tried(_special_cases(bench, [trial.support for trial in pool]))
-    independent = independent_samples(min(pool, key=lambda t: t.error_over_noise).residuals)
+    finest = min(pool, key=lambda t: t.error_over_noise)
+    if not math.isfinite(finest.error_over_noise):
+        raise SimulationError(
+            f"The equations of {bench.rig.name} cannot be simulated near these records: {finest.fit.message}"
+        )
+    independent = independent_samples(finest.residuals)
 
     def cost(trial: Trial) -> float:
         return criterion(trial, independent)

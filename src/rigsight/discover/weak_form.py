@@ -11,6 +11,7 @@ D. A. Messenger and D. M. Bortz, "Weak SINDy", Multiscale Model. Simul. 19 (2021
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,69 +25,100 @@ _LEAST_WIDTH = 11
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Test functions for one sample time, with which signals are turned into rows.
+class Windows:
+    """Test functions for one sample time.
 
     Attributes
     ----------
     weights
-        Test function and its first two derivatives with respect to time, integration weights included, shape (3, width); None
-        for point-wise rows.
+        Test function and its first two derivatives with respect to time, integration weights included, shape (3, width).
     step
         Samples from row to row.
     """
 
-    weights: NDArray[np.float64] | None
+    weights: NDArray[np.float64]
     step: int
 
+    def against(self, signal: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+        """Return the integrals of a signal with the test function or one of its derivatives, shape (n_rows,).
+
+        There are none if the signal is shorter than a window.
+        """
+        if signal.size < self.weights.shape[1]:
+            # numpy would exchange the two, and slide the signal along the test function.
+            return np.zeros(0)
+        return np.asarray(np.correlate(signal, self.weights[order], "valid")[:: self.step])
+
+
+@dataclass(frozen=True)
+class Rows:
+    """How signals of records, each with its own sample time, are turned into rows.
+
+    Attributes
+    ----------
+    width
+        Width of the windows [s]; None for point-wise rows.
+    step
+        Samples from row to row of point-wise rows.
+    """
+
+    width: float | None
+    step: int = 1
+
     @classmethod
-    def weak(cls, width: float, dt: float) -> Rows:
+    def weak(cls, width: float) -> Rows:
         """Make windows of `width` [s]."""
-        half = max(round(width / dt), _LEAST_WIDTH) // 2
-        s = np.arange(-half, half + 1) / (half + 1)
-        rate = 1.0 / ((half + 1) * dt)
-        inside = 1.0 - s**2
-        value = inside**_POWER
-        slope = -2.0 * _POWER * s * inside ** (_POWER - 1) * rate
-        bend = 2.0 * _POWER * inside ** (_POWER - 2) * (2.0 * (_POWER - 1) * s**2 - inside) * rate**2
-        # Rows of unit integral, so that a row is the mean of a signal over its window.
-        weights = np.array([value, slope, bend]) / np.sum(value)
-        return cls(weights, max(1, (2 * half + 1) // _ROWS_PER_WINDOW))
+        return cls(width)
 
     @classmethod
     def pointwise(cls, step: int = 1) -> Rows:
         """Make a row of every `step`-th sample."""
         return cls(None, step)
 
-    def of(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of(self, signal: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
         """Return the rows of a signal of shape (n_samples,)."""
-        return signal[:: self.step] if self.weights is None else self._against(signal, 0)
+        return signal[:: self.step] if self.width is None else windows(self.width, dt).against(signal, 0)
 
     def rate_of(self, signal: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
         """Return the rows of the derivative of a signal."""
-        if self.weights is None:
+        if self.width is None:
             return np.asarray(np.gradient(signal, dt)[:: self.step])
-        return -self._against(signal, 1)
+        return -windows(self.width, dt).against(signal, 1)
 
     def velocity(self, motion: Motion) -> NDArray[np.float64]:
         """Return the rows of the velocity."""
-        return motion.v[:: self.step] if self.weights is None else -self._against(motion.x, 1)
+        if self.width is None:
+            return motion.v[:: self.step]
+        return -windows(self.width, motion.dt).against(motion.x, 1)
 
     def acceleration(self, motion: Motion) -> NDArray[np.float64]:
         """Return the rows of the acceleration."""
-        if self.weights is None:
+        if self.width is None:
             return motion.acceleration[:: self.step]
-        return self._against(motion.measured, 2)
+        return windows(self.width, motion.dt).against(motion.measured, 2)
 
-    def independent_share(self, order: int) -> float:
+    def independent_share(self, order: int, dt: float) -> float:
         """Return the number of independent rows per row, less than 1 if windows overlap."""
-        if self.weights is None:
+        if self.width is None:
             return 1.0
-        own = self.weights[order]
+        found = windows(self.width, dt)
+        own = found.weights[order]
         products = np.correlate(own, own, "full") / np.sum(own**2)
-        lags = products[own.size - 1 :: self.step][1:]
+        lags = products[own.size - 1 :: found.step][1:]
         return float(1.0 / (1.0 + 2.0 * np.sum(lags**2)))
 
-    def _against(self, signal: NDArray[np.float64], order: int) -> NDArray[np.float64]:
-        assert self.weights is not None
-        return np.asarray(np.correlate(signal, self.weights[order], "valid")[:: self.step])
+
+@lru_cache(maxsize=64)
+def windows(width: float, dt: float) -> Windows:
+    """Return test functions of a width [s] at a sample time."""
+    half = max(round(width / dt), _LEAST_WIDTH) // 2
+    s = np.arange(-half, half + 1) / (half + 1)
+    rate = 1.0 / ((half + 1) * dt)
+    inside = 1.0 - s**2
+    value = inside**_POWER
+    slope = -2.0 * _POWER * s * inside ** (_POWER - 1) * rate
+    bend = 2.0 * _POWER * inside ** (_POWER - 2) * (2.0 * (_POWER - 1) * s**2 - inside) * rate**2
+    # Rows of unit integral, so that a row is the mean of a signal over its window.
+    weights = np.array([value, slope, bend]) / np.sum(value)
+    weights.setflags(write=False)
+    return Windows(weights, max(1, (2 * half + 1) // _ROWS_PER_WINDOW))

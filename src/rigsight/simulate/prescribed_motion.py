@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from functools import lru_cache
 from hashlib import sha256
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from rigsight.simulate.linear_prediction import continued
 _cache: OrderedDict[bytes, tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]] = (
     OrderedDict()
 )
+_cache_lock = Lock()
 _CACHED_SAMPLES = 2_000_000
 """Number of samples of all records in the cache, 48 MB: a campaign has few records, or hundreds of short windows of them."""
 _PENALTIES = (-16.0, 25.0)
@@ -84,11 +86,16 @@ def _kept(
     samples = np.ascontiguousarray(displacement, dtype=np.float64)
     # Cached, because every candidate needs the same records.
     key = sha256(samples.tobytes()).digest()
-    if key not in _cache:
-        _cache[key] = _spline(samples)
-        while len(_cache) > 1 and sum(kept[0].size for kept in _cache.values()) > _CACHED_SAMPLES:
-            _cache.popitem(last=False)
-    return _cache[key]
+    with _cache_lock:
+        found = _cache.get(key)
+    if found is None:
+        # Outside the lock: threads smooth different records side by side.
+        found = _spline(samples)
+        with _cache_lock:
+            _cache[key] = found
+            while len(_cache) > 1 and sum(kept[0].size for kept in _cache.values()) > _CACHED_SAMPLES:
+                _cache.popitem(last=False)
+    return found
 
 
 def smoothed_noise(

@@ -7,15 +7,12 @@ standard errors.
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.simulate.equations.structure import Structure, ahead_name
 from rigsight.simulate.input_hold import HeldInput
+from rigsight.simulate.parameter_expression import at_parameters
 
 Floats = NDArray[np.float64]
 
@@ -37,14 +34,9 @@ def read_ahead(structure: Structure, held: HeldInput, p: Floats) -> tuple[HeldIn
         return held, p
     own = p.copy()
     for sensor, delay in delays.items():
-        by = float(_function(structure.parameter_symbols, delay)(*(p if p.ndim == 1 else p[:, 0])))
+        by = float(at_parameters(structure, delay, p if p.ndim == 1 else p[:, 0]))
         if not np.isfinite(by):
             continue
         own[structure.names.index(ahead_name(sensor))] = by
         held = held.read_ahead(len(structure.rig.inputs) + structure.observed.index(sensor), by)
     return held, own
-
-
-@lru_cache(maxsize=1024)
-def _function(symbols: tuple[sp.Symbol, ...], delay: sp.Expr) -> Any:
-    return sp.lambdify(symbols, delay, "numpy")

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
+from rigsight.simulate.parameter_expression import at_parameters
 
 
 def as_measured(
@@ -42,7 +39,7 @@ def as_measured(
     dt = held.interval * held.per_sample
     late = [(i, delay) for i, delay in enumerate(structure.shown_late) if delay is not None]
     for column, (output, delay) in enumerate(late, len(structure.outputs)):
-        values = _function(structure.parameter_symbols, delay)(*p)
+        values = at_parameters(structure, delay, p)
         delays = np.broadcast_to(values, p.shape[1])
         visible[:, output] = _shifted(out[:, output], out[:, column] * dt, delays / dt)
     return visible
@@ -79,8 +76,3 @@ def _delayed(value: NDArray[np.float64], rise: NDArray[np.float64], delay: float
         delayed[:begin] = value[0] + rise[0] * (np.arange(begin) - delay)
         delayed[end:] = value[-1] + rise[-1] * (np.arange(end, n_samples) - delay - (n_samples - 1))
     return delayed
-
-
-@lru_cache(maxsize=1024)
-def _function(symbols: tuple[sp.Symbol, ...], delay: sp.Expr) -> Any:
-    return sp.lambdify(symbols, delay, "numpy")

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.simulate.equations.structure import Structure
+from rigsight.simulate.parameter_expression import at_parameters
 
 
 def state_limits(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -29,10 +26,5 @@ def state_limits(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.flo
     limits = np.full((len(structure.equations), p.shape[1]), np.inf)
     for i, equation in enumerate(structure.equations):
         if equation.limit is not None:
-            limits[i] = _function(structure.parameter_symbols, equation.limit)(*p)
+            limits[i] = at_parameters(structure, equation.limit, p)
     return limits
-
-
-@lru_cache(maxsize=1024)
-def _function(symbols: tuple[sp.Symbol, ...], limit: sp.Expr) -> Any:
-    return sp.lambdify(symbols, limit, "numpy")

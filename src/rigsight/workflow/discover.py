@@ -11,7 +11,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import cut, window_length
+from rigsight.diagnose.fitting.windows import WINDOW, cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
@@ -147,7 +147,8 @@ def regression_data(campaign: Campaign) -> RegressionData:
     Raises
     ------
     InputError
-        If its rig of one motion has other symbols than the built-in rigs, or records have constants of their own.
+        If its rig of one motion has other symbols than the built-in rigs, it models effects already, or records have constants
+        of their own.
     """
     _check_can_be_discovered(campaign)
     drifts = not has_stiffness(campaign)
@@ -156,6 +157,24 @@ def regression_data(campaign: Campaign) -> RegressionData:
     return RegressionData(
         campaign, {floor.output: floor.std for floor in floors}, cut(campaign.records, length)
     )
+
+
+def only(data: RegressionData, record: Record) -> RegressionData:
+    """Return the data with one estimation record alone, whole or in windows, and with all validation records.
+
+    Parameters
+    ----------
+    data
+        Of the whole campaign.
+    record
+        One of the campaign's estimation records.
+    """
+    own = tuple(
+        r
+        for r in data.records
+        if r.role == "validation" or r.name == record.name or r.name.startswith(f"{record.name}{WINDOW}")
+    )
+    return replace(data, windows=own)
 
 
 def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
@@ -177,13 +196,20 @@ def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
 
 
 def _check_can_be_discovered(campaign: Campaign) -> None:
-    """Refuse what a discovery does not support: rigs of one motion with other symbols than the built-in ones, own constants."""
+    """Refuse what a discovery does not support: symbols that no built-in rig has, effects modelled already, own constants."""
     rig = campaign.rig
     if rig.has_one_motion and not is_built_in_motion(rig):
         listed = ", ".join(name for name, built_in in RIGS.items() if built_in.has_one_motion)
         raise InputError(
             f"'rigsight discover' does not support your rig '{rig.name}': for rigs of one motion it supports only {listed}. "
             "If yours has the same equation, use one of these."
+        )
+    if campaign.modelled:
+        listed = ", ".join(effect.name for effect in campaign.modelled)
+        raise InputError(
+            "'rigsight discover' does not support effects that are modelled already, and the campaign declares "
+            f"{listed}. Leave them out of its effects, so that they are searched for like any other, or use 'rigsight diagnose', "
+            "which keeps them."
         )
     for record in campaign.records:
         if record.constants:
@@ -206,9 +232,8 @@ def _one_by_one(
     """Discover on each estimation record alone; if that fails, the result is the reason."""
 
     def alone(record: Record) -> tuple[str, Discovery | str]:
-        own = [r for r in data.records if r.role == "validation" or r.name.startswith(record.name)]
         try:
-            return record.name, discover(replace(data, windows=tuple(own)), method, pointwise, seed)
+            return record.name, discover(only(data, record), method, pointwise, seed)
         except RigsightError as error:
             return record.name, str(error)
 

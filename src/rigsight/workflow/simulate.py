@@ -17,7 +17,8 @@ from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
 from rigsight.rigs import Rig
-from rigsight.simulate import parameter_vector, record_input, record_values, rest_state, simulate
+from rigsight.simulate import Structure, parameter_vector, record_input, record_values, rest_state, simulate
+from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.given_simulation import checked_numbers
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
@@ -157,8 +158,9 @@ def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> 
     # If an output equals a state, users know the state by the name of the output.
     sensors = structure.rig.mechanism.sensors
     aliases = {s.name: s.reads.name for s in sensors if s.reads in structure.states}
-    vector = parameter_vector(structure, record_values(structure, model.values, record))
-    state = rest_state(structure, vector, record_input(structure, record))
+    simulated, values = without_vanished_effects(structure, record_values(structure, model.values, record))
+    rest = rest_state(simulated, parameter_vector(simulated, values), record_input(simulated, record))
+    state = _of_all_effects(structure, simulated, rest)
     for name, value in given.items():
         own = aliases.get(name, name)
         if own not in names:
@@ -176,10 +178,21 @@ def _estimated_state(model: Model, record: Record) -> NDArray[np.float64]:
     rig = model.structure.rig
     noise = {s.name: float(np.std(record[s.name])) or 1.0 for s in rig.outputs if s.name in record}
     scales = characteristic_scales(rig, [record], model.values)
-    result = GreyBoxFit(model.structure, [record], scales, noise).fit(model.values, [])
+    simulated, values = without_vanished_effects(model.structure, model.values)
+    result = GreyBoxFit(simulated, [record], scales, noise).fit(values, [])
     if not result.residuals:
         raise InputError(f"The initial state cannot be estimated: {result.message}")
-    return result.rig_states[0]
+    return _of_all_effects(model.structure, simulated, result.rig_states[0])
+
+
+def _of_all_effects(
+    complete: Structure, simulated: Structure, state: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return a state of the simulated equations as one of all effects; states of vanished effects are not used and are zero."""
+    if simulated is complete:
+        return state
+    known = dict(zip(simulated.states, map(float, state), strict=False))
+    return np.array([known.get(symbol, 0.0) for symbol in complete.states])
 
 
 def _csv_text(record: Record, names: list[str]) -> str:

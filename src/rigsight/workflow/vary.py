@@ -218,7 +218,12 @@ def _variant(
         return Variant(value, None, {}, str(error))
     output = simulated[ratio.response]
     # The static equilibrium is not part of the response to the sweep.
-    response = ratio(simulated.with_signals(**{ratio.response: output - output[0]}))
+    moved = output - output[0]
+    response = ratio(simulated.with_signals(**{ratio.response: moved}))
+    if not np.any(moved):
+        still = f"The sweep does not move '{ratio.response}'; give a larger amplitude with --amplitude."
+        none = ("peak_omega", "peak_magnitude", "break_frequency", "fitted_break_frequency")
+        return Variant(value, response, {"static_gain": 0.0, **dict.fromkeys(none)}, still)
     top = peak(response)
     notes = [] if top.is_resonance else ["The magnitude has no peak inside the band."]
     features: dict[str, float | None] = {

@@ -11,12 +11,14 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.fit_context import liveliest
-from rigsight.diagnose.verdict.unknown_cause import traced_to
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
+from rigsight.diagnose.verdict.unknown_cause import force_of_one_motion, traced_to
 from rigsight.discover import JointForce, JointLaw
 from rigsight.effects import effect_named, placed
+from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records.record import Record
-from rigsight.rigs import RIGS
+from rigsight.rigs import AXIS, RIGS
+from rigsight.simulate import compose, simulate
 
 TRAIN = RIGS["drive_train"]
 HIDDEN = [placed(effect_named("quadratic_damping"), "load_bearing")]
@@ -43,6 +45,27 @@ def test_a_missing_force_is_traced_to_its_joint(train: Any) -> None:
     (term,) = first["terms"]
     assert (term["name"], term["where"]) == ("quadratic_damping", "load_bearing")
     assert term["coefficients"]["c_2"]["value"] == pytest.approx(1e-3, rel=0.1)
+
+
+def test_sensor_zeros_of_single_records_do_not_bend_the_missing_force() -> None:
+    values = {"gain": 1.0, "m": 2.0, "d": 3.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+    noise, rng = {"x": 1e-6}, np.random.default_rng(1)
+    records = []
+    for name, amplitude, zero in (("a", 1.0, 5e-3), ("b", 1.5, -5e-3)):
+        t = 0.01 * np.arange(1500)
+        u = amplitude * sum(np.sin(2 * np.pi * f * t + rng.uniform(0, 6)) for f in np.linspace(0.5, 6.0, 20))
+        record = Record(name, 0.01, {"u": u}, {})
+        shown = simulate(compose(AXIS, [effect_named("cubic_stiffness")]), {**values, "k_3": 4e6}, record)
+        read = shown["x"] + zero + 1e-6 * rng.standard_normal(t.size)
+        records.append(record.with_signals(x=read).with_free_offsets(["x"]))
+    scales = characteristic_scales(AXIS, records, values)
+    fit = GreyBoxFit(compose(AXIS), records, scales, noise).fit(values, ["m", "d", "k"])
+    several = tuple(records)
+    context = FitContext(AXIS, several, several, several, scales, noise, frozenset())
+    found = force_of_one_motion(context, Scored((), fit, fit, 100.0), True, np.random.default_rng(0))
+    assert found is not None
+    assert [term.term for term in found.terms] == ["x^3"]
+    assert found.terms[0].coefficient == pytest.approx(4e6, rel=0.1)
 
 
 def test_only_a_single_force_that_agrees_with_all_sensors_is_evidence() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.discover import JointForce, MissingForce, missing_force, missing_forces, not_contradicted
-from rigsight.errors import SimulationError
+from rigsight.errors import InputError, SimulationError
 from rigsight.identify import without_offsets
 from rigsight.rigs import Rig
 
@@ -19,7 +19,8 @@ def force_of_one_motion(
 ) -> MissingForce | None:
     """Return the shape of the force missing on a rig with one motion; None for any other rig.
 
-    There is none beside effects that are modelled already either: the rig's own terms do not stand alone there.
+    There is none beside effects that are modelled already either: the rig's own terms do not stand alone there. Nor is there
+    one from records that are too short for a regression, or whose own constants change inertia, spring or damper.
 
     Parameters
     ----------
@@ -33,9 +34,12 @@ def force_of_one_motion(
     if context.modelled or not context.rig.has_one_motion:
         return None
     noise = context.noise[context.rig.outputs[0].name]
-    return missing_force(
-        context.rig, context.estimation, reidentified.fit.values, context.scales, noise, rng, has_stiffness
-    )
+    centered = without_offsets(context.estimation, reidentified.fit)
+    values = reidentified.fit.values
+    try:
+        return missing_force(context.rig, centered, values, context.scales, noise, rng, has_stiffness)
+    except InputError:
+        return None
 
 
 def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointForce, ...]:

@@ -13,14 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.discover.doubts import still_missing
 from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_force import JointForce, missing_forces, not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm
-from rigsight.discover.regression import information_criterion
+from rigsight.discover.regression import STRONG, information_criterion
 from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
-from rigsight.discover.selection import STRONG, independent_samples
-from rigsight.discover.terms.equations import equations
+from rigsight.discover.selection import independent_samples
+from rigsight.discover.terms.equations import equations, held_numbers
 from rigsight.effects import effect_named, placed
 from rigsight.effects.placed import kind_of
 from rigsight.errors import SimulationError
@@ -41,8 +42,6 @@ from rigsight.simulate.model import Model
 Floats = NDArray[np.float64]
 
 _EVALUATIONS = 100
-_FLOOR = 1.5
-"""Error in noise floors above which an effect is still missing."""
 _NO_WORSE = 1.05
 """Factor of the held-out error up to which an equation with fewer terms is shortened further."""
 _VAGUE = 3.0
@@ -80,7 +79,7 @@ def discover_at_joints(
     InputError
         If there is no estimation record, one is too short, or none moves the rig.
     SimulationError
-        If the rig's own equations cannot be simulated near the records.
+        If the rig's own equations cannot be simulated near the records, or its linearized responses cannot be regressed.
     """
     say = progress or (lambda _: None)
     polisher = _Polisher(data, IdleThreads(n_jobs))
@@ -92,7 +91,12 @@ def discover_at_joints(
     say("re-identified")
     known = {**data.campaign.constants, **alone.fit.values}
     centered = without_offsets(polisher.estimation, alone.fit)
-    joints = missing_forces(data.rig, centered, known, data.noise, np.random.default_rng(seed))
+    try:
+        joints = missing_forces(data.rig, centered, known, data.noise, np.random.default_rng(seed))
+    except np.linalg.LinAlgError as error:
+        raise SimulationError(
+            f"The missing forces of {data.rig.name} cannot be found from its responses linearized about these records ({error})."
+        ) from error
     say("missing forces")
     found = [alone]
     # The law of a joint that is ruled out is not refitted.
@@ -199,9 +203,7 @@ def _assembled(
     own_joints = {str(term.effect.at) for term in chosen.terms}
     joints = tuple(sorted(joints, key=lambda force: force.joint not in own_joints))
     structure, values = chosen.fit.structure, chosen.fit.values
-    constants = {p.name for p in rig.constants}
-    numbers = {n: v for n, v in values.items() if n not in chosen.fit.free and n not in constants}
-    text, latex = equations(structure, numbers)
+    text, latex = equations(structure, held_numbers(chosen.fit))
     units = {p.name: p.unit for p in structure.parameters}
     coefficients = {
         name: Coefficient(values[name], chosen.fit.standard_errors[name], units[name])
@@ -342,11 +344,7 @@ def _warnings(
         found.append(
             f"{listed} does not increase the held-out error, but does not lower it significantly either."
         )
-    if chosen.error_over_noise > _FLOOR:
-        found.append(
-            f"The equations leave {chosen.error_over_noise:.1f} times the noise floor in free run on the held-out records: "
-            "an effect is still missing, or disturbances are larger than the noise floor."
-        )
+    found += still_missing(chosen.error_over_noise)
     unknown = [name for name, c in coefficients.items() if not math.isfinite(c.std)]
     if unknown:
         found.append(f"These records do not determine {', '.join(unknown)}.")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rigsight.discover.joints.joint_motion import JointMotion
 from rigsight.discover.joints.sensor_regression import SensorRegression, sensor_regressions
 from rigsight.discover.motion import Motion
-from rigsight.discover.regression import alike, inclusion_probabilities, sparse_path
+from rigsight.discover.regression import STRONG, alike, inclusion_probabilities, sparse_path
 from rigsight.discover.terms.library import (
     Candidate,
     TermSignals,
@@ -34,8 +34,6 @@ from rigsight.rigs import Joint, Rig, evaluated
 
 Floats = NDArray[np.float64]
 
-STRONG = 10.0
-"""Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
 _MOST_TERMS = 4
 _SAME_COLUMN = 1.0 - 1e-7
 """Correlation above which terms cannot be distinguished by a record of this length; otherwise the likelihood decides."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import sympy as sp
 
+from rigsight.identify import FitResult
 from rigsight.simulate import Structure
 from rigsight.simulate.printing.latex import latex_equation
 from rigsight.simulate.printing.shown import ShownEquation, flat_equations
@@ -14,6 +15,22 @@ from rigsight.simulate.printing.text import text_equation
 
 _DIGITS = 4
 """Significant digits of numbers in an effect's equation; parameters are written as symbols."""
+
+
+def held_numbers(fit: FitResult) -> dict[str, float]:
+    """Return the held parameters whose values are written into the equations: only 0 and 1, which make them shorter.
+
+    Parameters
+    ----------
+    fit
+        The equations with all values; constants of the rig are always written as symbols.
+    """
+    constants = {p.name for p in fit.structure.rig.constants}
+    return {
+        name: value
+        for name, value in fit.values.items()
+        if name not in fit.free and name not in constants and value in (0.0, 1.0)
+    }
 
 
 def equations(structure: Structure, numbers: Mapping[str, float]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -27,7 +44,10 @@ def equations(structure: Structure, numbers: Mapping[str, float]) -> tuple[tuple
         Parameters written as numbers: those that were not fitted, such as a scale of one or a force of zero.
     """
     symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))
-    written = {symbols[name]: sp.nsimplify(value) for name, value in numbers.items()}
+    written = {
+        symbols[name]: sp.Integer(value) if float(value).is_integer() else sp.Float(value)
+        for name, value in numbers.items()
+    }
     shown = flat_equations(structure, written)
     rounded = [_rounded(equation) for equation in shown.equations]
     # The text uses the same parameter names as the tables of their values.
@@ -44,4 +64,6 @@ def _rounded(equation: ShownEquation) -> ShownEquation:
         )
 
     limit = None if equation.limit is None else (equation.limit[0], short(equation.limit[1]))
-    return replace(equation, terms=tuple(map(short, equation.terms)), limit=limit)
+    inertia = tuple((short(mass), acceleration) for mass, acceleration in equation.inertia)
+    terms = tuple(map(short, equation.terms))
+    return replace(equation, left=short(equation.left), terms=terms, limit=limit, inertia=inertia)

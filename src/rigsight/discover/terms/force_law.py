@@ -123,13 +123,16 @@ def force_equation(
     target = [rows.rate_of(force, motion.dt) for motion, force in zip(motions, forces, strict=True)]
     matrix = np.concatenate(
         [
-            np.column_stack([rows.of(signal(motion.x, motion.v, force)) for signal in signals])
+            np.column_stack([rows.of(signal(motion.x, motion.v, force), motion.dt) for signal in signals])
             for motion, force in zip(motions, forces, strict=True)
         ]
     )
     rate = np.concatenate(target)
     # Only a constant rate is projected out, which no force can have for long.
-    projected = Projected(np.ones((rate.size, 1)), rate, rate.size * rows.independent_share(1))
+    independent = sum(
+        own.size * rows.independent_share(1, motion.dt) for own, motion in zip(target, motions, strict=True)
+    )
+    projected = Projected(np.ones((rate.size, 1)), rate, independent)
     inclusion = inclusion_probabilities(projected, matrix, rng)
     taken = inclusion >= 0.5
     coefficients = np.zeros(len(law.terms))

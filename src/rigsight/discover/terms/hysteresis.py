@@ -296,6 +296,8 @@ def _columns(
         with np.errstate(all="ignore"):
             z = simulate_sets(structure, held, p, start, motion.x.size, _SUBSTEPS)[:, 0, :]
             z = np.where(np.abs(z) < _RUNAWAY * x_size, z, np.nan)
-        return np.column_stack([rows.of(np.ascontiguousarray(z[:, i])) for i in range(len(shapes))])
+        return np.column_stack(
+            [rows.of(np.ascontiguousarray(z[:, i]), motion.dt) for i in range(len(shapes))]
+        )
 
     return np.concatenate(threads.results(block, [motion.x.size for motion in motions]))

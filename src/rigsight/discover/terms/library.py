@@ -178,7 +178,10 @@ def _best_inner(
     highest = 0.0
     for signals in term_signals(effect, motions, scales):
         parts = sign * np.column_stack(
-            [np.concatenate([rows.of(one) for one in part]) for part in zip(*signals.parts, strict=True)]
+            [
+                np.concatenate([rows.of(one, m.dt) for one, m in zip(part, motions, strict=True)])
+                for part in zip(*signals.parts, strict=True)
+            ]
         )
         candidate, share = mixed(signals, parts, projected)
         if share > highest:
@@ -231,7 +234,7 @@ def _library_columns(
         # In SI, because a sine requires the angle in radians; every regression scales its columns itself.
         values = np.asarray(library.fit_transform(np.column_stack([motion.x, motion.v])))
         for i in range(len(effects)):
-            columns[i].append(rows.of(np.ascontiguousarray(values[:, i])))
+            columns[i].append(rows.of(np.ascontiguousarray(values[:, i]), motion.dt))
     return [np.concatenate(parts) for parts in columns]
 
 

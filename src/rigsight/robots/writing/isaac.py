@@ -71,7 +71,8 @@ def isaac_settings(model: Model, source: Path, step: float | None = None) -> Wri
     }
     for drive, joint in joints_of_drives.items():
         _gains(model, drive, joint, float(compiled.actuator_gear[draft.drives[drive], 0]), settings)
-    _numbers(model, draft, compiled, settings)
+    _numbers(model, draft, settings)
+    _force_limits(model, draft, compiled, settings)
     _effects(model, draft, joints_of_drives, settings, step)
     content = {"actuators": {names[index]: group for index, group in settings.by_joint.items()}}
     head = [
@@ -91,18 +92,42 @@ def _gains(model: Model, drive: str, joint: int, gear: float, settings: _Setting
             settings.written.append(f"{setting} of {drive}")
 
 
-def _numbers(model: Model, draft: RigDraft, compiled: Any, settings: _Settings) -> None:
+def _force_limits(model: Model, draft: RigDraft, compiled: Any, settings: _Settings) -> None:
+    """Add the upper end of each drive's range of forces; Isaac Lab has the same limit in both directions."""
+    for drive, index in draft.drives.items():
+        if index < 0 or not compiled.actuator_forcelimited[index]:
+            continue
+        # An end at zero is no constant of the rig.
+        ends = dict(enumerate(map(float, compiled.actuator_forcerange[index])))
+        names = {0: f"lower limit of {drive}", 1: f"upper limit of {drive}"}
+        for name, value in model.values.items():
+            field = draft.fields.get(name, (None,))[0]
+            if field is not None and (field.element, field.attribute, field.index) == (
+                "actuator",
+                "forcerange",
+                index,
+            ):
+                ends[field.entry], names[field.entry] = value, name
+        weakest, strongest = (f"{names[end]} = {ends[end]:.4g}" for end in (0, 1))
+        if ends[1] > 0.0:
+            gear = abs(float(compiled.actuator_gear[index, 0]))
+            joint = int(compiled.actuator_trnid[index, 0])
+            settings.by_joint[joint]["actuator_effort_limit"] = gear * ends[1]
+            settings.written.append(strongest)
+        else:
+            settings.without_field.append(strongest)
+        if ends[0] != -ends[1]:
+            settings.without_field.append(f"{weakest}, unlike the upper end")
+
+
+def _numbers(model: Model, draft: RigDraft, settings: _Settings) -> None:
     known = draft.tables.get("constants", {})
     for name, value in model.values.items():
         field = draft.fields.get(name, (None,))[0]
         setting = None if field is None or field.entry else _FIELDS.get((field.element, field.attribute))
         if field is not None and (field.element, field.attribute) == ("actuator", "forcerange"):
-            if field.entry == 1:
-                gear = abs(float(compiled.actuator_gear[field.index, 0]))
-                joint = int(compiled.actuator_trnid[field.index, 0])
-                settings.by_joint[joint]["actuator_effort_limit"] = gear * value
-                settings.written.append(f"{name} = {value:.4g}")
-        elif setting is not None and field is not None:
+            continue
+        if setting is not None and field is not None:
             for one in setting:
                 settings.add(field.index, one, value)
             settings.written.append(f"{name} = {value:.4g}")

@@ -118,11 +118,6 @@ class FrozenStructure:
         return found if found is not None and found.velocity is not None and found.alone else None
 
     @property
-    def friction_mode(self) -> int | None:
-        """Index of the mode of the `single_friction`, or None."""
-        return None if self.single_friction is None else self.single_friction.mode
-
-    @property
     def dependent_modes(self) -> tuple[int, ...]:
         """Indices of the modes whose switch contains another mode; they must be evaluated again when that mode changes."""
         return tuple(i for i, switch in enumerate(self.switches) if switch.free_symbols & set(self.modes))

@@ -301,11 +301,14 @@ class Structure:
         return unique_names(self.rig, self.effects)[effect.name, own_name]
 
     @property
-    def special_cases(self) -> frozenset[str]:
-        """Own names of the effects' parameters that are written into the equations at their special values."""
+    def special_cases(self) -> frozenset[tuple[str, str]]:
+        """Parameters that are written into the equations at their special values, each as effect and own name."""
         fixed = dict(self.fixed)
         return frozenset(
-            own for e in self.effects for own in e.special_cases if self.parameter_name(e, own) in fixed
+            (e.name, own)
+            for e in self.effects
+            for own in e.special_cases
+            if self.parameter_name(e, own) in fixed
         )
 
     def values_of(self, effect: Effect, values: Mapping[str, float]) -> dict[str, float]:

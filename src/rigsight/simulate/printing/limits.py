@@ -7,8 +7,7 @@ import sympy as sp
 from rigsight.effects.symbols import positive_part
 
 _MIN, _MAX, _CLIP = map(sp.Function, ("min", "max", "clip"))
-SHOWN_LIMITS = ("min", "max", "clip")
-"""Names of the displayed functions: `min` and `max` of two values, `clip` of a value and the ends of its range."""
+"""The displayed functions: `min` and `max` of two values, `clip` of a value and the ends of its range."""
 
 
 def with_limits(expression: sp.Expr) -> sp.Expr:

@@ -15,6 +15,7 @@ from rigsight.identify.hysteresis import SpectralRatio
 from rigsight.records import Record
 from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, rest_state
+from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.input_hold import hold_input, together
@@ -116,8 +117,8 @@ def _natural_frequencies(model: Model, amplitude: float) -> list[float]:
 
 def _poles(model: Model) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
     """Return the eigenvalues of a model about its equilibrium without input."""
-    structure = model.structure
-    p = parameter_vector(structure, model.values)
+    structure, values = without_vanished_effects(model.structure, model.values)
+    p = parameter_vector(structure, values)
     n_inputs = len(structure.rig.inputs)
     rest = rest_state(structure, p, together([hold_input(np.zeros(2), 1.0, "foh")] * n_inputs))
     known = dict(zip(structure.parameter_symbols, p, strict=True))
@@ -155,9 +156,11 @@ def _natural_frequency(model: Model, amplitude: float) -> float:
             "The model has no spring and so no natural frequency: give the band with --lowest and --highest [rad/s]."
         )
     held = hold_input(np.full(3, amplitude), 1.0, "zoh")
+    structure, values = without_vanished_effects(model.structure, model.values)
     with contextlib.suppress(SimulationError):
-        state = rest_state(model.structure, parameter_vector(model.structure, model.values), held)
-        secant = drive * amplitude / (float(state[0]) - rest)
+        moved = float(rest_state(structure, parameter_vector(structure, values), held)[0]) - rest
+        # Dry friction or a dead zone may hold the rig where it is.
+        secant = drive * amplitude / moved if moved != 0.0 else math.inf
         if 0.0 < secant < math.inf:
             stiffness = secant
     return math.sqrt(stiffness / inertia)
