@@ -144,3 +144,21 @@ def test_a_logarithmic_unit_is_not_converted() -> None:
     with pytest.raises(UnknownUnitError, match="is logarithmic"):
         factor("dB", "1")
     assert is_unit("dB")
+
+
+def test_an_offset_alone_leaves_the_unit_of_the_file() -> None:
+    mapping, (note,) = si_mapping("run.mf4", "x", "m", ColumnMapping("pos", offset=-0.1), "pos", "mm")
+    assert (mapping.scale, mapping.offset) == (1e-3, -0.1)
+    assert "converted from mm, the unit stated in the file, to m; the offset -0.1 m was added" in note
+    as_given, notes = si_mapping(
+        "run.mf4", "x", "m", ColumnMapping("pos", scale=1.0, offset=-0.1), "pos", "mm"
+    )
+    assert (as_given.scale, as_given.offset, notes) == (1.0, -0.1, ())
+
+
+def test_beside_an_offset_a_message_names_only_the_scale() -> None:
+    mapping, (note,) = si_mapping("run.csv", "x", "m", ColumnMapping("x_mm", offset=-0.1), "x_mm", None)
+    assert (mapping.scale, mapping.offset) == (None, -0.1)
+    assert "write scale = 0.001 beside the offset" in note
+    with pytest.raises(InputError, match=r"'Grad', stated in the file, .* Write scale = 1.0 to take"):
+        si_mapping("run.mf4", "psi", "rad", ColumnMapping("psi", offset=0.1), "psi", "Grad")

@@ -156,7 +156,8 @@ def si_mapping(
     signal, si
         The rig's signal and its unit.
     mapping
-        Mapping in the campaign: scale and offset take precedence, then its unit, then the unit of the file.
+        Mapping in the campaign: its scale takes precedence, then its unit, then the unit of the file. An offset alone is added
+        to what the unit gives.
     stated
         Unit stated in the file, None if there is none.
 
@@ -167,18 +168,21 @@ def si_mapping(
     """
     unit = mapping.unit if mapping.unit is not None else stated
     where = f"{file}, column '{label}'"
-    if mapping.is_converted:
+    if mapping.scale is not None:
         return mapping, ()
     if unit is None:
         named = split_unit(label)[1]
         taken = si if has_si(si) else _drive_of(named)
         if named is None or taken is None or named == taken or not is_a(named, taken):
             return mapping, ()
+        if mapping.offset is None:
+            own = f'{signal} = {{ name = "{label}", unit = "{named}" }}'
+            mend = f"{own} (on a command line --unit {signal}={named}); if not, scale = 1.0"
+        else:
+            mend = f"scale = {factor(named, taken):.9g} beside the offset; if not, scale = 1.0"
         return mapping, (
             f"{where}: values taken as {taken} without conversion, although the name ends with {named}. If it is in {named}, "
-            f"write "
-            f'{signal} = {{ name = "{label}", unit = "{named}" }} (on a command line --unit {signal}={named}); if not, '
-            "scale = 1.0.",
+            f"write {mend}.",
         )
     if not has_si(si):
         if mapping.unit is not None:
@@ -196,12 +200,17 @@ def si_mapping(
         scale, offset = conversion(unit, si)
     except UnknownUnitError as error:
         by = "" if mapping.unit is not None else ", stated in the file,"
+        # An offset cannot stand beside a unit.
+        right = (
+            ""
+            if mapping.offset is not None
+            else f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or '
+        )
         raise InputError(
-            f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write "
-            f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or scale = 1.0 to take the '
-            "values without conversion."
+            f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write {right}scale = 1.0 to take the values without "
+            "conversion."
         ) from None
-    converted = ColumnMapping(mapping.name, scale=scale, offset=offset)
+    converted = ColumnMapping(mapping.name, scale=scale, offset=offset + (mapping.offset or 0.0))
     absolute = ""
     if offset:
         absolute = (
@@ -218,4 +227,7 @@ def si_mapping(
         )
     if (scale, offset) == (1.0, 0.0):
         return converted, ()
-    return converted, (f"{where}: converted from {unit}, the unit stated in the file, to {si}.{absolute}",)
+    added = "" if mapping.offset is None else f"; the offset {mapping.offset:g} {si} was added"
+    return converted, (
+        f"{where}: converted from {unit}, the unit stated in the file, to {si}{added}.{absolute}",
+    )

@@ -21,9 +21,9 @@ class ColumnMapping:
     name
         Name of the column or channel, or its number, counted from 1.
     scale
-        SI unit per unit of the column. None here and for `offset` uses the unit, or takes the values without conversion.
+        SI unit per unit of the column. None uses the unit, or the one that the file states, or takes the values as they are.
     offset
-        Value added after scaling, in the SI unit.
+        Value added after scaling or conversion of the file's unit, in the SI unit.
     unit
         Unit of the column, instead of scale and offset: ``"deg"``.
 
@@ -53,7 +53,7 @@ class ColumnMapping:
 
     @property
     def is_converted(self) -> bool:
-        """True if scale or offset is given, so that no unit is asked."""
+        """True if scale or offset is given."""
         return self.scale is not None or self.offset is not None
 
     def to_si(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
