@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, nearest, shown
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,44 @@ class ColumnMapping:
         scale = 1.0 if self.scale is None else self.scale
         offset = 0.0 if self.offset is None else self.offset
         return scale * column + offset
+
+
+def checked_columns(
+    file: str, columns: Mapping[str, ColumnMapping | str | int], signals: Collection[str]
+) -> dict[str, ColumnMapping]:
+    """Return the columns of signals as mappings.
+
+    Parameters
+    ----------
+    file
+        Name of the file in messages.
+    columns
+        Signal name -> its column; a name or a number alone is one without conversion.
+    signals
+        Signals that may have a column.
+
+    Raises
+    ------
+    InputError
+        Naming a signal that is none of them, or what is no column.
+    """
+    checked = {}
+    for signal, column in columns.items():
+        if signal not in signals:
+            raise InputError(
+                f"{file}: columns names '{signal}', which is not a signal here.{nearest(signal, signals)} "
+                f"Signals: {', '.join(signals)}."
+            )
+        if isinstance(column, str) or (isinstance(column, int) and not isinstance(column, bool)):
+            checked[signal] = ColumnMapping(column)
+        elif isinstance(column, ColumnMapping):
+            checked[signal] = column
+        else:
+            raise InputError(
+                f"{file}: the column of {signal} must be its name, its number counted from 1, or a ColumnMapping; "
+                f"got {shown(column)}."
+            )
+    return checked
 
 
 @dataclass(frozen=True, eq=False)
