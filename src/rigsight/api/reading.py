@@ -54,7 +54,7 @@ def read_record(
     hold
         The input between samples: ``"zoh"``, ``"foh"`` or ``"band_limited"``.
     dt
-        Sample time [s] of a file without time.
+        Sample time [s] of a file without time; time that it has is not read then, with a note.
     resample
         Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
     constants

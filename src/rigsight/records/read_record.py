@@ -10,7 +10,7 @@ from typing import Literal, TypedDict, Unpack
 import numpy as np
 
 from rigsight.errors import InputError
-from rigsight.records.channel_table import read_channels
+from rigsight.records.channel_table import read_channels, unread_time
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
 from rigsight.records.conditioning import TimeBase, check_long_enough, time_base
@@ -129,7 +129,7 @@ def read_stretches(
     role, kind, amplitude, hold
         See `Record`.
     dt
-        Sample time [s] of a file without time.
+        Sample time [s] of a file without time; time that it has is not read then, with a note.
     resample
         Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
     separator, decimal, header, comment
@@ -270,7 +270,13 @@ def _table(
     if dt is None:
         return table
     stamps = dt * np.arange(table.lines.size, dtype=np.float64)
-    return replace(table, values={TIME: stamps, **table.values}, labels={TIME: "dt", **table.labels})
+    notes = unread_time(path, dt, [TIME] if TIME in table.names else [])
+    return replace(
+        table,
+        values={TIME: stamps, **table.values},
+        labels={TIME: "dt", **table.labels},
+        notes=(*table.notes, *notes),
+    )
 
 
 def _refuse_time_as_signal(file: str, table: Columns) -> None:
