@@ -16,6 +16,7 @@ from rigsight.errors import InputError, nearest
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
+from rigsight.records.stamps import digits_for
 from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.model import Model
@@ -24,7 +25,9 @@ from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.run.results import check_target, write_together
 
-_DIGITS = "%.12g"
+_DIGITS = 12
+_STAMPS_TO = 1e-4
+"""Of the sample time: how closely time is written, so that the file is evenly sampled when it is read again."""
 
 
 def run_simulate(
@@ -185,5 +188,13 @@ def _estimated_state(model: Model, record: Record) -> NDArray[np.float64]:
 def _csv_text(record: Record, names: list[str]) -> str:
     file = io.StringIO()
     table = np.column_stack([record.t, *(record[name] for name in names)])
-    np.savetxt(file, table, fmt=_DIGITS, delimiter=",", header=",".join([TIME, *names]), comments="")
+    digits = [digits_for(float(record.t[-1]), _STAMPS_TO * record.dt, _DIGITS), *[_DIGITS] * len(names)]
+    np.savetxt(
+        file,
+        table,
+        fmt=[f"%.{n}g" for n in digits],
+        delimiter=",",
+        header=",".join([TIME, *names]),
+        comments="",
+    )
     return file.getvalue()
