@@ -284,6 +284,7 @@ def _distinct(name: str, taken: Sequence[str]) -> str:
 def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
     notes = [
         *campaign.notes,
+        *(f"Record '{record.name}': {note}" for record in campaign.records for note in record.notes),
         *closed_loop_notes(campaign.records, campaign.rig, "It is not used in a comparison."),
     ]
     if all(record.kind == "step" for record in campaign.records):
