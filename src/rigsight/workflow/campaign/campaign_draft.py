@@ -118,7 +118,7 @@ def campaign_text(
             assumed = "" if constant.default is None else "assumed, check: "
             about = f"# {assumed}{constant.description} [{constant.unit}]"
             lines.append(
-                f"{constant.name} = {BLANK if constant.default is None else f'{constant.default:g}'}  {about}"
+                f"{constant.name} = {BLANK if constant.default is None else repr(constant.default)}  {about}"
             )
     lines += [
         "",
