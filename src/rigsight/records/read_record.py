@@ -9,7 +9,7 @@ from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, readable
 from rigsight.records.channel_table import read_channels, unread_time
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
@@ -216,7 +216,7 @@ def read_stretches(
     parts = (one_stretch(path.name, cut),) if at_pauses == "refuse" else cut.parts
     held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
     holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
-    called, before = name or path.stem, (*table.notes, *unit_notes, *cut.notes)
+    called, before = name or readable(path.stem), (*table.notes, *unit_notes, *cut.notes)
     records = []
     for number, part in enumerate(parts, 1):
         on_axis = _on_one_axis(path, part, kept, to_si[TIME], resample, holds)

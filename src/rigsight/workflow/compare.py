@@ -15,7 +15,7 @@ from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_o
 from rigsight.compare.comparison_files import comparison_csv, comparison_json
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.errors import InputError, check_option
+from rigsight.errors import InputError, check_option, readable
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
@@ -269,8 +269,8 @@ def _name_and_source(text: str) -> tuple[str, str]:
         return name.strip(), source
     path = Path(text)
     if path.name == MODEL_FILE:
-        return path.absolute().parent.name or text, text
-    return (path.stem if path.suffix == ".json" else path.absolute().name) or text, text
+        return readable(path.absolute().parent.name) or text, text
+    return readable(path.stem if path.suffix == ".json" else path.absolute().name) or text, text
 
 
 def _distinct(name: str, taken: Sequence[str]) -> str:

@@ -131,7 +131,9 @@ def write_together(
                 target = (folder / name).resolve()
                 remove_left(target)
                 part = parts[target] = temporary_path(target, token, "part")
-                file = write_locked(part, content.encode("utf-8") if isinstance(content, str) else content)
+                # Commands and notes quote names of files, which need not be text.
+                raw = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+                file = write_locked(part, raw)
                 locks.callback(file.close)
                 os.fsync(file.fileno())
                 if os.name == "nt":
