@@ -148,3 +148,17 @@ def test_a_prediction_over_unix_time_is_read_again(
     assert run("simulate", write_model(), record, "-o", out)[0] == 0
     read = read_record(out, "axis")
     assert (read.dt, read.t0, read.notes) == (0.005, 1.7e9, ())
+
+
+def test_a_measurement_is_not_overwritten_by_its_simulation(
+    axis_campaign: Path, write_model: Callable[..., Path], tmp_path: Path, run: Run
+) -> None:
+    record = axis_campaign / "fit.csv"
+    measured = record.read_bytes()
+    link = tmp_path / "link.csv"
+    link.symlink_to(record)
+    for out in (record, link):
+        code, _, stderr = run("simulate", write_model(), record, "-o", out)
+        assert code == 2
+        assert "it is the record that is simulated. Name another file with --out." in stderr
+    assert record.read_bytes() == measured

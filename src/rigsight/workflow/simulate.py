@@ -85,6 +85,10 @@ def run_simulate(
     own = checked_numbers(Where(MODEL_FILE), ("constants",), rig, rig.constants, constants or {})
     if out is not None:
         check_target(Path(out))
+        if Path(out).exists() and Path(record).exists() and Path(out).samefile(record):
+            raise InputError(
+                f"Cannot write {out}: it is the record that is simulated. Name another file with --out."
+            )
     estimated = initial_state == "estimated"
     driven = read_record(
         Path(record),
