@@ -78,7 +78,7 @@ def run_compare(
     _check_wishes(models, method, step_seconds)
     jobs = checked_jobs(n_jobs)
     if out is not None:
-        check_writable(Path(out))
+        check_writable(Path(out), COMPARISON_FILE, TABLE_FILE, PAGE_FILE)
     read = read_campaign(campaign)
     competitors = named_competitors(models, read)
     comparison = compare_campaign(read, competitors, method, step_seconds, jobs, listener)

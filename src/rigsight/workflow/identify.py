@@ -89,7 +89,7 @@ def run_identify(
     options = checked_options(method, resolution)
     jobs = checked_jobs(n_jobs)
     if out is not None:
-        check_writable(Path(out))
+        check_writable(Path(out), IDENTIFICATION_FILE, MODEL_FILE, PAGE_FILE)
     identification = identify_campaign(
         read_campaign(campaign, own_effects), options, jobs, listener, effects=effects, seed=seed
     )

@@ -106,7 +106,7 @@ def run_vary(
         If the model or an option cannot be used, or the results cannot be written; nothing is written then.
     """
     if out is not None:
-        check_writable(Path(out))
+        check_writable(Path(out), VARY_FILE)
     read = named_model(model)
     rig = read.structure.rig
     if not rig.is_driven or not rig.inputs:
