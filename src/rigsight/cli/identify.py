@@ -20,7 +20,7 @@ from rigsight.cli.options import (
     Simulators,
     effect_names,
 )
-from rigsight.cli.terminal import show, show_files, show_json
+from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.run.progress_display import listening
 
 
@@ -86,6 +86,7 @@ def identify(
             seed=seed,
             n_jobs=jobs,
             listener=listener,
+            command=command_line(),
         )
     if json:
         show_json(out / "identification.json")
