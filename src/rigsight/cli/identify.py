@@ -32,7 +32,8 @@ def identify(
         typer.Option(
             "--method",
             metavar="NAME",
-            help="Estimator of the frequency responses: local_rational or local_polynomial; with one input also h1 or thesis.",
+            help="Estimator of the frequency responses: local_rational or local_polynomial; for built-in rigs of one motion also "
+            "h1 or thesis.",
         ),
     ] = "local_rational",
     resolution: Annotated[

@@ -130,6 +130,17 @@ def test_one_mass_with_names_of_its_own_is_identified_from_files(tmp_path: Path)
     assert "<dt>Seed</dt><dd>7</dd>" in page
 
 
+def test_an_estimator_for_built_in_rigs_alone_is_refused_with_the_reason() -> None:
+    stage = rig_of_text(STAGE)
+    t = np.linspace(0.0, 1.0, 50)
+    record = Record("one", 0.02, {"current": np.sin(9.0 * t), "scale": np.cos(9.0 * t)}, {})
+    told = (
+        r"for the rig 'stage' .*h1 and thesis are for built-in rigs of one motion.* is 'h1'.*'local_rational'"
+    )
+    with pytest.raises(InputError, match=told):
+        identify_campaign(make_campaign(stage, [record]), checked_options("h1", None))
+
+
 def test_the_name_of_a_rig_changes_nothing() -> None:
     """The axis copied into a file of one's own, under a name of one's own, is still the axis."""
     rng, axis = np.random.default_rng(1), RIGS["axis"]
