@@ -253,10 +253,6 @@ def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
             f"Model '{name}' is of the rig '{model.structure.rig.name}', the records of {campaign.called} are of the rig "
             f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."
         )
-    if model.structure.rig.mechanism != campaign.rig.mechanism:
-        raise InputError(
-            f"Model '{name}' declares the rig '{campaign.rig.name}' with other equations than {campaign.called}. Leave it out."
-        )
     return model
 
 
