@@ -218,7 +218,7 @@ def _in_units_of(rig: Rig, record: Record) -> Record:
         if signal.name not in record or (stated and not has_si(signal.unit)):
             continue
         units[signal.name] = signal.unit
-        if not stated or stated == signal.unit:
+        if not stated or stated == signal.unit or {stated, signal.unit} == {"", "1"}:
             continue
         try:
             scale, offset = conversion(stated, signal.unit)
