@@ -47,6 +47,11 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]} ..."
 
 
+def readable(name: str) -> str:
+    """Return a name of a file with a sign that can be printed for each byte that is not text."""
+    return "".join("\ufffd" if "\ud800" <= sign <= "\udfff" else sign for sign in name)
+
+
 def nearest(name: str, allowed: Iterable[str]) -> str:
     """Return ``" Did you mean 'x'?"`` for the closest allowed name, or an empty string."""
     matches = get_close_matches(name, list(allowed), n=1, cutoff=0.5)

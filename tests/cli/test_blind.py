@@ -31,6 +31,13 @@ def part(tmp_path: Path, outcome_like: Callable[..., Outcome]) -> Path:
         (["--merge", "a", "--rescore"], ["--merge and --rescore", "cannot be combined"]),
         (["--merge", "a", "--campaigns", "b", "--keys", "c"], ["--merge and --campaigns"]),
         (["--rescore", "--trial", "3"], ["--rescore runs no trial"]),
+        (["--campaigns", "a", "--keys", "b", "--seed", "0"], ["--campaigns draws no rigs, so --seed"]),
+        (
+            ["--campaigns", "a", "--keys", "b", "--trials", "3", "--design", "small"],
+            ["so --trials and --design would"],
+        ),
+        (["--rescore", "--design", "small"], ["--rescore draws no rigs, so --design"]),
+        (["--merge", "a", "--trials", "3"], ["--merge draws no rigs, so --trials"]),
         (["--trial", "three"], ["--trial must be a number", "'three'", "--campaigns"]),
         (["--trial", "9999", "--design", "small"], ["numbered from 0", "9999"]),
         (["--trial", "60", "--design", "laboratory"], ["numbered from 0 to 59", "60"]),

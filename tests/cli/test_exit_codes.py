@@ -51,6 +51,24 @@ def test_a_defect_exits_1_with_one_line(
         run(*arguments, "--debug")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="paths differ there")
+def test_a_path_that_cannot_exist_is_told(
+    axis_campaign: Path, write_model: Callable[..., Path], tmp_path: Path, run: Run
+) -> None:
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    long = "x" * 300
+    for arguments in (
+        ("diagnose", long),
+        ("simulate", write_model(), long),
+        ("simulate", write_model(), loop / "fit.csv"),
+        ("simulate", write_model(), axis_campaign / "fit.csv" / "fit.csv"),
+    ):
+        code, _, stderr = run(*arguments)
+        assert (code, stderr.count("\n")) == (2, 1), stderr
+        assert "defect" not in stderr
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
 @pytest.mark.parametrize(
     ("stage", "candidates"),

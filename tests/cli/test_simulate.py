@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.api.reading import read_record
+
 Run = Callable[..., tuple[int, str, str]]
 
 BROKEN_MODELS: dict[str, tuple[Callable[[dict[str, Any]], object] | str, tuple[str, ...]]] = {
@@ -135,3 +137,28 @@ def test_simulate_converts_units_and_asks_about_those_in_names(
     assert (code, "Note" in stdout) == (0, False)
     rows = np.loadtxt(out, delimiter=",", skiprows=1)
     assert (rows[-1, 0], rows[-1, 1]) == (pytest.approx(0.59), 1.0)
+
+
+def test_a_prediction_over_unix_time_is_read_again(
+    write_model: Callable[..., Path], tmp_path: Path, run: Run
+) -> None:
+    record, out = tmp_path / "drive.csv", tmp_path / "predicted.csv"
+    rows = (f"{1.7e9 + 0.005 * i:.4f},{np.sin(0.1 * i):.6f}" for i in range(200))
+    record.write_text("t,u\n" + "\n".join(rows))
+    assert run("simulate", write_model(), record, "-o", out)[0] == 0
+    read = read_record(out, "axis")
+    assert (read.dt, read.t0, read.notes) == (0.005, 1.7e9, ())
+
+
+def test_a_measurement_is_not_overwritten_by_its_simulation(
+    axis_campaign: Path, write_model: Callable[..., Path], tmp_path: Path, run: Run
+) -> None:
+    record = axis_campaign / "fit.csv"
+    measured = record.read_bytes()
+    link = tmp_path / "link.csv"
+    link.symlink_to(record)
+    for out in (record, link):
+        code, _, stderr = run("simulate", write_model(), record, "-o", out)
+        assert code == 2
+        assert "it is the record that is simulated. Name another file with --out." in stderr
+    assert record.read_bytes() == measured

@@ -8,7 +8,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping
-from rigsight.records.channel_units import UnknownUnitError, factor, si_mapping
+from rigsight.records.channel_units import UnknownUnitError, conversion, factor, is_unit, si_mapping
 
 
 @pytest.mark.parametrize(
@@ -112,3 +112,53 @@ def test_a_unit_of_the_campaign_that_contradicts_the_column_is_told() -> None:
     assert "taken in ms, as stated in the campaign, although its name ends with s." in note
     _, (note,) = si_mapping("run.mf4", "x", "m", ColumnMapping("x", unit="mm"), "x", "um")
     assert "though the file states um" in note
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "scale", "offset"),
+    [
+        ("degC", "K", 1.0, 273.15),
+        ("°C", "K", 1.0, 273.15),
+        ("degF", "K", 5 / 9, 459.67 * 5 / 9),
+        ("N/degC", "N/K", 1.0, 0.0),
+        ("mm", "m", 1e-3, 0.0),
+    ],
+)
+def test_temperatures_are_converted_with_their_offset(
+    unit: str, si: str, scale: float, offset: float
+) -> None:
+    assert conversion(unit, si) == pytest.approx((scale, offset), rel=1e-14)
+
+
+def test_the_offset_of_a_temperature_is_told() -> None:
+    stated, (note,) = si_mapping("run.mf4", "T", "K", ColumnMapping("T"), "T", "degC")
+    assert (stated.scale, stated.offset) == (1.0, 273.15)
+    assert "converted from degC, the unit stated in the file, to K. 273.15 K was added" in note
+    assert "difference of temperatures, write scale = 1" in note
+    asked, (note,) = si_mapping("run.csv", "T", "K", ColumnMapping("T", unit="degC"), "T", None)
+    assert (asked.scale, asked.offset) == (1.0, 273.15)
+    assert "taken in degC. 273.15 K was added" in note
+
+
+def test_a_logarithmic_unit_is_not_converted() -> None:
+    with pytest.raises(UnknownUnitError, match="is logarithmic"):
+        factor("dB", "1")
+    assert is_unit("dB")
+
+
+def test_an_offset_alone_leaves_the_unit_of_the_file() -> None:
+    mapping, (note,) = si_mapping("run.mf4", "x", "m", ColumnMapping("pos", offset=-0.1), "pos", "mm")
+    assert (mapping.scale, mapping.offset) == (1e-3, -0.1)
+    assert "converted from mm, the unit stated in the file, to m; the offset -0.1 m was added" in note
+    as_given, notes = si_mapping(
+        "run.mf4", "x", "m", ColumnMapping("pos", scale=1.0, offset=-0.1), "pos", "mm"
+    )
+    assert (as_given.scale, as_given.offset, notes) == (1.0, -0.1, ())
+
+
+def test_beside_an_offset_a_message_names_only_the_scale() -> None:
+    mapping, (note,) = si_mapping("run.csv", "x", "m", ColumnMapping("x_mm", offset=-0.1), "x_mm", None)
+    assert (mapping.scale, mapping.offset) == (None, -0.1)
+    assert "write scale = 0.001 beside the offset" in note
+    with pytest.raises(InputError, match=r"'Grad', stated in the file, .* Write scale = 1.0 to take"):
+        si_mapping("run.mf4", "psi", "rad", ColumnMapping("psi", offset=0.1), "psi", "Grad")

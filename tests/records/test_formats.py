@@ -229,9 +229,22 @@ def test_time_may_be_given_as_a_sample_time(tmp_path: Path) -> None:
         read(tmp_path / "run.mat")
     for name in ("run.mat", "run.csv"):
         record = read(tmp_path / name, dt=0.01)
-        assert (record.dt, record.t0, record.n_samples) == (0.01, 0.0, 120)
+        assert (record.dt, record.t0, record.n_samples, record.notes) == (0.01, 0.0, 120, ())
     with pytest.raises(InputError, match="give one of the two"):
         read(tmp_path / "run.csv", dt=0.01, columns={"t": ColumnMapping("u")})
+
+
+@pytest.mark.parametrize("kind", ["text", "matlab", "mdf"])
+def test_a_sample_time_beside_the_time_of_a_file_is_told(tmp_path: Path, kind: str) -> None:
+    suffix, write = {
+        "text": (".csv", write_text),
+        "matlab": (".mat", write_matlab),
+        "mdf": (".mf4", write_mdf),
+    }[kind]
+    write(tmp_path / f"run{suffix}", rows(), {})
+    (note,) = read(tmp_path / f"run{suffix}", dt=0.02).notes
+    assert f"run{suffix}: dt = 0.02 s was taken as given, and the file's own time (" in note
+    assert note.endswith("was not read. Leave dt out to read it.")
 
 
 def test_dates_count_in_seconds_from_the_first(tmp_path: Path) -> None:

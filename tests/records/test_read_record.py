@@ -114,6 +114,21 @@ def test_clipped_output_is_a_warning(write_csv: WriteCsv) -> None:
     assert "'psi'" in record.notes[0]
 
 
+def test_a_column_of_no_signal_is_refused(write_csv: WriteCsv) -> None:
+    with pytest.raises(
+        InputError, match=r"sweep.csv: columns names 'Psi', .* Did you mean 'psi'\? Signals: t, u, psi, y\."
+    ):
+        read_record(write_csv(), INPUTS, OUTPUTS, columns={"Psi": ColumnMapping("psi", unit="deg")})
+
+
+def test_a_column_may_be_a_name_or_a_number(write_csv: WriteCsv) -> None:
+    path = write_csv(header="t,current,psi,y")
+    record = read_record(path, INPUTS, OUTPUTS, columns={"u": "current", "y": 4})
+    assert list(record.signals) == ["u", "psi", "y"]
+    with pytest.raises(InputError, match=r"the column of u must be its name, .* got \['current'\]\."):
+        read_record(path, INPUTS, OUTPUTS, columns={"u": ["current"]})  # type: ignore[dict-item]
+
+
 def test_time_that_runs_backwards_by_its_scale_is_refused(write_csv: WriteCsv) -> None:
     with pytest.raises(InputError, match="scale of time must be positive"):
         read_record(write_csv(), INPUTS, OUTPUTS, columns={"t": ColumnMapping("t", scale=-1.0)})

@@ -24,10 +24,17 @@ def shown(outcomes: list[Outcome]) -> str:
 def test_shares_come_with_counts_and_intervals(outcome_like: Like, wrong_outcome: Like) -> None:
     text = shown([*(outcome_like(trial=f"{n:03d}") for n in range(3)), wrong_outcome(trial="017")])
     line = next(line for line in text.splitlines() if line.startswith("single effects right"))
-    assert "75%" in line
+    assert "75 %" in line
     assert "3 of 4" in line
-    assert "(30% to 95%)" in line
+    assert "(30 % to 95 %)" in line
     assert "stated 0.75" in text
+
+
+def test_nearly_all_is_not_shown_as_all(outcome_like: Like, wrong_outcome: Like) -> None:
+    text = shown([*(outcome_like(trial=f"{n:03d}") for n in range(299)), wrong_outcome(trial="999")])
+    line = next(line for line in text.splitlines() if line.startswith("single effects right"))
+    assert "99.7 %" in line
+    assert "100 %" not in line
 
 
 def test_wrong_trials_are_listed_with_what_was_named_instead(outcome_like: Like, wrong_outcome: Like) -> None:

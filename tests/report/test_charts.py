@@ -3,6 +3,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -17,6 +18,7 @@ from rigsight.report.drawing.charts import (
     packed,
     points_per_curve,
 )
+from rigsight.report.record_views import record_views
 
 
 def unpacked(content: dict[str, object]) -> np.ndarray:
@@ -77,3 +79,18 @@ def test_stages_that_are_the_same_simulation_are_drawn_once(
     }  # fmt: skip
     assert list(curve_names(variant("unknown"))) == ["measured", "before", "reidentified"]
     assert curve_names(variant("two effects"))["after"] == "with effects"
+
+
+def test_records_over_unix_time_are_drawn_from_their_first_stamp(diagnosis: Diagnosis) -> None:
+    (trace, *_) = diagnosis.traces
+    later = replace(trace, t=trace.t + 1.7e9)
+    plain, late = (
+        next(iter(record_views(replace(diagnosis, traces=(one,)), {}))).charts[0] for one in (trace, later)
+    )
+    drawn, moved = (json.loads(chart.data) for chart in (plain, late))
+    assert moved["label"].startswith("time [s] since 17000000")
+    assert drawn["label"] == "time [s]"
+    np.testing.assert_allclose(np.diff(moved["range"]), np.diff(drawn["range"]), rtol=1e-3)
+    for figure in late.drawings:
+        assert "time [s] since 17000000" in figure.image
+        assert "1.7e+09" not in figure.image

@@ -45,6 +45,17 @@ def test_a_rig_is_read_as_it_stands() -> None:
     assert (inertia.logarithmic, inertia.lower, inertia.unit) == (True, 1e-9, "kg m^2")
 
 
+def test_a_file_may_begin_with_the_mark_of_windows_editors(tmp_path: Path) -> None:
+    file = tmp_path / "train.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + TRAIN.encode())
+    assert read_rig_file(file) is rig_of_text(TRAIN)
+
+
+def test_an_integer_of_thousands_of_digits_is_refused() -> None:
+    with pytest.raises(InputError, match=r"rig\.toml: contains an integer with too many digits"):
+        rig_of_text(changed("default = 0.05", "default = " + 5000 * "1"), "rig.toml")
+
+
 def test_a_control_law_reads_the_sensor() -> None:
     (drive,) = RIGS["servo"].mechanism.drives
     assert {symbol.name for symbol in drive.signal.free_symbols} == {"k_p", "goal", "reading of angle"}

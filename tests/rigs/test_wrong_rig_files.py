@@ -38,6 +38,7 @@ MISTAKES = [
     ("[coordinates.phi_m]", '[coordinates.phi_m]\nprescribed_by = "k_t"', "line 46, column 17: .* no input 'k_t'. Declared: u"),
     ("[sensors.motor_angle]", "[sensors.shaft]", r"line 70, column 1: .*\[joints.shaft\] has the same name"),
     ('unit = "A"', 'unit = "mA"', "line 5, column 8: .* 'mA' is not SI: equations are in A"),
+    ('unit = "A"', 'unit = "degC"', "line 5, column 8: .* 'degC' is not SI: equations are in K, which has another zero"),
     ('"k_s"', '"k_s*log(-1)"', "line 55, column 18: .*no real value"),
     ('"k_s"', '"k_s^1e9"', "line 55, column 18: .*an exponent must be within"),
     ('"k_s"', '"' + "k_s+" * 1300 + 'k_s"', "line 55, column 13: .* it may have at most 5000 characters but has 5203"),

@@ -207,6 +207,25 @@ def test_other_constants_than_the_campaign_has_are_told(gear: Path, tmp_path: Pa
     )
 
 
+def test_what_was_done_to_a_record_is_told(axis_campaign: Path, linear_model: Path, tmp_path: Path) -> None:
+    file = axis_campaign / "fit.csv"
+    file.write_text(file.read_text().replace("t,u,x", "t,u,x_mm", 1))
+    toml = axis_campaign / "campaign.toml"
+    toml.write_text(
+        toml.read_text().replace('file = "fit.csv"', 'file = "fit.csv"\ncolumns = { x = "x_mm" }', 1)
+    )
+    result = CliRunner().invoke(
+        app, ["compare", str(axis_campaign), str(linear_model), "--out", str(tmp_path / "o")]
+    )
+    assert result.exit_code == 0, result.output
+    (told,) = [
+        n for n in json.loads((tmp_path / "o" / "comparison.json").read_text())["notes"] if "x_mm" in n
+    ]
+    assert told.startswith("Record 'fit': fit.csv, column 'x_mm': values taken as m without conversion")
+    assert "values taken as m" in (tmp_path / "o" / "comparison.html").read_text()
+    assert "taken as m" in re.sub(r"\s+", " ", result.output)
+
+
 def test_a_rig_without_a_spring_is_run_in_windows(axis_campaign: Path, linear_model: Path) -> None:
     content = json.loads(linear_model.read_text())
     content["parameters"]["k"] = 0.0

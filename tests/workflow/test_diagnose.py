@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import json
+import os
+import shlex
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -14,6 +17,7 @@ from rigsight.errors import InputError
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.conicity import creep_factor
 from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.compare import run_compare
 from rigsight.workflow.diagnose import run_diagnose
 from rigsight.workflow.run.kernels import structures_to_try
 from rigsight.workflow.run.progress import Step
@@ -171,3 +175,22 @@ def test_the_hysteresis_benchmark_reaches_its_noise(shared_data: Path) -> None:
     assert (1.0 - values["a"]) * values["k"] == pytest.approx(5e4, rel=0.02)
     assert values["beta"] == pytest.approx(1e3 * 0.8, rel=0.02)
     assert values["gamma"] == pytest.approx(1e3 * -1.1, rel=0.02)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are text elsewhere")
+def test_a_folder_whose_name_is_no_text_is_diagnosed_and_compared(
+    axis_campaign: Path, write_model: Callable[..., Path], tmp_path: Path
+) -> None:
+    odd = axis_campaign.rename(tmp_path / os.fsdecode(b"M\xe4rz"))
+    toml = odd / "campaign.toml"
+    toml.write_text(
+        "".join(line for line in toml.read_text().splitlines(True) if not line.startswith("title"))
+    )
+    out = tmp_path / "out"
+    command = shlex.join(["rigsight", "diagnose", str(odd)])
+    diagnosis = run_diagnose(odd, out, effects=FEW[:1], n_jobs=1, command=command)
+    assert diagnosis.title == "M\ufffdrz"
+    assert json.loads((out / "diagnosis.json").read_text())["title"] == "M\ufffdrz"
+    assert "M\ufffdrz" in (out / "report.html").read_text()
+    comparison = run_compare(odd, [write_model()], out, n_jobs=1, command=command)
+    assert comparison.title == "M\ufffdrz"

@@ -274,6 +274,14 @@ def test_a_rig_of_ones_own_is_named_by_its_file(tmp_path: Path) -> None:
     assert read_campaign(tmp_path).rig.name == "train"
 
 
+def test_a_constant_keeps_all_its_digits(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "motor_angle": ANSWER, "load_angle": ANSWER}, {})
+    file = own_train(tmp_path)
+    file.write_text(file.read_text().replace("default = 0.05", "default = 0.0512345678", 1))
+    run_init(tmp_path, rig_files=[file])
+    assert read_campaign(tmp_path).constants == {"k_t": 0.0512345678}
+
+
 def test_a_rig_file_elsewhere_is_copied_into_the_campaign(tmp_path: Path) -> None:
     (tmp_path / "records").mkdir()
     write_text(tmp_path / "records" / "a.csv", {"t": T, "u": SWEEP, "motor_angle": ANSWER}, {})

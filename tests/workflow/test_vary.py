@@ -28,7 +28,7 @@ def test_a_larger_share_of_the_spring_without_memory_breaks_later_and_gives_less
     features = [variant.features for variant in variation.variants]
     assert [variant.value for variant in variation.variants] == pytest.approx([0.35, 0.525, 0.7])
     breaks = [row["break_frequency"] for row in features]
-    gains = [row["static_gain"] for row in features]
+    gains = [row["lowest_gain"] for row in features]
     assert breaks == sorted(breaks)
     assert gains == sorted(gains, reverse=True)
 
@@ -40,7 +40,7 @@ def test_a_smaller_beta_removes_the_peak_and_a_larger_one_raises_it() -> None:
     assert variation.variants[1].value == pytest.approx(7362.0)
     assert high["peak_magnitude"] > 1.2 * base["peak_magnitude"] > 12.0 * low["peak_magnitude"]
     assert high["break_frequency"] < base["break_frequency"] < 0.5 * low["break_frequency"]
-    assert low["static_gain"] < 0.2 * base["static_gain"]
+    assert low["lowest_gain"] < 0.2 * base["lowest_gain"]
 
 
 def test_a_linear_model_shows_its_closed_form(write_model: Callable[..., Path]) -> None:
@@ -50,7 +50,7 @@ def test_a_linear_model_shows_its_closed_form(write_model: Callable[..., Path]) 
     (variation,) = run_vary(write_model(linear), ["k"], low=200.0, high=800.0, steps=2, band=(2.0, 60.0))
     for variant in variation.variants:
         assert variant.features["break_frequency"] == pytest.approx(math.sqrt(variant.value / 2.0), rel=0.02)
-        assert variant.features["static_gain"] == pytest.approx(1.0 / (variant.value - 8.0), rel=0.05)
+        assert variant.features["lowest_gain"] == pytest.approx(1.0 / (variant.value - 8.0), rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_two_masses_answer_by_their_closed_form(tmp_path: Path) -> None:
         error = np.abs(variant.response.values - expected)[clear] / np.abs(expected[clear])
         # The weight over neighboring lines is 0.035 wide; it bends the flanks of a resonance.
         assert np.median(error) < 0.02
-        assert variant.features["static_gain"] == pytest.approx(own["k_t"] / own["k_l"], rel=0.02)
+        assert variant.features["lowest_gain"] == pytest.approx(own["k_t"] / own["k_l"], rel=0.02)
 
 
 def test_a_road_is_swept_as_a_motion(tmp_path: Path) -> None:
@@ -181,6 +181,9 @@ def test_one_parameter_has_a_picture_of_the_plain_name_and_progress_and_the_same
     sweeping = [step for step in steps if step.stage == "Sweeping"]
     assert (sweeping[-1].done, sweeping[-1].total) == (2, 2)
     assert "k_c [N m/rad]" in table_text(variation)
+    response = variation.variants[0].response
+    assert response is not None
+    assert f"gain at {response.omega[0]:.4g} rad/s [rad/A]" in table_text(variation)
     run_vary("identified", ["k_c"], tmp_path / "again", steps=2)
     assert {path.name: path.read_bytes() for path in (tmp_path / "again").iterdir()} == files
 
@@ -194,7 +197,9 @@ def test_one_parameter_has_a_picture_of_the_plain_name_and_progress_and_the_same
         ({"parameters": []}, "Name a parameter"),
         ({"parameters": ["beta", "a"], "low": 1.0}, "can be used with one parameter only"),
         ({"parameters": ["a"], "high": 1.5}, r"--to.*\[0, 1\]"),
-        ({"low": 5.0, "high": 5.0}, "only one value"),
+        ({"low": 5.0, "high": 5.0}, "do not increase: --from 5, --to 5. Give --from and --to"),
+        ({"low": 9e9}, r"do not increase: --from 9e\+09, --to 14724 \(the default\)"),
+        ({"low": 5.0, "high": 4.0}, "do not increase: --from 5, --to 4"),
         ({"steps": 1}, "--steps"),
         ({"amplitude": 0.0}, "--amplitude"),
         ({"band": (5.0, 1.0)}, "0 < lowest < highest"),

@@ -18,7 +18,7 @@ def read_record(
     path: str | Path,
     rig: str | Rig,
     *,
-    columns: Mapping[str, ColumnMapping] | None = None,
+    columns: Mapping[str, ColumnMapping | str | int] | None = None,
     require_outputs: bool = True,
     name: str | None = None,
     role: Role = "estimation",
@@ -39,8 +39,8 @@ def read_record(
         Rig of the signals: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x), ``"element"`` (t, x, force), the name
         of another built-in rig, or a rig of your own.
     columns
-        Columns of the signals and of time ``t``, and their conversion to SI units; by default the columns with the same names. A
-        record of a closed loop may also contain the ``reference`` of its controller.
+        Columns of the signals and of time ``t``, by name, by number, or with their conversion to SI units; by default the columns
+        with the same names. A record of a closed loop may also contain the ``reference`` of its controller.
     require_outputs
         False to simulate the record: its time and inputs suffice.
     name
@@ -54,7 +54,7 @@ def read_record(
     hold
         The input between samples: ``"zoh"``, ``"foh"`` or ``"band_limited"``.
     dt
-        Sample time [s] of a file without time.
+        Sample time [s] of a file without time; time that it has is not read then, with a note.
     resample
         Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
     constants

@@ -16,6 +16,7 @@ from rigsight.workflow.run.progress_display import listening
 
 
 def blind(
+    context: typer.Context,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the bench.")] = Path(
         "blind"
     ),
@@ -98,7 +99,8 @@ def blind(
         from rigsight.workflow.bench.score_files import write_markdown
         from rigsight.workflow.run.results import check_target
 
-        _check_together(campaigns, keys, merge or [], rescore, trial or [])
+        drawing = [f"--{name}" for name in ("trials", "design", "seed") if _is_given(context, name)]
+        _check_together(campaigns, keys, merge or [], rescore, trial or [], drawing)
         if markdown is not None:
             check_target(markdown)
         running: Mapping[str, Any] = {
@@ -135,8 +137,18 @@ def blind(
         show_files({"Page": out / "blind.html", "Score": out / "blind.json", **text})
 
 
+def _is_given(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
+
+
 def _check_together(
-    campaigns: Path | None, keys: Path | None, merge: Sequence[Path], rescore: bool, trial: Sequence[str]
+    campaigns: Path | None,
+    keys: Path | None,
+    merge: Sequence[Path],
+    rescore: bool,
+    trial: Sequence[str],
+    drawing: Sequence[str],
 ) -> None:
     """Refuse options that exclude each other, or of which only one of two is given."""
     if (campaigns is None) != (keys is None):
@@ -155,6 +167,9 @@ def _check_together(
         raise InputError(f"{' and '.join(asked)} cannot be combined. Give only one of them.")
     if trial and (merge or rescore):
         raise InputError(f"{asked[0]} runs no trials, so --trial has no effect. Leave it out.")
+    if asked and drawing:
+        listed, them = " and ".join(drawing), "it" if len(drawing) == 1 else "them"
+        raise InputError(f"{asked[0]} draws no rigs, so {listed} would have no effect. Leave {them} out.")
 
 
 def _numbers(given: Sequence[str]) -> list[int]:

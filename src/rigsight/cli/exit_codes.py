@@ -18,11 +18,12 @@ from typing import NoReturn
 import typer
 
 from rigsight.cli.signals import exit_code
-from rigsight.errors import MachineError, RigsightError
+from rigsight.errors import MachineError, RigsightError, shown
 from rigsight.workflow.run.results import noting_folders
 
 DEFECT, BAD_INPUT, UNREAD = 1, 2, 141
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES, errno.EPERM)
+_OF_A_PATH = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR)
 _OF_THE_SESSION = (errno.EMFILE, errno.ENFILE, errno.EFBIG)
 _MOST_NAMED = 3
 """Largest number of result folders that an interruption lists by name; a bench has hundreds."""
@@ -71,6 +72,8 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
                     BAD_INPUT,
                     is_of_the_machine=True,
                 )
+            if error.errno in _OF_A_PATH and error.filename:
+                leave(f"{shown(error.filename)} cannot be used: {error.strerror}. Check the path.", BAD_INPUT)
             if error.errno not in _OF_THE_DISK and "temporary directory" not in str(error):
                 _leave_defect(error)
             # Result files have messages of their own; here remain input files and temporary files.

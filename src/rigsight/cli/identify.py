@@ -20,7 +20,7 @@ from rigsight.cli.options import (
     Simulators,
     effect_names,
 )
-from rigsight.cli.terminal import show, show_files, show_json
+from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.run.progress_display import listening
 
 
@@ -32,7 +32,8 @@ def identify(
         typer.Option(
             "--method",
             metavar="NAME",
-            help="Estimator of the frequency responses: local_rational or local_polynomial; with one input also h1 or thesis.",
+            help="Estimator of the frequency responses: local_rational or local_polynomial; for built-in rigs of one motion also "
+            "h1 or thesis.",
         ),
     ] = "local_rational",
     resolution: Annotated[
@@ -86,6 +87,7 @@ def identify(
             seed=seed,
             n_jobs=jobs,
             listener=listener,
+            command=command_line(),
         )
     if json:
         show_json(out / "identification.json")

@@ -52,6 +52,8 @@ def _table(found: Inspection) -> Table:
     from rich.markup import escape
     from rich.table import Table
 
+    from rigsight.records.stamps import written_stamp
+
     headings = (
         "channel",
         "unit",
@@ -67,14 +69,18 @@ def _table(found: Inspection) -> Table:
     rows = []
     for channel in found.channels:
         rate = "" if not channel.dt else f"{1.0 / channel.dt:.6g}"
-        numbers = (channel.t0, channel.t1, channel.minimum, channel.maximum)
+        ends = (
+            "" if stamp is None else written_stamp(stamp, channel.dt or 0.0, fewest=5)
+            for stamp in (channel.t0, channel.t1)
+        )
         rows.append(
             (
                 escape(channel.name),
                 escape(channel.unit or ""),
                 str(channel.n_samples),
                 rate,
-                *("" if number is None else f"{number:.5g}" for number in numbers),
+                *ends,
+                *("" if number is None else f"{number:.5g}" for number in (channel.minimum, channel.maximum)),
                 "" if channel.n_gaps is None else str(channel.n_gaps),
                 str(channel.n_not_finite or ""),
             )

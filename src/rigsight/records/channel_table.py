@@ -16,6 +16,7 @@ from rigsight.records.formats.channel_file import open_channels
 
 _LISTED = 30
 """Channels that a message lists; a logger may record thousands."""
+_OWN_AXIS = "its own time axis"
 
 
 def read_channels(
@@ -65,6 +66,9 @@ def read_channels(
         labels = {signal: channel.name for signal, channel in found.items()} | {time: label[0]}
         units = {signal: channel.unit for signal, channel in found.items()} | {time: label[1]}
         names = tuple(channel.name for channel in file.channels)
+        unread = [channel.name for channel in _named(file.channels, time)]
+        if not unread and any(channel.axis is not None for channel in found.values()):
+            unread = [_OWN_AXIS]
     shared = _shared(axes.values())
     if shared is not None:
         values[time] = shared
@@ -73,10 +77,31 @@ def read_channels(
         values,
         labels,
         np.arange(1, n_rows + 1, dtype=np.int64),
+        () if dt is None else unread_time(path, dt, unread),
         units={signal: unit for signal, unit in units.items() if unit is not None},
         axes={} if shared is not None else axes,
         row="sample",
         names=names,
+    )
+
+
+def unread_time(path: Path, dt: float, unread: Sequence[str]) -> tuple[str, ...]:
+    """Return a note that a sample time that was given replaces the time in a file, none where it has no time.
+
+    Parameters
+    ----------
+    path
+        The file.
+    dt
+        Sample time [s].
+    unread
+        Columns or channels of time that the file has.
+    """
+    if not unread:
+        return ()
+    return (
+        f"{path.name}: dt = {dt:g} s was taken as given, and the file's own time ({', '.join(unread[:_LISTED])}) was not read. "
+        "Leave dt out to read it.",
     )
 
 
@@ -171,7 +196,7 @@ def _axes(
         # Of a record of nothing but time, the time itself.
         chosen = dict.fromkeys(found or [time], named)
     else:
-        return _own_axes(path, found), ("its own time axis", None)
+        return _own_axes(path, found), (_OWN_AXIS, None)
     stamps = {
         name: _finite(path, channel, as_stamps(channel.load()))
         for name, channel in {channel.name: channel for channel in chosen.values()}.items()

@@ -18,6 +18,7 @@ DRIVES = ("A", "V", "N", "N m")
 _UNIT = r"[A-Za-zµμΩ°%]+(?:(?:\^|\*\*)?-?[1-4])?"
 _PRODUCT = re.compile(rf"{_UNIT}(?:\s*[*/·.⋅ ]\s*{_UNIT}){{0,5}}")
 _LONGEST = 40
+_ROUNDING = 1e-9
 _POWERS = str.maketrans({"²": "^2", "³": "^3", "⁻": "-", "¹": "1", "μ": "µ", "⋅": "*", "·": "*"})
 # As loggers write them; pint would not know these, or take Nm for something else.
 _USUAL = {
@@ -54,14 +55,23 @@ def factor(unit: str, si: str) -> float:
     UnknownUnitError
         If the unit is unknown or of another quantity.
     """
+    return conversion(unit, si)[0]
+
+
+def conversion(unit: str, si: str) -> tuple[float, float]:
+    """Return scale and offset from `unit` to `si`; only units of temperature have an offset.
+
+    Raises
+    ------
+    UnknownUnitError
+        If the unit is unknown, of another quantity, or logarithmic.
+    """
     unit = unit.strip()
-    if unit == si:
-        return 1.0
-    return _ratio(unit, si)
+    return (1.0, 0.0) if unit == si else _conversion(unit, si)
 
 
 @cache
-def _ratio(unit: str, si: str) -> float:
+def _conversion(unit: str, si: str) -> tuple[float, float]:
     from pint.errors import PintError
 
     if unit in _MISLEADING:
@@ -71,9 +81,13 @@ def _ratio(unit: str, si: str) -> float:
         raise UnknownUnitError("is no unit")
     registry = _registry()
     try:
+        parsed = registry.parse_units(text)
         # Root units, not dimensions: pint counts angles, shares and plain numbers as one dimension.
-        size, base = registry.get_root_units(registry.parse_units(text))
+        size, base = registry.get_root_units(parsed)
         target_size, target = registry.get_root_units(registry.parse_units(_USUAL.get(si, si)))
+        none, one = (
+            float(registry.Quantity(number, parsed).to_root_units().magnitude) for number in (0.0, 1.0)
+        )
     except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError):
         raise UnknownUnitError("is no known unit") from None
     if base != target:
@@ -81,7 +95,9 @@ def _ratio(unit: str, si: str) -> float:
     ratio = float(size / target_size)
     if ratio <= 0.0:
         raise UnknownUnitError("is no known unit")
-    return ratio
+    if unit != si and abs(one - none - float(size)) > _ROUNDING * max(abs(none), abs(one)):
+        raise UnknownUnitError("is logarithmic")
+    return ratio, none / float(target_size)
 
 
 @cache
@@ -122,7 +138,7 @@ def is_a(unit: str, si: str) -> bool:
 def is_unit(text: str) -> bool:
     """Return True if a text is a unit of any quantity."""
     try:
-        _ratio(text, text)
+        _conversion(text, text)
     except UnknownUnitError:
         return False
     return True
@@ -140,7 +156,8 @@ def si_mapping(
     signal, si
         The rig's signal and its unit.
     mapping
-        Mapping in the campaign: scale and offset take precedence, then its unit, then the unit of the file.
+        Mapping in the campaign: its scale takes precedence, then its unit, then the unit of the file. An offset alone is added
+        to what the unit gives.
     stated
         Unit stated in the file, None if there is none.
 
@@ -151,18 +168,21 @@ def si_mapping(
     """
     unit = mapping.unit if mapping.unit is not None else stated
     where = f"{file}, column '{label}'"
-    if mapping.is_converted:
+    if mapping.scale is not None:
         return mapping, ()
     if unit is None:
         named = split_unit(label)[1]
         taken = si if has_si(si) else _drive_of(named)
         if named is None or taken is None or named == taken or not is_a(named, taken):
             return mapping, ()
+        if mapping.offset is None:
+            own = f'{signal} = {{ name = "{label}", unit = "{named}" }}'
+            mend = f"{own} (on a command line --unit {signal}={named}); if not, scale = 1.0"
+        else:
+            mend = f"scale = {factor(named, taken):.9g} beside the offset; if not, scale = 1.0"
         return mapping, (
             f"{where}: values taken as {taken} without conversion, although the name ends with {named}. If it is in {named}, "
-            f"write "
-            f'{signal} = {{ name = "{label}", unit = "{named}" }} (on a command line --unit {signal}={named}); if not, '
-            "scale = 1.0.",
+            f"write {mend}.",
         )
     if not has_si(si):
         if mapping.unit is not None:
@@ -177,21 +197,37 @@ def si_mapping(
             f"{where}: {signal} has no fixed unit on this rig; values were taken without conversion, in {unit}.",
         )
     try:
-        scale = factor(unit, si)
+        scale, offset = conversion(unit, si)
     except UnknownUnitError as error:
         by = "" if mapping.unit is not None else ", stated in the file,"
+        # An offset cannot stand beside a unit.
+        right = (
+            ""
+            if mapping.offset is not None
+            else f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or '
+        )
         raise InputError(
-            f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write "
-            f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or scale = 1.0 to take the '
-            "values without conversion."
+            f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write {right}scale = 1.0 to take the values without "
+            "conversion."
         ) from None
-    converted = ColumnMapping(mapping.name, scale=scale)
+    converted = ColumnMapping(mapping.name, scale=scale, offset=offset + (mapping.offset or 0.0))
+    absolute = ""
+    if offset:
+        absolute = (
+            f" {offset:.6g} {si} was added, as for an absolute temperature; if it is a difference of temperatures, write "
+            f"scale = {scale:.6g} instead of a unit."
+        )
     if mapping.unit is not None:
         said = split_unit(label)[1] if stated is None else stated
-        if said is None or not is_a(said, si) or factor(said, si) == scale:
-            return converted, ()
+        if said is None or not is_a(said, si) or conversion(said, si) == (scale, offset):
+            return converted, (f"{where}: taken in {unit}.{absolute}",) if absolute else ()
         by = "its name ends with" if stated is None else "the file states"
-        return converted, (f"{where}: taken in {unit}, as stated in the campaign, although {by} {said}.",)
-    if scale == 1.0:
+        return converted, (
+            f"{where}: taken in {unit}, as stated in the campaign, although {by} {said}.{absolute}",
+        )
+    if (scale, offset) == (1.0, 0.0):
         return converted, ()
-    return converted, (f"{where}: converted from {unit}, the unit stated in the file, to {si}.",)
+    added = "" if mapping.offset is None else f"; the offset {mapping.offset:g} {si} was added"
+    return converted, (
+        f"{where}: converted from {unit}, the unit stated in the file, to {si}{added}.{absolute}",
+    )

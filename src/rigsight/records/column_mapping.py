@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, nearest, shown
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class ColumnMapping:
     name
         Name of the column or channel, or its number, counted from 1.
     scale
-        SI unit per unit of the column. None here and for `offset` uses the unit, or takes the values without conversion.
+        SI unit per unit of the column. None uses the unit, or the one that the file states, or takes the values as they are.
     offset
-        Value added after scaling, in the SI unit.
+        Value added after scaling or conversion of the file's unit, in the SI unit.
     unit
         Unit of the column, instead of scale and offset: ``"deg"``.
 
@@ -53,7 +53,7 @@ class ColumnMapping:
 
     @property
     def is_converted(self) -> bool:
-        """True if scale or offset is given, so that no unit is asked."""
+        """True if scale or offset is given."""
         return self.scale is not None or self.offset is not None
 
     def to_si(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -67,6 +67,44 @@ class ColumnMapping:
         scale = 1.0 if self.scale is None else self.scale
         offset = 0.0 if self.offset is None else self.offset
         return scale * column + offset
+
+
+def checked_columns(
+    file: str, columns: Mapping[str, ColumnMapping | str | int], signals: Collection[str]
+) -> dict[str, ColumnMapping]:
+    """Return the columns of signals as mappings.
+
+    Parameters
+    ----------
+    file
+        Name of the file in messages.
+    columns
+        Signal name -> its column; a name or a number alone is one without conversion.
+    signals
+        Signals that may have a column.
+
+    Raises
+    ------
+    InputError
+        Naming a signal that is none of them, or what is no column.
+    """
+    checked = {}
+    for signal, column in columns.items():
+        if signal not in signals:
+            raise InputError(
+                f"{file}: columns names '{signal}', which is not a signal here.{nearest(signal, signals)} "
+                f"Signals: {', '.join(signals)}."
+            )
+        if isinstance(column, str) or (isinstance(column, int) and not isinstance(column, bool)):
+            checked[signal] = ColumnMapping(column)
+        elif isinstance(column, ColumnMapping):
+            checked[signal] = column
+        else:
+            raise InputError(
+                f"{file}: the column of {signal} must be its name, its number counted from 1, or a ColumnMapping; "
+                f"got {shown(column)}."
+            )
+    return checked
 
 
 @dataclass(frozen=True, eq=False)

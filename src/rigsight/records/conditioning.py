@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.record import Hold
+from rigsight.records.stamps import written_stamp
 
 FEWEST_SAMPLES = 50
 # Beyond, squares and quotients would overflow; data read with a wrong type looks like this.
@@ -132,12 +133,28 @@ def time_base(
             else "Resample the record onto an even grid, or record with a fixed sample time."
         )
         raise InputError(
-            f"{file}, {row} {lines[worst + 1]}: the samples are not equally spaced; the step to t = {stamps[worst + 1]:.9g} is "
-            f"{steps[worst]:.4g}, the mean step {dt:.4g} (jitter {100 * jitter:.2g} %, at most 1 % is resampled). "
+            f"{file}, {row} {lines[worst + 1]}: the samples are not equally spaced; the step to "
+            f"t = {told_stamp(stamps, worst + 1)} is {steps[worst]:.4g}, the mean step {dt:.4g} "
+            f"(jitter {100 * jitter:.2g} %, at most 1 % is resampled). "
             f"{mend}"
         )
     note = f"{file}: time stamps jitter by {100 * jitter:.2g} % of the sample time; samples were interpolated onto an even grid."
     return TimeBase(float(stamps[0]), dt, stamps, (note,))
+
+
+def told_stamp(stamps: NDArray[np.float64], sample: int) -> str:
+    """Return a stamp as text that tells it from its neighbors.
+
+    Parameters
+    ----------
+    stamps
+        Time stamps, shape (n_samples,).
+    sample
+        Which of them.
+    """
+    steps = np.abs(np.diff(stamps))
+    finest = float(np.min(steps[steps > 0.0], initial=np.inf))
+    return written_stamp(float(stamps[sample]), max(finest, 1e-3 * float(np.median(steps))), fewest=9)
 
 
 def pauses(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -201,12 +218,12 @@ def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: st
     where = f"{file}, {row} {lines[first + 1]}: "
     if steps[first] < 0.0:
         raise InputError(
-            f"{where}time is not increasing: {stamps[first + 1]:.9g} follows {stamps[first]:.9g}. "
+            f"{where}time is not increasing: {told_stamp(stamps, first + 1)} follows {told_stamp(stamps, first)}. "
             "Sort the rows, or split the file where a new record begins."
         )
     count = int(np.count_nonzero(steps == 0.0))
     mend = "Write the time with more digits." if count > stamps.size // 10 else "Delete the repeated row."
-    raise InputError(f"{where}duplicate time stamp {stamps[first]:.9g} ({count} in the file). {mend}")
+    raise InputError(f"{where}duplicate time stamp {told_stamp(stamps, first)} ({count} in the file). {mend}")
 
 
 def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str) -> None:
@@ -217,6 +234,7 @@ def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str
     first = int(gaps[0])
     more = f" ({gaps.size} gaps in the file)" if gaps.size > 1 else ""
     raise InputError(
-        f"{file}, between {row}s {lines[first]} and {lines[first + 1]}: {missing_behind(stamps, first)} samples are missing, "
-        f"the time jumps from {stamps[first]:.9g} to {stamps[first + 1]:.9g}{more}. Split the record there into two files."
+        f"{file}, between {row}s {lines[first]} and {lines[first + 1]}: {missing_behind(stamps, first)} samples are "
+        f"missing, the time jumps from {told_stamp(stamps, first)} to {told_stamp(stamps, first + 1)}{more}. "
+        "Split the record there into two files."
     )

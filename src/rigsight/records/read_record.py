@@ -9,10 +9,10 @@ from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 
-from rigsight.errors import InputError
-from rigsight.records.channel_table import read_channels
+from rigsight.errors import InputError, readable
+from rigsight.records.channel_table import read_channels, unread_time
 from rigsight.records.channel_units import si_mapping
-from rigsight.records.column_mapping import ColumnMapping, Columns
+from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
 from rigsight.records.conditioning import TimeBase, check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
 from rigsight.records.formats.read_csv import read_csv
@@ -36,7 +36,7 @@ TIME = "t"
 class ReadingOptions(TypedDict, total=False):
     """How a record is to be read, see `read_stretches`."""
 
-    columns: Mapping[str, ColumnMapping] | None
+    columns: Mapping[str, ColumnMapping | str | int] | None
     require_outputs: bool
     required_outputs: Collection[str] | None
     absent_inputs: Collection[str]
@@ -83,7 +83,7 @@ def read_stretches(
     inputs: Sequence[NamedSignal],
     outputs: Sequence[NamedSignal],
     *,
-    columns: Mapping[str, ColumnMapping] | None = None,
+    columns: Mapping[str, ColumnMapping | str | int] | None = None,
     require_outputs: bool = True,
     required_outputs: Collection[str] | None = None,
     absent_inputs: Collection[str] = (),
@@ -113,7 +113,7 @@ def read_stretches(
     inputs, outputs
         Signals of the rig. Further outputs than the required ones are read where the file has them.
     columns
-        Where signals and time ``t`` stand; by default in columns of their own names.
+        Where signals and time ``t`` stand, as mappings, names or numbers; by default in columns of their own names.
     require_outputs
         False to simulate a record: its time and inputs suffice, and its inputs may be constant.
     required_outputs
@@ -129,7 +129,7 @@ def read_stretches(
     role, kind, amplitude, hold
         See `Record`.
     dt
-        Sample time [s] of a file without time.
+        Sample time [s] of a file without time; time that it has is not read then, with a note.
     resample
         Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
     separator, decimal, header, comment
@@ -146,7 +146,8 @@ def read_stretches(
     InputError
         If the record is unusable; the message gives file, line or column, and the remedy.
     """
-    columns = columns or {}
+    known = [TIME, *(signal.name for signal in (*inputs, *outputs)), *beside]
+    columns = checked_columns(path.name, columns or {}, known)
     time = columns.get(TIME, ColumnMapping(TIME))
     if time.scale is not None and time.scale < 0.0:
         raise InputError(f"{path.name}: the scale of time must be positive, got {time.scale:g}.")
@@ -215,7 +216,7 @@ def read_stretches(
     parts = (one_stretch(path.name, cut),) if at_pauses == "refuse" else cut.parts
     held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
     holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
-    called, before = name or path.stem, (*table.notes, *unit_notes, *cut.notes)
+    called, before = name or readable(path.stem), (*table.notes, *unit_notes, *cut.notes)
     records = []
     for number, part in enumerate(parts, 1):
         on_axis = _on_one_axis(path, part, kept, to_si[TIME], resample, holds)
@@ -269,7 +270,13 @@ def _table(
     if dt is None:
         return table
     stamps = dt * np.arange(table.lines.size, dtype=np.float64)
-    return replace(table, values={TIME: stamps, **table.values}, labels={TIME: "dt", **table.labels})
+    notes = unread_time(path, dt, [TIME] if TIME in table.names else [])
+    return replace(
+        table,
+        values={TIME: stamps, **table.values},
+        labels={TIME: "dt", **table.labels},
+        notes=(*table.notes, *notes),
+    )
 
 
 def _refuse_time_as_signal(file: str, table: Columns) -> None:

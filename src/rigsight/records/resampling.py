@@ -13,6 +13,7 @@ from rigsight.errors import InputError
 from rigsight.records.conditioning import FEWEST_SAMPLES, TimeBase
 from rigsight.records.formats.channel import MOST_SAMPLES
 from rigsight.records.record import Hold
+from rigsight.records.stamps import written_stamp
 
 # Of the sample time: closer than this, a stamp lies on the grid.
 _ON_GRID = 1e-6
@@ -49,7 +50,7 @@ def refuse_different_axes(file: str, bases: Mapping[str, TimeBase], labels: Mapp
         Always: with the sample times and lengths that were found, and the key that resamples.
     """
     listed = ", ".join(
-        f"{signal} ('{labels[signal]}') every {base.dt:.6g} s from {base.t0:.6g} s"
+        f"{signal} ('{labels[signal]}') every {base.dt:.6g} s from {written_stamp(base.t0, base.dt, 6)} s"
         for signal, base in bases.items()
     )
     finest = min(base.dt for base in bases.values())
@@ -104,8 +105,9 @@ def resampled(
         )
     n_samples = int(np.floor(asked + _ON_GRID)) + 1
     if n_samples < FEWEST_SAMPLES:
+        span = " to ".join(f"{written_stamp(stamp, step, 6)} s" for stamp in (start, stop))
         raise InputError(
-            f"{file}: the signals have {max(n_samples, 0)} samples of {step:g} s in common (from {start:.6g} s to {stop:.6g} s); "
+            f"{file}: the signals have {max(n_samples, 0)} samples of {step:g} s in common (from {span}); "
             f"at least {FEWEST_SAMPLES} are needed for a record. Do their clocks start together?"
         )
     on_axis, how = {}, []

@@ -21,6 +21,7 @@ from rigsight.records.conditioning import (
     missing_behind,
     pauses,
     resolution,
+    told_stamp,
 )
 from rigsight.records.plausibility import is_constant
 
@@ -125,7 +126,7 @@ def _where(stamps: NDArray[np.float64], table: Columns, ends: NDArray[np.intp]) 
     others = "" if ends.size == 1 else f", and at {ends.size - 1} more place{'s' if ends.size > 2 else ''}"
     return (
         f"between {table.row}s {table.lines[first]} and {table.lines[first + 1]} ({missing_behind(stamps, first)}; the time "
-        f"jumps from {stamps[first]:.9g} to {stamps[first + 1]:.9g}){others}"
+        f"jumps from {told_stamp(stamps, first)} to {told_stamp(stamps, first + 1)}){others}"
     )
 
 

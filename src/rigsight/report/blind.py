@@ -23,6 +23,7 @@ from rigsight.report.blind_bench.views import (
     number,
     trial_text,
 )
+from rigsight.report.wording import percent
 
 _MOST_WRONG = 15
 
@@ -61,7 +62,11 @@ def _share_cells(share: Mapping[str, Any]) -> tuple[str, str, str]:
     if not share["total"]:
         return "-", "", ""
     low, high = share["interval"]
-    return f"{share['share']:.0%}", f"{share['count']} of {share['total']}", f"({low:.0%} to {high:.0%})"
+    return (
+        percent(share["share"]),
+        f"{share['count']} of {share['total']}",
+        f"({percent(low)} to {percent(high)})",
+    )
 
 
 def _conditions(content: Mapping[str, Any]) -> RenderResult:

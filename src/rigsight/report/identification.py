@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from rich.console import Console, ConsoleOptions, RenderResult
@@ -102,8 +102,7 @@ def _amplitude_tables(found: Identification, text: Callable[..., Text], width: i
         table.add_column(text("record"))
         for record in part:
             table.add_column(text(record.record.name), justify="right", overflow="fold")
-        unit = found.units.get(part[0].source, "")
-        table.add_row(text(f"amplitude{unit_in_brackets(unit)}"), *(text(f"{r.amplitude:.4g}") for r in part))
+        table.add_row(*map(text, amplitude_row(found, part)))
         for name in names:
             head = text(f"{name}{unit_in_brackets(found.units.get(name, ''))}")
             table.add_row(head, *(text(estimate_cell(record, name)) for record in part))
@@ -111,6 +110,17 @@ def _amplitude_tables(found: Identification, text: Callable[..., Text], width: i
             seen = ("-" if r.resonance is None else f"{r.resonance:.3g}" for r in part)
             table.add_row(text("resonance [rad/s]"), *map(text, seen))
         yield table
+
+
+def amplitude_row(found: Identification, records: Sequence[RecordIdentification]) -> list[str]:
+    """Return the head and the cells of the amplitudes of records; the unit stands once, or in each cell where sources differ."""
+    units = [found.units.get(record.source, "") for record in records]
+    if len({found.units.get(record.source, "") for record in found.records}) == 1:
+        return [f"amplitude{unit_in_brackets(units[0])}", *(f"{record.amplitude:.4g}" for record in records)]
+    return [
+        "amplitude",
+        *(f"{record.amplitude:.4g} {unit}".rstrip() for record, unit in zip(records, units, strict=True)),
+    ]
 
 
 def unit_in_brackets(unit: str) -> str:

@@ -48,6 +48,7 @@ def render_identification(
     amplitudes: Figure | None,
     command: str,
     versions: Mapping[str, str],
+    seed: int | None = None,
 ) -> str:
     """Return the page of an identification.
 
@@ -63,6 +64,8 @@ def render_identification(
         The command line that made it.
     versions
         Package -> version.
+    seed
+        Seed of the calibration.
     """
     told = identification.identifiability
     assert told is not None
@@ -104,7 +107,7 @@ def render_identification(
             ),
             command=command or "from Python",
             versions=versions,
-            seed=None,
+            seed=seed,
             made=datetime.now(UTC),
         )
     )

@@ -10,6 +10,7 @@ from rigsight import plot
 from rigsight.diagnose.location.gap_parts import AmplitudePart, GapPart, StatePart
 from rigsight.diagnose.result import Diagnosis
 from rigsight.discover import not_contradicted
+from rigsight.records.stamps import written_span
 from rigsight.report.declared import rig_of
 from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent
@@ -204,7 +205,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
                 plot.gap_times(times, stages),
                 f"{key}-times",
                 f"Steps of the gap over time, {rest} largest with {gap_percent(worst_time.reidentified)} from "
-                f"{worst_time.t_start:.4g} s to {worst_time.t_end:.4g} s of {worst_time.record}; noise floor "
+                f"{written_span(worst_time.t_start, worst_time.t_end)} of {worst_time.record}; noise floor "
                 f"{gap_percent(worst_time.noise_floor)}.",
                 "Over time within each scored record, relative to the motion of all of them.",
             )

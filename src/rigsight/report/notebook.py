@@ -12,7 +12,7 @@ from rigsight.identify.identification import Identification
 from rigsight.report.comparison import comparison_view
 from rigsight.report.discovery import discovery_rows
 from rigsight.report.hysteresis import ERROR_HEADS, HEADING, error_rows, hysteresis_rows
-from rigsight.report.identification import estimate_cell, joint_rows, unit_in_brackets
+from rigsight.report.identification import amplitude_row, estimate_cell, joint_rows, unit_in_brackets
 from rigsight.report.render import environment
 from rigsight.report.terminal import diagnosis_rows
 from rigsight.report.trust import trust_line
@@ -68,11 +68,10 @@ def identification_html(identification: Identification) -> str:
     """
     records = sorted(identification.records, key=lambda record: record.amplitude)
     names = dict.fromkeys(name for record in records for name in record.estimates)
-    unit = identification.units.get(records[0].source, "")
     alone = NotebookTable(
         ("record", *(record.record.name for record in records)),
         [
-            (f"amplitude{unit_in_brackets(unit)}", *(f"{record.amplitude:.4g}" for record in records)),
+            tuple(amplitude_row(identification, records)),
             *(
                 (
                     f"{name}{unit_in_brackets(identification.units.get(name, ''))}",

@@ -14,6 +14,7 @@ from rigsight import plot
 from rigsight.diagnose.location.trace import STAGES, Stage, Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.metrics import nrmse
+from rigsight.records.stamps import time_label, time_origin, written_span
 from rigsight.report.drawing.charts import (
     Chart,
     ChartPanel,
@@ -148,7 +149,8 @@ def _time_chart(
     ]
     window = plot.detail_window(trace, output)
     is_step = plot.step_window(trace, output) is not None
-    begin, end = float(trace.t[window.start]), float(trace.t[window.stop - 1])
+    origin = time_origin(trace.t)
+    begin, end = float(trace.t[window.start]) - origin, float(trace.t[window.stop - 1]) - origin
     first = names[stages[0]]
     detail = (
         Detail(begin, end, "Step", "Show the step")
@@ -162,6 +164,7 @@ def _time_chart(
         panels,
         names,
         detail=detail,
+        label=time_label(trace.t),
     )
     thinned = ""
     if measured.size > most_points:
@@ -181,7 +184,9 @@ def _time_chart(
 
 
 def _curve(of: str, trace: Trace, values: NDArray[np.float64], most_points: int) -> Curve:
-    x, y = plot.envelope(trace.t, np.where(np.isfinite(values), values, np.nan), most_points // 2)
+    x, y = plot.envelope(
+        trace.t - time_origin(trace.t), np.where(np.isfinite(values), values, np.nan), most_points // 2
+    )
     return Curve(of, x, y)
 
 
@@ -207,7 +212,7 @@ def _drawings(
     )  # fmt: skip
     if not has_detail:
         return (whole,)
-    span = f"{detail.low:.4g} s to {detail.high:.4g} s"
+    span = written_span(float(trace.t[window.start]), float(trace.t[window.stop - 1]))
     near = PageFigure(
         f"{key}-detail",
         time_drawing(

@@ -15,7 +15,7 @@ from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_o
 from rigsight.compare.comparison_files import comparison_csv, comparison_json
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.errors import InputError, check_option
+from rigsight.errors import InputError, check_option, readable
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
@@ -78,7 +78,7 @@ def run_compare(
     _check_wishes(models, method, step_seconds)
     jobs = checked_jobs(n_jobs)
     if out is not None:
-        check_writable(Path(out))
+        check_writable(Path(out), COMPARISON_FILE, TABLE_FILE, PAGE_FILE)
     read = read_campaign(campaign)
     competitors = named_competitors(models, read)
     comparison = compare_campaign(read, competitors, method, step_seconds, jobs, listener)
@@ -253,10 +253,6 @@ def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
             f"Model '{name}' is of the rig '{model.structure.rig.name}', the records of {campaign.called} are of the rig "
             f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."
         )
-    if model.structure.rig.mechanism != campaign.rig.mechanism:
-        raise InputError(
-            f"Model '{name}' declares the rig '{campaign.rig.name}' with other equations than {campaign.called}. Leave it out."
-        )
     return model
 
 
@@ -269,8 +265,8 @@ def _name_and_source(text: str) -> tuple[str, str]:
         return name.strip(), source
     path = Path(text)
     if path.name == MODEL_FILE:
-        return path.absolute().parent.name or text, text
-    return (path.stem if path.suffix == ".json" else path.absolute().name) or text, text
+        return readable(path.absolute().parent.name) or text, text
+    return readable(path.stem if path.suffix == ".json" else path.absolute().name) or text, text
 
 
 def _distinct(name: str, taken: Sequence[str]) -> str:
@@ -284,6 +280,7 @@ def _distinct(name: str, taken: Sequence[str]) -> str:
 def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
     notes = [
         *campaign.notes,
+        *(f"Record '{record.name}': {note}" for record in campaign.records for note in record.notes),
         *closed_loop_notes(campaign.records, campaign.rig, "It is not used in a comparison."),
     ]
     if all(record.kind == "step" for record in campaign.records):

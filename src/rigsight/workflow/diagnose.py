@@ -80,7 +80,7 @@ def run_diagnose(
     """
     jobs = checked_jobs(n_jobs)
     if out is not None:
-        check_writable(Path(out))
+        check_writable(Path(out), DIAGNOSIS_FILE, MODEL_FILE, REPORT_FILE)
 
     def keep(diagnosis: Diagnosis) -> None:
         if out is not None:

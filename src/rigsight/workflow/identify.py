@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -56,6 +57,7 @@ def run_identify(
     seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
+    command: str | None = None,
 ) -> Identification:
     """Identify the linear rig behind the estimation records of a campaign, and the rig with effects of memory if some are named.
 
@@ -79,6 +81,8 @@ def run_identify(
         Records identified at the same time; None for one per processor.
     listener
         Told of every finished step.
+    command
+        The command line that the page quotes.
 
     Raises
     ------
@@ -89,16 +93,27 @@ def run_identify(
     options = checked_options(method, resolution)
     jobs = checked_jobs(n_jobs)
     if out is not None:
-        check_writable(Path(out))
+        check_writable(Path(out), IDENTIFICATION_FILE, MODEL_FILE, PAGE_FILE)
     identification = identify_campaign(
         read_campaign(campaign, own_effects), options, jobs, listener, effects=effects, seed=seed
     )
     if out is not None:
-        asked = "".join(f" --effect {effect.name}" for effect in effects)
-        seeded = f" --seed {seed}" if effects and seed else ""
-        write_identification(
-            identification, Path(out), f"rigsight identify {campaign}{asked}{seeded} --out {out}"
-        )
+        asked = [word for effect in effects for word in ("--effect", effect.name)]
+        estimated = [] if method == "local_rational" else ["--method", method]
+        resolved = [] if resolution is None else ["--resolution", f"{resolution!r}"]
+        seeded = ["--seed", str(seed)] if seed else []
+        quoted = [
+            "rigsight",
+            "identify",
+            str(campaign),
+            *estimated,
+            *resolved,
+            *asked,
+            *seeded,
+            "--out",
+            str(out),
+        ]
+        write_identification(identification, Path(out), command or shlex.join(quoted), seed)
     return identification
 
 
@@ -207,7 +222,9 @@ def _by_transfer_functions(
     return identification
 
 
-def write_identification(identification: Identification, out: Path, command: str = "") -> tuple[Path, ...]:
+def write_identification(
+    identification: Identification, out: Path, command: str = "", seed: int | None = None
+) -> tuple[Path, ...]:
     """Write all results of an identification into a folder, all or none.
 
     Parameters
@@ -232,7 +249,9 @@ def write_identification(identification: Identification, out: Path, command: str
             view_figure(v, identification.units) for v in identification.views if v.measured is not None
         ]
         amplitudes = amplitudes_figure(identification)
-        page[PAGE_FILE] = render_identification(identification, drawings, amplitudes, command, versions())
+        page[PAGE_FILE] = render_identification(
+            identification, drawings, amplitudes, command, versions(), seed
+        )
     return write_together(
         out,
         {

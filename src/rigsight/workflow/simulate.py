@@ -16,6 +16,7 @@ from rigsight.errors import InputError, nearest
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
+from rigsight.records.stamps import digits_for
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.equations.composition import without_vanished_effects
@@ -25,7 +26,9 @@ from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.run.results import check_target, write_together
 
-_DIGITS = "%.12g"
+_DIGITS = 12
+_STAMPS_TO = 1e-4
+"""Of the sample time: how closely time is written, so that the file is evenly sampled when it is read again."""
 
 
 def run_simulate(
@@ -83,6 +86,10 @@ def run_simulate(
     own = checked_numbers(Where(MODEL_FILE), ("constants",), rig, rig.constants, constants or {})
     if out is not None:
         check_target(Path(out))
+        if Path(out).exists() and Path(record).exists() and Path(out).samefile(record):
+            raise InputError(
+                f"Cannot write {out}: it is the record that is simulated. Name another file with --out."
+            )
     estimated = initial_state == "estimated"
     driven = read_record(
         Path(record),
@@ -198,5 +205,13 @@ def _of_all_effects(
 def _csv_text(record: Record, names: list[str]) -> str:
     file = io.StringIO()
     table = np.column_stack([record.t, *(record[name] for name in names)])
-    np.savetxt(file, table, fmt=_DIGITS, delimiter=",", header=",".join([TIME, *names]), comments="")
+    digits = [digits_for(float(record.t[-1]), _STAMPS_TO * record.dt, _DIGITS), *[_DIGITS] * len(names)]
+    np.savetxt(
+        file,
+        table,
+        fmt=[f"%.{n}g" for n in digits],
+        delimiter=",",
+        header=",".join([TIME, *names]),
+        comments="",
+    )
     return file.getvalue()

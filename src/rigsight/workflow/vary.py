@@ -26,7 +26,7 @@ from rigsight.workflow.run.variation_sweep import MARGIN, Pair, variation_sweep
 
 VARY_FILE = "vary.json"
 VARYING = "Sweeping"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 _MOST_STEPS = 50
 
 
@@ -41,8 +41,8 @@ class Variant:
     response
         Frequency response, None where the model cannot be simulated with it.
     features
-        ``static_gain``, ``peak_omega``, ``peak_magnitude``, ``break_frequency``, ``fitted_break_frequency``; None where the
-        band does not show one.
+        ``lowest_gain`` (the magnitude at the lowest frequency), ``peak_omega``, ``peak_magnitude``, ``break_frequency``,
+        ``fitted_break_frequency``; None where the band does not show one.
     note
         A remark; empty if there is none.
     """
@@ -106,7 +106,7 @@ def run_vary(
         If the model or an option cannot be used, or the results cannot be written; nothing is written then.
     """
     if out is not None:
-        check_writable(Path(out))
+        check_writable(Path(out), VARY_FILE)
     read = named_model(model)
     rig = read.structure.rig
     if not rig.is_driven or not rig.inputs:
@@ -148,10 +148,11 @@ def run_vary(
 
 
 def table_text(variation: Variation) -> str:
-    """Return static gain, peak and break frequency of every value as lines for a terminal."""
-    unit = next(v.response.unit for v in variation.variants if v.response is not None)
+    """Return the gain at the lowest frequency, peak and break frequency of every value as lines for a terminal."""
+    response = next(v.response for v in variation.variants if v.response is not None)
+    unit = response.unit
     columns = {
-        "static_gain": f"gain [{unit}]",
+        "lowest_gain": f"gain at {response.omega[0]:.4g} rad/s [{unit}]",
         "peak_magnitude": f"peak [{unit}]",
         "peak_omega": "at [rad/s]",
         "break_frequency": "break [rad/s]",
@@ -191,15 +192,23 @@ def _values(
     name = parameter.name
     if base == 0.0 and (low is None or high is None):
         raise InputError(f"'{name}' is 0 in this model, so there is no default range: give --from and --to.")
-    first, last = (0.5 * base if low is None else low), (2.0 * base if high is None else high)
     for option, value in (("--from", low), ("--to", high)):
         if value is not None:
             check_in_range(
                 f"The parameter '{name}' ({option})", value, parameter.lower, parameter.upper, parameter.unit
             )
-    first, last = (float(np.clip(v, parameter.lower, parameter.upper)) for v in sorted((first, last)))
-    if first == last:
-        raise InputError(f"--from and --to give '{name}' only one value, {first:g}: give two different ones.")
+    least, most = (
+        float(np.clip(v, parameter.lower, parameter.upper)) for v in sorted((0.5 * base, 2.0 * base))
+    )
+    first, last = (least if low is None else low), (most if high is None else high)
+    if first >= last:
+        told = ", ".join(
+            f"{option} {end:g}{' (the default)' if value is None else ''}"
+            for option, value, end in (("--from", low, first), ("--to", high, last))
+        )
+        raise InputError(
+            f"The values of '{name}' do not increase: {told}. Give --from and --to, the smaller value first."
+        )
     if low is None and high is None and first * last > 0.0:
         values = np.geomspace(abs(first), abs(last), steps) * math.copysign(1.0, first)
     else:
@@ -227,7 +236,7 @@ def _variant(
     top = peak(response)
     notes = [] if top.is_resonance else ["The magnitude has no peak inside the band."]
     features: dict[str, float | None] = {
-        "static_gain": float(response.magnitude[0]),
+        "lowest_gain": float(response.magnitude[0]),
         "peak_omega": top.omega if top.is_resonance else None,
         "peak_magnitude": top.magnitude if top.is_resonance else None,
     }

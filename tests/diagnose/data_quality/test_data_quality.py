@@ -244,7 +244,7 @@ def with_lost_counts(x):
     ("fault", "kind", "told"),
     [
         (clipped, "clipping", "is clipped at"),
-        (stuck, "stuck", "is exactly constant from 7.5 to 7.995 s"),
+        (stuck, "stuck", "is exactly constant from 7.5 s to 7.995 s"),
         (coarse, "quantization", "61 levels"),
         (with_spike, "jump", "at 10 s"),
         (with_lost_counts, "jump", "at 10 s"),

@@ -227,6 +227,19 @@ def test_errors_of_a_record_name_campaign_file_and_line(campaign: Callable[..., 
         read_campaign(campaign(change=change))
 
 
+def test_a_column_that_is_no_signal_is_told_with_its_own_line(campaign: Callable[..., Path]) -> None:
+    folder = campaign()
+    toml = folder / "campaign.toml"
+    lines = [*toml.read_text().rstrip("\n").split("\n"), "", "[records.columns]", 'force = "u"', ""]
+    toml.write_text("\n".join(lines))
+    number = lines.index('force = "u"') + 1
+    with pytest.raises(
+        InputError,
+        match=rf"campaign.toml, line {number}, column 9: record .*: columns.force: is not a signal",
+    ):
+        read_campaign(folder)
+
+
 def test_a_link_that_leaves_the_folder_is_refused(
     campaign: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory
 ) -> None:

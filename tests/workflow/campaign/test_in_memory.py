@@ -56,6 +56,32 @@ def test_units_are_those_of_the_rig_unless_the_record_has_its_own() -> None:
     assert made.units == {"u": "N", "x": "m"}
 
 
+def test_another_unit_of_a_record_is_converted_with_a_note() -> None:
+    given = record(units={"u": "N", "x": "mm"})
+    (made,) = make_campaign("axis", [given]).records
+    np.testing.assert_allclose(made["x"], 1e-3 * given["x"], rtol=1e-15)
+    assert made.units == {"u": "N", "x": "m"}
+    assert made.notes == ("Record 'sweep': x was converted from mm, the unit of the record, to m.",)
+    assert make_campaign("axis", [made]).records[0].notes == made.notes
+
+
+def test_an_amplitude_is_converted_with_the_input() -> None:
+    u = np.sin(np.linspace(0.0, 60.0, 500) ** 1.5)
+    given = record(
+        signals={"u": 250.0 * u, "psi": 0.01 * u}, units={"u": "mA"}, kind="sweep", amplitude=250.0
+    )
+    constants = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
+    (made,) = make_campaign("running_gear", [given], constants=constants).records
+    assert (made.amplitude, np.max(made["u"])) == (0.25, pytest.approx(0.25, rel=1e-3))
+
+
+def test_a_unit_of_another_quantity_is_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"Record 'sweep': the unit 'deg' of x does not measure the same as m; x is in m"
+    ):
+        make_campaign("axis", [record(units={"x": "deg"})])
+
+
 def test_effects_are_named_or_declared() -> None:
     named = make_campaign("axis", [record()], parameters={"k_3": 2.0}, effects=["cubic_stiffness"])
     own = replace(CUBIC, name="my_spring")

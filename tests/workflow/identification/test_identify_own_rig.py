@@ -118,14 +118,27 @@ def test_one_mass_with_names_of_its_own_is_identified_from_files(tmp_path: Path)
         '[rig]\nfile = "stage.toml"\n\n[[records]]\nfile = "sweep.csv"\nrole = "estimation"\nkind = "sweep"\n',
         "utf-8",
     )
-    found = run_identify(tmp_path, tmp_path / "out", n_jobs=1)
+    found = run_identify(tmp_path, tmp_path / "out", method="local_polynomial", seed=7, n_jobs=1)
     assert found.identifiability is not None
     assert found.identifiability.determined == ("carriage", "friction", "leaf")
     for name in found.identifiability.determined:
         value, error = found.joint.fit.fit.values[name], found.joint.fit.fit.standard_errors[name]
         assert abs(value - truth[name]) < 4.0 * error < 0.1 * truth[name]
     assert found.views[0].modes[0].natural_frequency == pytest.approx(np.sqrt(400.0 / 0.8), rel=1e-3)
-    assert (tmp_path / "out" / "identification.html").is_file()
+    page = (tmp_path / "out" / "identification.html").read_text("utf-8")
+    assert f"rigsight identify {tmp_path} --method local_polynomial --seed 7 --out {tmp_path / 'out'}" in page
+    assert "<dt>Seed</dt><dd>7</dd>" in page
+
+
+def test_an_estimator_for_built_in_rigs_alone_is_refused_with_the_reason() -> None:
+    stage = rig_of_text(STAGE)
+    t = np.linspace(0.0, 1.0, 50)
+    record = Record("one", 0.02, {"current": np.sin(9.0 * t), "scale": np.cos(9.0 * t)}, {})
+    told = (
+        r"for the rig 'stage' .*h1 and thesis are for built-in rigs of one motion.* is 'h1'.*'local_rational'"
+    )
+    with pytest.raises(InputError, match=told):
+        identify_campaign(make_campaign(stage, [record]), checked_options("h1", None))
 
 
 def test_the_name_of_a_rig_changes_nothing() -> None:

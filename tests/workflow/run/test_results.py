@@ -12,6 +12,9 @@ from pathlib import Path
 import pytest
 
 from rigsight.errors import InputError
+from rigsight.workflow.compare import run_compare
+from rigsight.workflow.diagnose import run_diagnose
+from rigsight.workflow.identify import run_identify
 from rigsight.workflow.run import results
 from rigsight.workflow.run.results import (
     check_target,
@@ -20,6 +23,7 @@ from rigsight.workflow.run.results import (
     write_together,
 )
 from rigsight.workflow.run.unfinished_files import temporary_path, write_locked
+from rigsight.workflow.vary import run_vary
 
 CONTENTS = {"a.json": "{}\n", "b.html": "<p>ä</p>\n"}
 
@@ -36,6 +40,32 @@ def test_earlier_results_are_replaced_and_other_files_stay(tmp_path: Path) -> No
     write_together(tmp_path, CONTENTS)
     assert (tmp_path / "a.json").read_text() == "{}\n"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "b.html", "mine.txt"]
+
+
+def test_what_is_in_the_way_is_told_before_the_work(tmp_path: Path) -> None:
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "nowhere")
+    for folder in (link, link / "out"):
+        with pytest.raises(
+            InputError, match=r"is a link to .*nowhere, which does not exist\. Name another folder"
+        ):
+            check_writable(folder)
+    (tmp_path / "a.json").mkdir()
+    check_writable(tmp_path, "b.html")
+    with pytest.raises(InputError, match=r"a\.json: it is a folder"):
+        check_writable(tmp_path, "b.html", "a.json")
+
+
+def test_every_command_checks_its_files_before_the_work(axis_campaign: Path, tmp_path: Path) -> None:
+    for name, run in (
+        ("diagnosis.json", run_diagnose),
+        ("comparison.html", lambda campaign, out: run_compare(campaign, ["nowhere"], out)),
+        ("vary.json", lambda _, out: run_vary("nowhere", ["k"], out)),
+        ("model.json", run_identify),
+    ):
+        (tmp_path / name / name).mkdir(parents=True)
+        with pytest.raises(InputError, match=f"{name}: it is a folder"):
+            run(axis_campaign, tmp_path / name)
 
 
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "no space"), KeyboardInterrupt()])

@@ -9,6 +9,7 @@ from rigsight.diagnose.data_quality.finding import Finding
 from rigsight.diagnose.policy import NOTES
 from rigsight.records.plausibility import clipping
 from rigsight.records.record import Record
+from rigsight.records.stamps import written_span, written_stamp
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 
@@ -108,7 +109,7 @@ def _stuck(record: Record, name: str) -> list[Finding]:
     if stuck.size == 0:
         return []
     told = [
-        f"{record.t[starts[i]]:.4g} to {record.t[min(stops[i], record.n_samples - 1)]:.4g} s"
+        written_span(float(record.t[starts[i]]), float(record.t[min(stops[i], record.n_samples - 1)]))
         for i in stuck[: NOTES.first_told]
     ]
     return [
@@ -142,7 +143,7 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
     # A third difference reaches over four samples; the jump lies at the largest step among them.
     steps = [np.abs(np.diff(samples[place : place + 4])) for place in places]
     told = ", ".join(
-        f"{record.t[place + 1 + np.argmax(step)]:.4g} s"
+        f"{written_stamp(float(record.t[place + 1 + np.argmax(step)]), record.dt)} s"
         for place, step in zip(places[: NOTES.first_told], steps, strict=False)
     )
     largest = max(float(np.max(step)) for step in steps)

@@ -139,6 +139,7 @@ def chart_data(
     *,
     log: bool = False,
     detail: Detail | None = None,
+    label: str = "",
 ) -> Markup:
     """Return a chart's curves as JSON for the page's script.
 
@@ -156,6 +157,8 @@ def chart_data(
         True for a logarithmic shared axis.
     detail
         A part worth looking at.
+    label
+        What stands at the shared axis, by default its quantity and unit.
     """
     symbol, unit = axis
     ends = [float(curve.x[i]) for panel in panels for curve in panel.curves for i in (0, -1)]
@@ -163,7 +166,7 @@ def chart_data(
         "title": title,
         "symbol": symbol,
         "unit": unit,
-        "label": f"{'angular frequency' if log else 'time'} [{unit}]",
+        "label": label or f"{'angular frequency' if log else 'time'} [{unit}]",
         "log": log,
         "range": [_short(min(ends)), _short(max(ends))],
         "detail": None

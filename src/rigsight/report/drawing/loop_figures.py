@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rigsight import plot
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.result import Diagnosis
+from rigsight.records.stamps import written_span
 from rigsight.report.declared import rig_of
 from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent
@@ -92,7 +93,7 @@ def _figure(diagnosis: Diagnosis, trace: Trace, motion: str, force: str, key: st
     half = 0.5 * float(np.ptp(displacement[window]))
     scale = plot.display_scale(diagnosis.units.get(motion, ""), half)
     what = f"{force} over {motion} and over its rate, record {trace.record}, motion of ±{half * scale.factor:.3g} {scale.unit}"
-    place = f"{trace.t[window.start]:.4g} s to {trace.t[window.stop - 1]:.4g} s"
+    place = written_span(float(trace.t[window.start]), float(trace.t[window.stop - 1]))
     if window.stop - window.start < whole.size:
         place += f", where the error is largest, {next(iter(stages.values()))}"
     return page_figure(

@@ -22,6 +22,7 @@ from rigsight.plot.frequency_responses import (
     seen,
     thinned,
 )
+from rigsight.records.stamps import time_label, time_origin
 from rigsight.report.drawing.line_drawing import Area, DrawnPanel, Line, around, line_drawing
 from rigsight.report.responses import PathResponse
 
@@ -62,7 +63,8 @@ def time_drawing(
         Samples to mark with a bar in a drawing of the whole record.
     """
     shown = window or slice(None)
-    t, measured = trace.t[shown], np.asarray(trace.measured[output][shown], dtype=np.float64)
+    since_origin = trace.t - time_origin(trace.t)
+    t, measured = since_origin[shown], np.asarray(trace.measured[output][shown], dtype=np.float64)
     errors = {stage: -trace.residual(stage, output)[shown] for stage in stages}
     unit = diagnosis.units.get(output, "")
     factor, shown_unit = shown_in(unit, measured)
@@ -101,8 +103,8 @@ def time_drawing(
             [Area(ends, -reach, reach, FLOOR, 0.12)] if math.isfinite(floor) else [],
         ),
     ]  # fmt: skip
-    at = None if marked is None else (float(trace.t[marked.start]), float(trace.t[marked.stop - 1]))
-    return line_drawing(panels, "time [s]", key, alt, _DETAIL if window else _WHOLE, marked=at)
+    at = None if marked is None else (float(since_origin[marked.start]), float(since_origin[marked.stop - 1]))
+    return line_drawing(panels, time_label(trace.t), key, alt, _DETAIL if window else _WHOLE, marked=at)
 
 
 def response_drawing(

@@ -63,6 +63,7 @@ def dimension(unit: str) -> Dimension:
         # A blank multiplies, and what follows a stroke in parentheses is all below it.
         quantity = registry.Quantity(1.0, registry.parse_units(re.sub(r"(?<=[\w)]) +(?=[\w(])", "*", text)))
         si = quantity.to_base_units()
+        zero = float(registry.Quantity(0.0, quantity.units).to_base_units().magnitude)
     except (
         PintError,
         ValueError,
@@ -75,6 +76,10 @@ def dimension(unit: str) -> Dimension:
         TokenError,
     ):
         raise UnitError(f"the unit '{unit}' is unknown; write one like N m/rad, kg m^2 or 1/s") from None
+    if zero:
+        raise UnitError(
+            f"the unit '{unit}' is not SI: equations are in {_plain(si.units)}, which has another zero"
+        )
     if abs(float(si.magnitude) - 1.0) > 1e-12:
         raise UnitError(
             f"the unit '{unit}' is not SI: equations are in {_plain(si.units)}, which is {1.0 / si.magnitude:g} {unit}"

@@ -35,7 +35,7 @@ def read_rig_file(path: Path) -> Rig:
     if file_size(path, "the rig file") > LARGEST_FILE:
         raise InputError(f"{path}: a rig file may have at most {LARGEST_FILE / 1e6:g} MB.")
     try:
-        text = path.read_text("utf-8")
+        text = path.read_text("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not text in UTF-8 (byte {error.start}).") from None
     return rig_of_text(text, str(path), folder=path.parent)
@@ -68,6 +68,9 @@ def rig_of_text(
         raise InputError(f"{source}{toml_error(error)}") from None
     except RecursionError:
         raise InputError(f"{source}: is not valid TOML: its arrays are nested too deep.") from None
+    except ValueError:
+        # The only valid TOML that fails here is an integer with thousands of digits.
+        raise InputError(f"{source}: contains an integer with too many digits to be read.") from None
     if folder is not None:
         content = with_whole_path(content, folder)
     return _rig_of(content, value_places(text), source, check_units)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 Path = tuple[str | int, ...]
 Place = tuple[int, int]
@@ -33,7 +33,7 @@ def value_places(text: str) -> dict[Path, Place]:
     for number, line in _outside_long_strings(text):
         header = _HEADER.fullmatch(line)
         if header:
-            table = _keys(header[2])
+            table = _within_lists(_keys(header[2]), lists)
             if header[1] == "[[":
                 lists[table] = lists.get(table, -1) + 1
                 table = (*table, lists[table])
@@ -52,6 +52,16 @@ def value_places(text: str) -> dict[Path, Place]:
             for inner in _INNER.finditer(plain, key.end()):
                 places[(*path, *_keys(line[inner.start(1) : inner.end(1)]))] = (number, inner.end() + 1)
     return places
+
+
+def _within_lists(keys: Path, lists: Mapping[Path, int]) -> Path:
+    """Return the keys of a header with the number of the list's last element behind each list that they lead through."""
+    path: Path = ()
+    for key in keys[:-1]:
+        path = (*path, key)
+        if path in lists:
+            path = (*path, lists[path])
+    return (*path, *keys[-1:])
 
 
 _MENDS = {

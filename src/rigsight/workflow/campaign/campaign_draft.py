@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, readable
 from rigsight.records import Role
 from rigsight.records.formats.csv_channels import open_measurement
 from rigsight.records.formats.known import BY_SUFFIX
@@ -111,14 +111,19 @@ def campaign_text(
     ]
     if n_blanks:
         lines.append(f"# Replace each {BLANK} ({_times(n_blanks)}): these values could not be guessed.")
-    lines += ["", f"title = {quoted(folder.resolve().name)}", "", *_rig_lines(folder, rig, file, others)]
+    lines += [
+        "",
+        f"title = {quoted(readable(folder.resolve().name))}",
+        "",
+        *_rig_lines(folder, rig, file, others),
+    ]
     if rig.constants and (values is None or open_constants):
         lines += ["", "[rig.constants]"]
         for constant in rig.constants:
             assumed = "" if constant.default is None else "assumed, check: "
             about = f"# {assumed}{constant.description} [{constant.unit}]"
             lines.append(
-                f"{constant.name} = {BLANK if constant.default is None else f'{constant.default:g}'}  {about}"
+                f"{constant.name} = {BLANK if constant.default is None else repr(constant.default)}  {about}"
             )
     lines += [
         "",

@@ -11,6 +11,7 @@ from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import ParameterSet
 from rigsight.records import Hold, Record
+from rigsight.records.channel_units import UnknownUnitError, conversion, has_si
 from rigsight.records.plausibility import is_constant
 from rigsight.rigs import RIGS, Rig, rig_of_tables
 from rigsight.simulate import compose
@@ -40,8 +41,9 @@ def make_campaign(
     rig
         Name of a built-in rig (``rigsight rigs`` lists them), or a rig of your own.
     records
-        With distinct names; each holds the inputs and outputs of the rig in SI units. Outputs may be missing, all but the
-        first of ``"running_gear"``, ``"axis"`` and ``"element"``, all but one of others. Roles say which may be fitted.
+        With distinct names; each holds the inputs and outputs of the rig, in SI units where its `units` state no other: those are
+        converted, with a note. Outputs may be missing, all but the first of ``"running_gear"``, ``"axis"`` and ``"element"``, all
+        but one of others. Roles say which may be fitted.
     constants
         Known numbers of the rig by name [SI].
     parameters
@@ -176,12 +178,13 @@ def effects_of(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, 
 
 
 def _checked(called: str, record: Record, rig: Rig) -> Record:
-    """Return a record with the units of its rig where it has none.
+    """Return a record in the units of its rig.
 
     Raises
     ------
     InputError
-        If it lacks a required signal, a required signal never changes, or it has constants of another rig.
+        If it lacks a required signal, a required signal never changes, a unit is unknown or measures something else, or it has
+        constants of another rig.
     """
     outputs = rig.required_outputs or tuple(s.name for s in rig.outputs if s.name in record)
     if not outputs:
@@ -204,5 +207,33 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
     checked_numbers(
         Where(f"{called}: record '{record.name}'"), ("constants",), rig, rig.constants, record.constants
     )
-    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs) if signal.name in record}
-    return replace(record, units={**units, **record.units})
+    return _in_units_of(rig, record)
+
+
+def _in_units_of(rig: Rig, record: Record) -> Record:
+    units, signals, notes = dict(record.units), dict(record.signals), list(record.notes)
+    amplitude = record.amplitude
+    for signal in (*rig.inputs, *rig.outputs):
+        stated = record.units.get(signal.name, "")
+        if signal.name not in record or (stated and not has_si(signal.unit)):
+            continue
+        units[signal.name] = signal.unit
+        if not stated or stated == signal.unit or {stated, signal.unit} == {"", "1"}:
+            continue
+        try:
+            scale, offset = conversion(stated, signal.unit)
+        except UnknownUnitError as error:
+            raise InputError(
+                f"Record '{record.name}': the unit '{stated}' of {signal.name} {error}; {signal.name} is in {signal.unit}. Give "
+                f'the right unit, or units = {{"{signal.name}": "{signal.unit}"}} to take the values without conversion.'
+            ) from None
+        if (scale, offset) == (1.0, 0.0):
+            continue
+        signals[signal.name] = scale * record[signal.name] + offset
+        added = f"; {offset:.6g} {signal.unit} was added, as for an absolute temperature" if offset else ""
+        notes.append(
+            f"Record '{record.name}': {signal.name} was converted from {stated}, the unit of the record, to {signal.unit}{added}."
+        )
+        if amplitude is not None and [source.name for source in rig.inputs] == [signal.name]:
+            amplitude *= scale
+    return replace(record, units=units, signals=signals, notes=tuple(notes), amplitude=amplitude)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.errors import InputError
+from rigsight.errors import InputError, readable
 from rigsight.records import Record
 from rigsight.rigs import Rig, read_rig_file
 from rigsight.workflow.campaign.campaign_file import (
@@ -78,7 +78,7 @@ def read_campaign(
     constants, differing = of_first_record(rig, known_constants, records)
     notes = [note for note in (differing, *record_notes(path.name, rig, records)) if note]
     return Campaign(
-        title=table.title or path.parent.resolve().name,
+        title=table.title or readable(path.parent.resolve().name),
         rig=rig,
         constants=constants,
         parameters=parameters,

@@ -91,10 +91,15 @@ def identify_any_rig(
     Raises
     ------
     InputError
-        If the method cannot separate several inputs.
+        If the method is only for rigs that are identified record by record.
     """
-    check_option("The method for a rig with several inputs or sensors", options.method, METHODS)
     rig, structure = campaign.rig, compose(campaign.rig)
+    check_option(
+        f"The method for the rig '{rig.name}' with these records (h1 and thesis are for built-in rigs of one motion, each record "
+        "driven and without constants or offsets of its own)",
+        options.method,
+        METHODS,
+    )
     records = campaign.estimation
     prepare_kernels([structure], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(records) + _STEPS_AFTER_RECORDS, listener)

@@ -33,7 +33,9 @@ class FitJournal:
     """
 
     def __init__(self, campaign: Path, going_on: Callable[[int], None] | None = None) -> None:
-        name = hashlib.sha256(f"{version('rigsight')} {campaign.resolve()}".encode()).hexdigest()[:24]
+        name = hashlib.sha256(
+            f"{version('rigsight')} {campaign.resolve()}".encode("utf-8", "surrogatepass")
+        ).hexdigest()[:24]
         self._path = cache_folder() / "unfinished" / f"{name}.jsonl"
         self._known: dict[str, Mapping[str, Any]] = {}
         self._own: dict[str, Mapping[str, Any]] = {}

@@ -60,22 +60,37 @@ def json_text(content: Mapping[str, Any]) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def check_writable(folder: Path) -> None:
+def check_writable(folder: Path, *names: str) -> None:
     """Check before long work that results can be written into a folder, which may not exist yet.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+    *names
+        Files that are to be written there.
 
     Raises
     ------
     InputError
-        If a file is in the way or the folder cannot be made or written.
+        If a file or a link to nothing is in the way, the folder cannot be made or written, or one of the names belongs to
+        something other than a file.
     """
     existing = folder.absolute()
     try:
         while not existing.exists():
+            if existing.is_symlink():
+                raise InputError(
+                    f"Cannot write results to {folder}: {existing} is a link to {existing.readlink()}, which does not exist. "
+                    "Name another folder, or remove the link."
+                )
             existing = existing.parent
         if not existing.is_dir():
             raise InputError(f"Cannot write results to {folder}: {existing} is a file. Name another folder.")
         with signals_held():
             Path(tempfile.mkdtemp(prefix=".rigsight-", dir=existing)).rmdir()
+        for name in names:
+            _check_replaceable(folder / name)
     except OSError as error:
         raise _told(folder, error) from None
 
@@ -131,7 +146,9 @@ def write_together(
                 target = (folder / name).resolve()
                 remove_left(target)
                 part = parts[target] = temporary_path(target, token, "part")
-                file = write_locked(part, content.encode("utf-8") if isinstance(content, str) else content)
+                # Commands and notes quote names of files, which need not be text.
+                raw = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+                file = write_locked(part, raw)
                 locks.callback(file.close)
                 os.fsync(file.fileno())
                 if os.name == "nt":
