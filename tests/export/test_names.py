@@ -27,7 +27,7 @@ from rigsight.rigs.reading.functions import FUNCTIONS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 
-DT, N_SAMPLES, STEP = 0.02, 41, 0.002
+DT, N_SAMPLES, STEP = 0.02, 11, 0.002
 WRITTEN_FROM = (
     "offsets", "element", "a saturated control law", "friction at a motor", "two masses with delays", "linear running gear",
 )  # fmt: skip
@@ -194,7 +194,7 @@ def c_outputs(case: Named, folder: Path) -> dict[str, NDArray[np.float64]]:
     text = str(export_model(case.model, "c", source="rig", name="rig"))
     (folder / "rig.c").write_text(text, encoding="utf-8")
     # Without -std=c99 the headers define more.
-    command = [*c_compilers()[0].command, "-O1", "-DRIG_MAIN", "-o", "program", "rig.c", "-lm"]
+    command = [*c_compilers()[0].command, "-O0", "-DRIG_MAIN", "-o", "program", "rig.c", "-lm"]
     run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     rows = np.column_stack([case.t, *case.fed]).tolist()

@@ -35,7 +35,8 @@ class Language:
 
     def expression(self, expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
         """Return one expression with its symbols renamed."""
-        return str(self.printer.doprint(_plain(_renamed(expression, names))))
+        named = {symbol: names[symbol] for symbol in expression.free_symbols if symbol in names}
+        return str(self.printer.doprint(_plain(expression.xreplace(_symbols(named)))))
 
     def statements(
         self,
@@ -59,7 +60,8 @@ class Language:
         """
         if needed_steps(expressions, steps):
             return self.written(targets, straight_line(expressions, steps), names)
-        renamed = [_renamed(expression, names) for expression in expressions]
+        known = _symbols(names)
+        renamed = [expression.xreplace(known) for expression in expressions]
         parts = (sp.Symbol(f"part{i}", real=True) for i in range(10_000))
         shared, reduced = sp.cse(renamed, symbols=parts, optimizations=None)
         lines = [self.declared.format(s.name, self.printer.doprint(_plain(e))) for s, e in shared]
@@ -84,7 +86,7 @@ class Language:
         """
         own = {part: part_name(part) for part in line.parts}
         every = {**names, **own}
-        known = {symbol: sp.Symbol(name, real=True) for symbol, name in every.items()}
+        known = _symbols(every)
         printed = [_printed(self.printer, e.xreplace(known)) for e in (*line.parts.values(), *line.results)]
         forms = [(self.declared, name) for name in own.values()]
         forms += [(self.assigned, target) for target in targets]
@@ -102,8 +104,8 @@ def _printed(printer: Any, expression: sp.Expr) -> str:
     return str(printer.doprint(_plain(expression)))
 
 
-def _renamed(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> sp.Expr:
-    return expression.xreplace({symbol: sp.Symbol(name, real=True) for symbol, name in names.items()})
+def _symbols(names: Mapping[sp.Symbol, str]) -> dict[sp.Symbol, sp.Symbol]:
+    return {symbol: sp.Symbol(name, real=True) for symbol, name in names.items()}
 
 
 def _plain(expression: sp.Expr) -> sp.Expr:
