@@ -32,7 +32,7 @@ WRITTEN_FROM = (
     "offsets", "element", "a saturated control law", "friction at a motor", "two masses with delays", "linear running gear",
 )  # fmt: skip
 """Models whose texts together hold nearly all of the templates."""
-LEFT_OUT = re.compile(r"part\d+|part_.*|__\w+__|_|t|None|self")
+LEFT_OUT = re.compile(r"part\d+|part_.*|__\w+__|_|t|None")
 """What every text has as many of as it needs, and what cannot be a name in the engine, either."""
 WORD = r"(?<![\w.])[A-Za-z]\w*"
 ROLES = 4

@@ -166,7 +166,7 @@ class Record:
     def __contains__(self, signal: object) -> bool:
         return signal in self.signals
 
-    def with_signals(self, **signals: ArrayLike) -> Record:
+    def with_signals(self, /, **signals: ArrayLike) -> Record:
         """Return a copy in which signals are added or replaced.
 
         Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
@@ -77,6 +78,16 @@ def declared_name(name: str) -> ShownName:
     return ShownName(letter, (below.replace("_", " "),) if below else ())
 
 
+def declared_names(names: Iterable[str]) -> dict[str, ShownName]:
+    """Return the displayed forms of declared names; of ``r0`` beside ``r_0``, the first one stays undivided."""
+    shown = {name: declared_name(name) for name in names}
+    counts = Counter(shown.values())
+    return {
+        name: ShownName(name) if counts[form] > 1 and form.plain != name else form
+        for name, form in shown.items()
+    }
+
+
 def rate_symbol(symbol: sp.Symbol) -> sp.Symbol:
     """Return the symbol of the rate of a state."""
     return sp.Symbol(f"d({symbol.name})", real=True)
@@ -98,11 +109,15 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
     prescribed motion has the name of the input that it follows.
     """
     rig, tree = structure.rig, structure.tree
-    names = {TIME: ShownName("t"), **_input_names(rig)}
-    for coordinate, velocity in zip(tree.motion.coordinates, tree.motion.velocities, strict=True):
-        own = declared_name(coordinate.name)
+    coordinates, owned = tree.motion.coordinates, _owned(structure)
+    forms = declared_names(
+        [*rig.mechanism.inputs, *(symbol.name for symbol in coordinates), *(name for _, name, _ in owned)]
+    )
+    names = {TIME: ShownName("t"), **_input_names(rig, forms)}
+    for coordinate, velocity in zip(coordinates, tree.motion.velocities, strict=True):
+        own = forms[coordinate.name]
         names |= {coordinate: own, velocity: own.dotted(), rate_symbol(velocity): own.dotted().dotted()}
-    names |= _distinguished(_owned(structure), names.values(), label)
+    names |= _distinguished(owned, forms, names.values(), label)
     for state, rate in kinematic_states(structure).items():
         names[rate] = names[state].dotted()
     for state in tree.states:
@@ -130,13 +145,13 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
     return names
 
 
-def _input_names(rig: Rig) -> dict[sp.Symbol, ShownName]:
+def _input_names(rig: Rig, forms: Mapping[str, ShownName]) -> dict[sp.Symbol, ShownName]:
     """Return the names of the inputs, and of the rates of those that prescribe a motion."""
     names = {}
     prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
     for index, source in enumerate(rig.mechanism.inputs):
         value, rate, curvature = input_symbols(index)
-        names[value] = declared_name(source)
+        names[value] = forms[source]
         if source in prescribing:
             names |= {rate: names[value].dotted(), curvature: names[value].dotted().dotted()}
     return names
@@ -220,9 +235,12 @@ def kinematic_states(structure: Structure) -> dict[sp.Symbol, sp.Symbol]:
 
 
 def _distinguished(
-    sources: list[tuple[sp.Symbol, str, str | None]], taken: Iterable[ShownName], label: Callable[[str], str]
+    sources: list[tuple[sp.Symbol, str, str | None]],
+    forms: Mapping[str, ShownName],
+    taken: Iterable[ShownName],
+    label: Callable[[str], str],
 ) -> dict[sp.Symbol, ShownName]:
-    own = {symbol: declared_name(name) for symbol, name, _ in sources}
+    own = {symbol: forms[name] for symbol, name, _ in sources}
     every = [*taken, *own.values()]
     return {
         symbol: own[symbol].beside(label(owner))
