@@ -194,3 +194,32 @@ def test_a_sensor_that_nobody_recorded_is_named_if_it_would_help(
     # The tachometer scales as the scale does.
     assert told.remedies == ("If 'laser' were also recorded, these inputs would determine all parameters.",)
     assert told.sentence.endswith(told.remedies[0])
+
+
+def _known_mass(also_a_parameter: str = "") -> str:
+    """The axis in a file of one's own whose mass was weighed; one of its other constants may be unknown."""
+    text = rig_file_text("axis").replace('name = "axis"', 'name = "weighed"')
+    text = text.replace(f"[constants.{also_a_parameter}]", f"[parameters.{also_a_parameter}]")
+    text = text.replace("[parameters.m]", "[constants.m]")
+    return text.replace('log = true\nabout = "moving mass"', 'about = "moving mass"')
+
+
+def test_a_declared_constant_of_the_axis_in_ones_own_file_stays_as_declared() -> None:
+    rng, rig = np.random.default_rng(1), rig_of_text(_known_mass())
+    values = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+    record = recorded("one", rig, values, {"u": multisine(rng, 1.0, 60.0)}, rng)
+    campaign = make_campaign(rig, [record], constants={"gain": 2.0, "m": 2.0})
+    found = identify_campaign(campaign, checked_options("local_rational", None))
+    assert found.joint.fit.fit.values["m"] == 2.0
+    assert found.model["constants"]["m"] == 2.0
+    assert found.joint.fit.fit.values["k"] == pytest.approx(200.0, rel=0.01)
+
+
+def test_an_axis_of_known_mass_and_unknown_gain_is_identified() -> None:
+    rng, rig = np.random.default_rng(1), rig_of_text(_known_mass("gain"))
+    values = {"gain": 2.0, "m": 2.0, "d": 3.2, "k": 200.0, "x_off": 0.0, "force_off": 0.0}
+    record = recorded("one", rig, values, {"u": multisine(rng, 1.0, 60.0)}, rng)
+    campaign = make_campaign(rig, [record], constants={"m": 2.0})
+    found = identify_campaign(campaign, checked_options("local_rational", None))
+    for name in ("gain", "d", "k"):
+        assert found.joint.fit.fit.values[name] == pytest.approx(values[name], rel=0.01), name

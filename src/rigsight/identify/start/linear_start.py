@@ -54,7 +54,7 @@ def linear_start(
     InputError
         If the records do not move the rig.
     """
-    if not rig.has_one_motion:
+    if not rig.has_one_motion or not _knows_its_gain(rig, {**constants, **known}):
         return any_rig_start(rig, records, constants, known)
     driven = [record for record in records if not is_constant(record[rig.inputs[0].name])]
     if rig.is_driven and not driven:
@@ -72,6 +72,10 @@ def linear_start(
     return {**clipped, **known}
 
 
+def _knows_its_gain(rig: Rig, known: Mapping[str, float]) -> bool:
+    return not rig.is_driven or all(symbol.name in known for symbol in rig.motion.drive_gain.free_symbols)
+
+
 def _one_offset(rig: Rig) -> dict[str, float]:
     """Return zero for a constant force that is equivalent to a free rest position."""
     return dict.fromkeys(map(str, rig.motion.bias.free_symbols), 0.0) if rig.motion.rest.free_symbols else {}
@@ -81,7 +85,7 @@ def _driven(
     rig: Rig, records: Sequence[Record], constants: Mapping[str, float], known: Mapping[str, float]
 ) -> dict[str, float]:
     motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
-    gain = evaluated(motion.drive_gain, constants)
+    gain = evaluated(motion.drive_gain, {**constants, **known})
     has_stiffness = known.get(str(motion.stiffness)) != 0.0
     inertia, damping, stiffness = second_order(records, source, response, gain, has_stiffness)
     offset = _mean(records, response) - gain * _mean(records, source) / stiffness if has_stiffness else 0.0

@@ -37,7 +37,7 @@ from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
-from rigsight.rigs import Rig, is_built_in_motion
+from rigsight.rigs import Rig, has_built_in_parameters, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
@@ -61,11 +61,12 @@ _GROWTHS = 3.0
 def has_transfer_forms(campaign: Campaign) -> bool:
     """Return True for rigs with the equations of a built-in one of one motion: their transfer functions are fitted by record.
 
-    A rig with the same equations from a file has other names. Records with different constants have no common transfer function,
-    and records without excitation have none. Offsets that differ between records are estimated only in the time domain.
+    A rig with the same equations from a file has other names, or knows a number that a transfer function would estimate. Records
+    with different constants have no common transfer function, and records without excitation have none. Offsets that differ
+    between records are estimated only in the time domain.
     """
     rig = campaign.rig
-    if not is_built_in_motion(rig) or any(
+    if not has_built_in_parameters(rig) or any(
         record.constants or record.free_offsets for record in campaign.records
     ):
         return False
