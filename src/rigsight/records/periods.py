@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate
+
+from rigsight.records.record import Record
 
 _SAME = 1e-3
 """Largest difference between two periods of one signal, relative to its standard deviation."""
@@ -30,6 +36,36 @@ def repeated_period(samples: NDArray[np.float64]) -> int | None:
         if differ_by_noise(samples[lag:], samples[:-lag], size):
             return int(lag)
     return None
+
+
+def mean_period(record: Record, drives: Sequence[str]) -> tuple[Record, int]:
+    """Return the mean of all common periods of some inputs but the first, which holds the transient, and their number.
+
+    Parameters
+    ----------
+    record
+        A record.
+    drives
+        Its inputs that move.
+
+    Returns
+    -------
+    The record and 0 if they do not repeat.
+    """
+    period = 1
+    for drive in drives:
+        own = repeated_period(record[drive])
+        if own is None:
+            return record, 0
+        period = math.lcm(period, own)
+    count = record.n_samples // period
+    if count < 2:
+        return record, 0
+    kept = {
+        name: samples[period : count * period].reshape(count - 1, period).mean(axis=0)
+        for name, samples in record.signals.items()
+    }
+    return replace(record, signals=kept), count - 1
 
 
 def differ_by_noise(first: NDArray[np.float64], second: NDArray[np.float64], size: float) -> bool:
