@@ -275,6 +275,7 @@ class _LocalModels:
         n_terms, n_inputs = self._order + 1, self._moving.size
         reach = max(0.5 * w * s.line for s, w in zip(self._spectra, self._widths, strict=True))
         collected: tuple[list[NDArray[np.complex128]], ...] = ([], [], [])
+        absorbed = np.zeros(omega.size, dtype=np.intp)
         for s, width, lines in zip(self._spectra, self._widths, self._lines, strict=True):
             center = np.round(omega / s.line).astype(np.intp) - 1
             picked = np.clip(center - width // 2, 0, s.omega.size - width)[:, None] + np.arange(width)
@@ -290,12 +291,12 @@ class _LocalModels:
                 -powers[..., 1 : self._poles + 1] * near,
                 near,
             ]
+            absorbed += np.where(heard[:, 0, 0], n_terms * s.has_transient, width)
             if s.has_transient:
                 own = _without(powers[..., :n_terms], own)
             for parts, part in zip(collected, own, strict=True):
                 parts.append(part)
         inputs, past, answers = (np.concatenate(parts, axis=1) for parts in collected)
-        absorbed = n_terms * sum(s.has_transient for s in self._spectra)
         fit = LocalFit(np.concatenate([inputs, past], axis=2), answers[..., 0], absorbed)
         first = [n_terms * i for i in range(n_inputs)]
         values = np.stack([fit.coefficient(term) for term in first], axis=1)
