@@ -18,6 +18,7 @@ from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.metrics import nrmse
 from rigsight.records import Record
+from rigsight.records.periods import roughness
 from rigsight.records.plausibility import is_constant
 from rigsight.report.quantities import gap_percent
 from rigsight.simulate import Structure, compose
@@ -90,7 +91,7 @@ def identify_jointly(
         fit=fit,
         names=fit.fit.free,
         pooled=pooled,
-        statement=_statement(fit, scores, [name for name in amplitudes if name in names]),
+        statement=_statement(fit, scores, records),
         conicity=conicity,
         scores=scores,
         left_out=tuple(r.record.name for r in found if r.record.name not in names),
@@ -122,7 +123,8 @@ def fit_any_rig_jointly(
     length
         Of windows into which records are cut [s]; None leaves them whole.
     """
-    windows = cut([r.record for r in found], length)
+    records = [r.record for r in found]
+    windows = cut(records, length)
     fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=parent)
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
@@ -133,7 +135,7 @@ def fit_any_rig_jointly(
         fit=fit,
         names=fit.fit.free,
         pooled=None,
-        statement=_statement(fit, scores, list(amplitudes)),
+        statement=_statement(fit, scores, records),
         conicity=None,
         scores=scores,
         left_out=(),
@@ -250,22 +252,28 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
     )
 
 
-def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str]) -> str:
+def _moves(samples: NDArray[np.float64]) -> bool:
+    """Return True if a fit that leaves no more than the noise of an output would follow it: at rest there is only noise."""
+    return roughness(samples) < _UNSERVED * float(np.std(samples))
+
+
+def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Record]) -> str:
     if not fit.fit.success:
         return f"The joint fit did not converge: {fit.fit.message}. Its parameter values are not reliable."
-    if len(names) < 2:
+    if len(fitted) < 2:
         return (
             "Only one estimation record was fitted, so its parameters cannot be compared with others. Another kind of record, "
             "such as a step beside a sweep, or another amplitude would test them."
         )
     if not math.isfinite(fit.probability):
         return "There is no parameter that every record determines, so the records cannot be compared."
+    by_name = {record.name: record for record in fitted}
     unserved = [
         f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
         for score in scores
         if score.role == "estimation"
         for name in score.nrmse
-        if not score.nrmse[name] < _UNSERVED
+        if not score.nrmse[name] < _UNSERVED and _moves(by_name[score.record][name])
     ]
     if fit.probability >= _DIFFERENT and unserved:
         return (
@@ -274,12 +282,12 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str
         )
     if fit.probability >= _DIFFERENT:
         return (
-            f"One parameter set fits all {len(names)} estimation records: equally large differences arise by chance with "
+            f"One parameter set fits all {len(fitted)} estimation records: equally large differences arise by chance with "
             f"probability {fit.probability:.2g}."
         )
     chance = f"below {_BELOW:g}" if fit.probability < _BELOW else f"{fit.probability:.1g}"
     text = (
-        f"No single parameter set fits all {len(names)} estimation records (probability of chance {chance})."
+        f"No single parameter set fits all {len(fitted)} estimation records (probability of chance {chance})."
     )
     return f"{text} {_pull(fit, scores)}"
 
