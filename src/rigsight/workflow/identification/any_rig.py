@@ -118,7 +118,7 @@ def identify_any_rig(
         views = tuple(_views(structure, joint.fit.fit.values, records, options, known))
     units = {p.name: p.unit for p in structure.parameters}
     units |= {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
-    statement, changing = amplitude_dependence(found, units, units.get(found[0].source, ""))
+    statement, changing = amplitude_dependence(found, units)
     told = None
     if known is not None:
         fit, windows = joint.fit, cut(records, length)
