@@ -223,3 +223,14 @@ def test_an_axis_of_known_mass_and_unknown_gain_is_identified() -> None:
     found = identify_campaign(campaign, checked_options("local_rational", None))
     for name in ("gain", "d", "k"):
         assert found.joint.fit.fit.values[name] == pytest.approx(values[name], rel=0.01), name
+
+
+def test_a_record_may_have_the_word_window_in_its_name() -> None:
+    rng, axis = np.random.default_rng(2), RIGS["axis"]
+    values = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+    names = ("lab window 1", "lab window 2", "lab")
+    records = [recorded(name, axis, values, {"u": multisine(rng, 1.0, 60.0)}, rng) for name in names]
+    campaign = make_campaign(axis, records, constants={"gain": 1.0})
+    found = identify_campaign(campaign, checked_options("local_rational", None))
+    assert [score.record for score in found.joint.scores] == list(names)
+    assert found.joint.statement.startswith("One parameter set fits all 3 estimation records")

@@ -41,7 +41,7 @@ from rigsight.rigs import Rig, has_built_in_parameters, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
-from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters, parent
+from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters
 from rigsight.workflow.identification.warnings import (
     any_rig_warnings,
     beyond_identified_amplitudes,
@@ -275,7 +275,7 @@ def _with_errors(
     whole = fit.fit if factor is None else _with_unknown(fit.fit, factor.held)
     known, together = corrected(whole, windows)
     kinds = tuple(
-        replace(kind, fit=corrected(kind.fit, [w for w in windows if parent(w) == kind.kind])[1])
+        replace(kind, fit=corrected(kind.fit, [w for w in windows if w.origin == kind.kind])[1])
         for kind in fit.kinds
     )
     return known, replace(joint, fit=replace(fit, fit=together, kinds=kinds), names=together.free)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import WINDOW, cut, window_length
+from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
@@ -29,6 +30,7 @@ _SMALL_LOSS = 0.01
 _UNSERVED = 0.9
 """NRMSE from which a fit does not follow a motion at all."""
 _LATERAL = ("l_0", "c_y")
+_ORIGIN = attrgetter("origin")
 _BELOW = 1e-6
 
 
@@ -62,7 +64,7 @@ def identify_jointly(
     windows = [w for w in cut(records, length) if not is_constant(w[campaign.rig.inputs[0].name])]
     known = held_parameters(campaign, records, has_stiffness)
     fit = fit_jointly(
-        structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=parent
+        structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=_ORIGIN
     )
     pooled = _pooled(found) if fit.probability < _DIFFERENT and not known.keys() & _LATERAL else None
     if pooled is not None:
@@ -73,7 +75,7 @@ def identify_jointly(
             known={**known, **pooled.values},
             start=fit.fit.values,
             output_noise=fit.noise,
-            group_of=parent,
+            group_of=_ORIGIN,
         )
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
@@ -125,7 +127,7 @@ def fit_any_rig_jointly(
     """
     records = [r.record for r in found]
     windows = cut(records, length)
-    fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=parent)
+    fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=_ORIGIN)
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
         *_estimation_scores(fit, windows, amplitudes),
@@ -168,11 +170,6 @@ def _start(found: Sequence[RecordIdentification], known: Mapping[str, float]) ->
     return {
         name: float(np.median([r.estimates[name][0] for r in found if name in r.estimates])) for name in names
     }
-
-
-def parent(record: Record) -> str:
-    """Return the name of the record that a window was cut from."""
-    return record.name.split(WINDOW)[0]
 
 
 def held_parameters(campaign: Campaign, records: Sequence[Record], has_stiffness: bool) -> dict[str, float]:
@@ -221,7 +218,7 @@ def _estimation_scores(
     outputs = [signal.name for signal in fit.fit.structure.rig.outputs]
     scores = []
     for own in fit.kinds:
-        places = [i for i, window in enumerate(windows) if parent(window) == own.kind]
+        places = [i for i, window in enumerate(windows) if window.origin == own.kind]
         records = [windows[i] for i in places]
         joint = [fit.fit.residuals[i] for i in places] if fit.fit.residuals else []
         scores.append(
