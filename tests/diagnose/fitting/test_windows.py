@@ -64,6 +64,10 @@ def test_no_length_leaves_records_whole() -> None:
     assert cut(records, None) == tuple(records)
 
 
+def test_a_window_holds_a_sample_however_short_it_should_be() -> None:
+    assert [w.n_samples for w in cut([moving(2.0, 300)], 1e-6)] == 300 * [1]
+
+
 def test_a_record_shorter_than_the_window_stays_whole() -> None:
     record = moving(2.0, 300)
     (window,) = cut([record], 100.0)

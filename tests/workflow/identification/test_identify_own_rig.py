@@ -16,6 +16,7 @@ from rigsight.rigs import RIGS, read_rig_file, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.workflow.campaign.in_memory import make_campaign
 from rigsight.workflow.discover import regression_data
+from rigsight.workflow.identification import any_rig
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import checked_options, identify_campaign, run_identify, write_identification
 
@@ -234,3 +235,20 @@ def test_a_record_may_have_the_word_window_in_its_name() -> None:
     found = identify_campaign(campaign, checked_options("local_rational", None))
     assert [score.record for score in found.joint.scores] == list(names)
     assert found.joint.statement.startswith("One parameter set fits all 3 estimation records")
+
+
+def test_given_values_that_diverge_within_a_sample_are_no_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = rig_of_text(
+        STAGE.replace('[parameters.leaf]\nunit = "N/m"\nlower = 0.0', '[parameters.leaf]\nunit = "N/m"')
+    )
+    rng = np.random.default_rng(6)
+    truth = {"force_constant": 12.0, "carriage": 0.8, "friction": 3.0, "leaf": 400.0}
+    record = recorded("sweep", rig, truth, {"current": linear_sweep(T, 0.5, 2.0, 60.0)}, rng)
+    diverging = {"carriage": 0.8, "friction": 3.0, "leaf": -4e8}
+    campaign = make_campaign(rig, [record], constants={"force_constant": 12.0}, parameters=diverging)
+    options = checked_options("local_rational", None)
+    found = identify_campaign(campaign, options).joint.fit.fit
+    assert found.values["leaf"] == pytest.approx(400.0, rel=0.01)
+    # Without another start they are all there is: nothing is found, but nothing breaks.
+    monkeypatch.setattr(any_rig, "linear_start", lambda *_: diverging)
+    assert identify_campaign(campaign, options).joint.statement

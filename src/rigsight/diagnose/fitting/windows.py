@@ -133,12 +133,15 @@ def typical_period(rig: Rig, records: Sequence[Record]) -> float:
 
 
 def cut(records: Sequence[Record], length: float | None) -> tuple[Record, ...]:
-    """Return the records cut into windows of `length` [s], whole where it is None; a short rest joins the last window."""
+    """Return the records cut into windows of `length` [s], whole where it is None; a short rest joins the last window.
+
+    A window holds one sample at least.
+    """
     if length is None:
         return tuple(records)
     windows: list[Record] = []
     for record in records:
-        count = max(1, int(record.n_samples * record.dt / length))
+        count = min(max(1, int(record.n_samples * record.dt / length)), record.n_samples)
         edges = np.linspace(0, record.n_samples, count + 1).astype(int)
         windows += _at(record, edges.tolist())
     return tuple(windows)

@@ -188,6 +188,12 @@ def _begin(
     if all(p.name in given for p in rig.parameters):
         starts.append({p.name: given[p.name] for p in rig.parameters})
     lengths = [_window_length(structure, {**constants, **start}, records) for start in starts]
+    # A window with no more samples than its own initial state has numbers follows any motion: such a start is no model of it.
+    shortest = (len(structure.states) + 1) * max(record.dt for record in records)
+    possible = [i for i, length in enumerate(lengths) if length is None or length >= shortest]
+    if possible:
+        starts, lengths = [starts[i] for i in possible], [lengths[i] for i in possible]
+    lengths = [None if length is None else max(length, shortest) for length in lengths]
     if len(starts) == 1:
         return starts[0], lengths[0]
     costs = [
