@@ -286,6 +286,11 @@ def test_a_dead_time_is_found_in_a_step() -> None:
     assert fit.standard_errors["dead_time"] < 2e-3
 
 
+def test_the_unit_of_a_step_response_divides_by_the_whole_unit_of_its_source() -> None:
+    driven = replace(stepped(1), units={"u": "N m", "psi": "rad"})
+    assert fit_step(driven, "u", "psi", "pt2", 178.0, 184.0).unit == "rad/(N m)"
+
+
 def test_bad_steps_are_told_in_words() -> None:
     record = stepped(4)
     with pytest.raises(InputError, match="has no step"):
