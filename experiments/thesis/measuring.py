@@ -92,9 +92,9 @@ def our_pair(record: Record, source: str, response: str) -> FrequencyResponse:
     """Return the local rational response where it stands out of its uncertainty."""
     order = "pt2" if response == "psi" else "pt1"
     hold = record.hold if source == "u" else "band_limited"
-    return record_response(record, source, response, order, "local_rational", hold=hold).response.band(
-        0.0, 100.0
-    )
+    return record_response(
+        record, source, response, order, "local_rational", hold=hold, drive="u"
+    ).response.band(0.0, 100.0)
 
 
 def our_sweep_values(record: Record) -> Values:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 from rigsight.compare import step_window
+from rigsight.compare.step_error import stepping_input
 from rigsight.errors import InputError
 from rigsight.excitation import step
 from rigsight.records import Record
@@ -59,3 +61,22 @@ def test_a_record_that_ends_early_is_compared_up_to_its_end() -> None:
 def test_a_step_without_offset_or_without_step_is_told(u: np.ndarray, told: str) -> None:
     with pytest.raises(InputError, match=told):
         step_window(record(u), "u")
+
+
+def test_the_noise_of_an_input_that_is_held_is_no_step() -> None:
+    rng = np.random.default_rng(0)
+    held, stepped = 1.0 + 1e-3 * rng.standard_normal(2000), 1e-3 * rng.standard_normal(2000)
+    late = np.zeros(2000)
+    late[1500:] = 1.0
+    stepped[1000:] += 1.0
+    made = Record("step", DT, {"held": held, "stepped": stepped, "late": late}, {}, kind="step")
+    for sources in itertools.permutations(("held", "stepped", "late")):
+        assert stepping_input(made, sources) == "stepped"
+    assert stepping_input(made, ("held", "late")) == "late"
+    assert step_window(made, "stepped").inside.start == 1000
+
+
+def test_without_any_step_the_first_input_that_moves_is_taken() -> None:
+    made = Record("still", DT, {"a": np.ones(100), "b": np.linspace(0.0, 1.0, 100)}, {}, kind="step")
+    assert stepping_input(made, ("a", "b")) == "b"
+    assert stepping_input(made, ("a",)) == "a"

@@ -141,6 +141,22 @@ def test_records_of_other_lengths_and_sample_times_are_read_together() -> None:
     assert set(found.found) == {(source, response) for source in INPUTS for response in OUTPUTS}
 
 
+@pytest.mark.parametrize("poles", [0, 2])
+def test_above_its_nyquist_frequency_a_slow_record_changes_nothing(poles: int) -> None:
+    rng = np.random.default_rng(12)
+    quick = recorded(multisine(rng), np.zeros(N), rng)
+    slow = [recorded(multisine(rng, 260, dt=15 * DT), np.zeros(260), rng, 15 * DT) for _ in range(3)]
+    nyquist = np.pi / slow[0].dt
+    alone, beside = (
+        responses_of_inputs(records, INPUTS[:1], ["x"], poles=poles).found["left", "x"].band(nyquist, 35.0)
+        for records in ([quick], [quick, *slow])
+    )
+    assert beside.omega.size == alone.omega.size > 30
+    assert beside.values == pytest.approx(alone.values)
+    assert beside.variance == pytest.approx(alone.variance)
+    assert beside.noise_freedom == alone.noise_freedom
+
+
 def test_a_sensor_that_some_records_lack_is_read_from_the_others() -> None:
     rng = np.random.default_rng(9)
     first, second = (

@@ -16,7 +16,8 @@ from rigsight.errors import InputError
 from rigsight.identify import FitResult
 from rigsight.identify.hysteresis import derived_quantities, loop_area
 from rigsight.identify.hysteresis.derived import saturation_level
-from rigsight.rigs import AXIS, RUNNING_GEAR
+from rigsight.rigs import AXIS, RUNNING_GEAR, rig_file_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, parameter_vector
 
 BOUC_WEN = effect_named("bouc_wen_hysteresis")
@@ -145,6 +146,16 @@ def test_the_saturation_follows_from_whatever_rate_is_declared() -> None:
     assert level is not None
     assert float(level.subs({beta: 10.0, gamma: 2.0})) == pytest.approx(0.5)
     assert saturation_level(replace(BOUC_WEN, states=(replace(z, rate=deflection_rate),))) is None
+
+
+def test_a_spring_may_state_its_stiffness_by_any_expression() -> None:
+    text = rig_file_text("axis").replace('stiffness = "k"', 'stiffness = "2*k"')
+    two = compose(rig_of_text(text.replace('name = "axis"', 'name = "stage"')), [BOUC_WEN])
+    one = compose(AXIS, [BOUC_WEN])
+    each = {**VALUES, "k": 0.5 * VALUES["k"]}
+    assert loop_area(two, parameter_vector(two, each)[:, None], 0.02) == pytest.approx(
+        loop_area(one, parameter_vector(one, VALUES)[:, None], 0.02)
+    )
 
 
 def test_iwan_hysteresis_has_a_loop_but_no_pair() -> None:

@@ -25,22 +25,23 @@ def wave(decay: float, omega: float = 3.0) -> Floats:
     return np.exp(-decay * T) * np.sin(omega * T)
 
 
-def said(function: Callable[..., Floats], **values: float) -> Identifiability:
-    """Return what is said of a function of parameters that is measured with noise."""
+def said(function: Callable[..., Floats], size: float = 0.0, **values: float) -> Identifiability:
+    """Return what is said of a function of parameters that is measured with noise; smaller ones than `size` may be negative."""
     names, place = tuple(values), np.array(list(values.values()))
+    sizes = np.maximum(place, size)
     base = function(*place)
     columns = []
     for i in range(len(names)):
         step = np.zeros(len(names))
-        step[i] = 1e-5 * place[i]
+        step[i] = 1e-5 * sizes[i]
         columns.append((function(*(place + step)) - function(*(place - step))) / 2e-5 / NOISE)
     return identifiability(
         Information(
             names=names,
             units=("kg",) * len(names),
             values=place,
-            sizes=place,
-            lower=np.zeros(len(names)),
+            sizes=sizes,
+            lower=np.where(place < size, -np.inf, 0.0),
             upper=np.full(len(names), np.inf),
             root=np.linalg.qr(np.column_stack(columns), mode="r"),
             change=lambda moved: float(np.linalg.norm(function(*(moved[n] for n in names)) - base)) / NOISE,
@@ -71,6 +72,16 @@ def test_two_parameters_that_follow_each_other_are_named_with_what_they_make(
     assert combination.value == pytest.approx(value)
     assert 0.0 < combination.std < 0.01 * abs(value)
     assert found.free_directions == 1
+
+
+@pytest.mark.parametrize("m", [-1e-4, -0.9e-4, 0.0, 1e-4])
+def test_a_sum_that_is_zero_by_chance_is_as_certain_as_its_terms(m: float) -> None:
+    found = said(lambda k, m, d: (k + m) * wave(d) + wave(d), size=0.1, k=1e-4, m=m, d=0.3)
+    assert found.sentence == "The records determine d. k and m only as their sum k + m."
+    (combination,) = found.combinations
+    assert combination.value == pytest.approx(1e-4 + m)
+    alone = said(lambda k, d: k * wave(d) + wave(d), size=0.1, k=1e-4, d=0.3)
+    assert combination.std == pytest.approx(0.1 * alone.relative_errors["k"], rel=1e-6)
 
 
 def test_the_error_of_a_combination_is_that_of_the_parameter_it_stands_for() -> None:

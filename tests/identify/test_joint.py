@@ -117,6 +117,11 @@ def test_a_known_parameter_keeps_its_value() -> None:
     assert "l_0" not in found.fit.free
 
 
+def test_a_constant_is_not_replaced_by_a_start_value_of_its_name() -> None:
+    found = fit_jointly(GEAR, campaign(4), CONSTANTS, start={**TRUTH, "k_tau": 0.3})
+    assert found.fit.values["k_tau"] == CONSTANTS["k_tau"]
+
+
 def test_bad_campaigns_are_told_in_words() -> None:
     records = campaign(5)
     with pytest.raises(InputError, match="all 2 are of kind 'step'"):

@@ -14,6 +14,7 @@ from rigsight.identify import linear_start
 from rigsight.records import Record
 from rigsight.records.record import Hold
 from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
 DT = 5e-3
@@ -87,6 +88,55 @@ def test_element_from_a_force_that_no_simulation_made() -> None:
     # A cubic spline's slope errs by (omega dt)^4/180 in the middle, more at the two ends; omega dt <= 0.065.
     for name, value in DAMPER.items():
         assert found[name] == pytest.approx(value, rel=1e-4), name
+
+
+BENCH = """
+name = "bench"
+summary = "A bench moves a damper."
+[inputs.x]
+unit = "m"
+[constants.ratio]
+unit = "1"
+[parameters.d]
+unit = "N s/m"
+[parameters.k]
+unit = "N/m"
+{parameter}
+[coordinates.stroke]
+unit = "m"
+prescribed_by = "x"
+[joints.dynamics]
+motion = "stroke"
+damping = "ratio*d"
+stiffness = "{stiffness}"
+{law}
+[sensors.force]
+reads = "force(dynamics)"
+unit = "N"
+"""
+FORCE = '[parameters.force_off]\nunit = "N"'
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "parameter", "law", "truth"),
+    [
+        ("2*k", FORCE, 'force = "force_off"', {"k": 2e3, "force_off": 3.0}),
+        ("k*ratio^2", FORCE, 'force = "force_off"', {"k": 1e3, "force_off": 3.0}),
+        ("k", FORCE, 'force = "force_off/4"', {"k": 4e3, "force_off": 12.0}),
+        ("k", "", "", {"k": 4e3}),
+        ("k", '[parameters.x_off]\nunit = "m"', 'rest = "x_off"', {"k": 4e3, "x_off": -3.0 / 4e3}),
+    ],
+)
+def test_an_element_may_state_its_spring_and_its_force_in_any_words(
+    stiffness: str, parameter: str, law: str, truth: dict[str, float]
+) -> None:
+    rig = rig_of_text(BENCH.format(stiffness=stiffness, parameter=parameter, law=law))
+    x = 0.01 * np.sin(3.0 * T + 0.5 * T**2)
+    v = 0.01 * (3.0 + T) * np.cos(3.0 * T + 0.5 * T**2)
+    force = DAMPER["k"] * x + DAMPER["d"] * v + DAMPER["force_off"]
+    record = Record(name="bench", dt=DT, signals={"x": x, "force": force}, units={})
+    found = linear_start(rig, [record], {"ratio": 2.0}, {})
+    assert found == pytest.approx({**truth, "d": 60.0}, rel=1e-4)
 
 
 def test_a_record_that_starts_in_motion() -> None:

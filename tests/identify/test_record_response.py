@@ -76,3 +76,26 @@ def test_the_driven_band_of_a_sweep_is_the_sweep(sweep: Record) -> None:
     low, high = driven_band(sweep, "u")
     assert low == pytest.approx(2.0, abs=0.6)
     assert high == pytest.approx(60.0, abs=1.5)
+
+
+def test_the_order_of_the_signals_in_a_record_changes_nothing() -> None:
+    rng = np.random.default_rng(2)
+    lines = np.zeros(1025, dtype=complex)
+    lines[1:300] = np.exp(2j * np.pi * rng.uniform(size=299))
+    record = measured(np.tile(40.0 * np.fft.irfft(lines, 2048), 4))
+    turned = Record(
+        "r", record.dt, {name: record[name] for name in ("x", "u")}, record.units, kind="multisine"
+    )
+    found, other = (record_response(r, "u", "x", "pt2", hold="foh").response for r in (record, turned))
+    assert other.method == found.method
+    assert np.array_equal(other.values, found.values)
+
+
+def test_a_measured_source_has_the_periods_of_what_drives_it() -> None:
+    rng = np.random.default_rng(2)
+    lines = np.zeros(1025, dtype=complex)
+    lines[1:300] = np.exp(2j * np.pi * rng.uniform(size=299))
+    record = measured(np.tile(40.0 * np.fft.irfft(lines, 2048), 4), noise=3e-3)
+    record = record.with_signals(y=np.cumsum(record["x"]))
+    assert "mean of periods" not in record_response(record, "x", "y", "pt1").response.method
+    assert "mean of periods 2 to 4" in record_response(record, "x", "y", "pt1", drive="u").response.method

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,11 @@ def test_a_slow_sweep_of_a_linear_rig_gives_its_transfer_function() -> None:
     found = SpectralRatio("u", "psi", OMEGA, width=0.02)(simulate(LINEAR, values, record))
     error = found.values / linear_response().values - 1.0
     assert np.sqrt(np.mean(np.abs(error) ** 2)) < 0.02
+
+
+def test_a_ratio_divides_by_the_whole_unit_of_its_source() -> None:
+    driven = replace(sweep(1.0).with_signals(psi=np.zeros(6000)), units={"u": "N m", "psi": "rad"})
+    assert SpectralRatio("u", "psi", OMEGA)(driven).unit == "rad/(N m)"
 
 
 def test_a_frequency_beyond_the_nyquist_frequency_is_refused() -> None:

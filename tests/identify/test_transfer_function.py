@@ -99,21 +99,6 @@ def test_maximum_likelihood_beats_uniform_weights_where_noise_differs() -> None:
     assert np.std(errors["variance"]) < 0.3 * np.std(errors["uniform"])
 
 
-def test_dependent_lines_widen_the_errors() -> None:
-    """The same line twice is not twice the information."""
-    truth = {"gain": 0.5, "omega_b": 2.0}
-    single = measured(truth, omega=np.geomspace(0.1, 30.0, 300))
-    omega = np.sort(np.concatenate([single.omega, single.omega * (1.0 + 1e-9)]))
-    double = FrequencyResponse(
-        omega, np.repeat(single.values, 2), "psi", "y", "m/rad", variance=np.repeat(single.variance, 2)
-    )
-    honest = fit_frequency_response(single, "pt1").standard_errors["omega_b"]
-    naive = fit_frequency_response(double, "pt1").standard_errors["omega_b"]
-    robust = fit_frequency_response(double, "pt1", dependent_lines=4).standard_errors["omega_b"]
-    assert naive == pytest.approx(honest / np.sqrt(2.0), rel=0.05)
-    assert robust > 1.2 * naive
-
-
 @pytest.mark.parametrize("method", [local_polynomial_response, local_rational_response])
 def test_errors_from_a_local_model_are_the_scatter_of_repeated_records(method) -> None:  # type: ignore[no-untyped-def]
     """Its lines overlap: counted as independent they would promise errors two to three times too small."""
@@ -284,6 +269,11 @@ def test_a_dead_time_is_found_in_a_step() -> None:
     fit = fit_step(late, "u", "psi", "pt2", 179.0, 184.0, longest_dead_time=0.2)
     assert abs(fit.values["dead_time"] - 0.035) < 4.0 * fit.standard_errors["dead_time"]
     assert fit.standard_errors["dead_time"] < 2e-3
+
+
+def test_the_unit_of_a_step_response_divides_by_the_whole_unit_of_its_source() -> None:
+    driven = replace(stepped(1), units={"u": "N m", "psi": "rad"})
+    assert fit_step(driven, "u", "psi", "pt2", 178.0, 184.0).unit == "rad/(N m)"
 
 
 def test_bad_steps_are_told_in_words() -> None:

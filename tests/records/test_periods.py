@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rigsight.records.periods import repeated_period, same_signal
 
@@ -10,6 +11,19 @@ from rigsight.records.periods import repeated_period, same_signal
 def test_a_repeated_noise_has_its_period() -> None:
     period = np.random.default_rng(0).normal(size=500)
     assert repeated_period(np.tile(period, 3)) == 500
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.0028])
+@pytest.mark.parametrize(("period", "count"), [(2000, 6), (2000, 2), (10000, 3)])
+def test_a_slow_sine_has_its_period_whatever_its_noise(period: int, count: int, noise: float) -> None:
+    x = np.sin(2.0 * np.pi * np.arange(count * period) / period)
+    assert repeated_period(x + noise * np.random.default_rng(1).normal(size=x.size)) == period
+
+
+def test_a_slow_signal_of_one_period_does_not_repeat() -> None:
+    """From sample to sample it moves less than its noise, which is no period."""
+    x = np.sin(2.0 * np.pi * np.arange(30000) / 30000)
+    assert repeated_period(x + 0.0028 * np.random.default_rng(1).normal(size=x.size)) is None
 
 
 def test_a_sweep_and_a_constant_do_not_repeat() -> None:

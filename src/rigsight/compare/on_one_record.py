@@ -23,12 +23,11 @@ from rigsight.compare.response_error import (
     without_shares,
 )
 from rigsight.compare.score import Column, Score
-from rigsight.compare.step_error import DEFAULT_SECONDS, StepWindow, step_window
+from rigsight.compare.step_error import DEFAULT_SECONDS, StepWindow, step_window, stepping_input
 from rigsight.errors import InputError, SimulationError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method
 from rigsight.records import Record
-from rigsight.records.plausibility import is_constant
 from rigsight.rigs import Rig
 
 _NOISE_SEED = 0
@@ -93,7 +92,7 @@ def compare_on_record(
     step = None
     if record.kind == "step":
         try:
-            step = step_window(record, _stepping(record, yardstick.rig), yardstick.step_seconds)
+            step = _step(record, yardstick)
         except InputError as error:
             notes.append(str(error))
     trials = [_trial(c, record, windows, yardstick, paths, measured, least, step) for c in competitors]
@@ -113,6 +112,13 @@ def compare_on_record(
     )
 
 
+def _step(record: Record, yardstick: Yardstick) -> StepWindow:
+    sources = [signal.name for signal in yardstick.rig.inputs]
+    if not sources:
+        raise InputError(f"Record '{record.name}': the rig has no input, so there is no step.")
+    return step_window(record, stepping_input(record, sources), yardstick.step_seconds)
+
+
 def _with_more_noise(record: Record, yardstick: Yardstick) -> list[Record]:
     """Return copies of a record whose outputs have as much noise again."""
     rng = np.random.default_rng(_NOISE_SEED)
@@ -123,18 +129,6 @@ def _with_more_noise(record: Record, yardstick: Yardstick) -> list[Record]:
         )
         for _ in range(_COPIES)
     ]
-
-
-def _stepping(record: Record, rig: Rig) -> str:
-    """Return the input that steps first; the first of all where none moves."""
-    first = {
-        signal.name: int(np.argmax(np.abs(np.diff(record[signal.name])) > 0.0))
-        for signal in rig.inputs
-        if not is_constant(record[signal.name])
-    }
-    if not rig.inputs:
-        raise InputError(f"Record '{record.name}': the rig has no input, so there is no step.")
-    return min(first, key=first.__getitem__, default=rig.inputs[0].name)
 
 
 @dataclass(eq=False)

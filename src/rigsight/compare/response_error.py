@@ -51,6 +51,8 @@ class SignalPath:
         True if the source is an input of the rig, whose hold the record knows; False if it was measured.
     inputs
         All inputs of a rig with several motions, of which any may move in a record; empty where one source says it all.
+    drive
+        The input that moves the source; empty where the source is an input.
     """
 
     source: str
@@ -59,6 +61,7 @@ class SignalPath:
     upper_cut: float
     is_commanded: bool
     inputs: tuple[str, ...] = ()
+    drive: str = ""
 
     @property
     def name(self) -> str:
@@ -106,7 +109,7 @@ def signal_paths(rig: Rig) -> tuple[SignalPath, ...]:
     source, first, *behind = (rig.inputs[0].name, *(signal.name for signal in rig.outputs))
     return (
         SignalPath(source, first, "pt2", cut, rig.is_driven),
-        *(SignalPath(first, name, "pt1", cut_behind, False) for name in behind),
+        *(SignalPath(first, name, "pt1", cut_behind, False, drive=source) for name in behind),
     )
 
 
@@ -223,6 +226,7 @@ def _response(
         clear_alone=True,
         with_coherence=False,
         wanted=wanted,
+        drive=path.drive or None,
     ).response
 
 

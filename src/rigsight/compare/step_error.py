@@ -7,14 +7,18 @@ four seconds from the step (or another length), each signal less its mean over u
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from rigsight.errors import InputError
 from rigsight.metrics import rms
 from rigsight.records import Record
+from rigsight.records.periods import roughness
+from rigsight.records.plausibility import is_constant
 
 DEFAULT_SECONDS = 4.0
 _BEFORE = 5.0
@@ -22,6 +26,8 @@ _BEFORE = 5.0
 _LEAST_BEFORE = 2
 _JUMP = 0.5
 """Share of the largest change between samples that counts as the step."""
+_CHANCE = 1e-3
+"""Probability that noise alone counts as a step."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,36 @@ class StepWindow:
         return std * math.sqrt(1.0 + 1.0 / (self.before.stop - self.before.start))
 
 
+def stepping_input(record: Record, sources: Sequence[str]) -> str:
+    """Return the input that steps first; the first of all where none moves.
+
+    Parameters
+    ----------
+    record
+        A record whose input steps; the others may be measured, and their noise is no step.
+    sources
+        Names of its inputs, at least one.
+    """
+    moving = [name for name in sources if not is_constant(record[name])]
+    jumping = [name for name in moving if _exceeds_noise(record[name])]
+    return min(jumping or moving, key=lambda name: _first_jump(record[name]), default=sources[0])
+
+
+def _first_jump(samples: NDArray[np.float64]) -> int:
+    """Return the first sample after the first large change; 0 for a constant."""
+    change = np.abs(np.diff(samples))
+    largest = float(change.max(initial=0.0))
+    return int(np.argmax(change >= _JUMP * largest)) + 1 if largest > 0.0 else 0
+
+
+def _exceeds_noise(samples: NDArray[np.float64]) -> bool:
+    """Return True if noise as rough as that of the samples does not explain their largest change."""
+    change = np.abs(np.diff(samples))
+    # The difference of two samples has twice the variance of their noise; of all changes the largest is tested, to both sides.
+    limit = math.sqrt(2.0) * norm.isf(_CHANCE / (2.0 * change.size)) * roughness(samples)
+    return bool(np.max(change) > limit)
+
+
 def step_window(record: Record, source: str, seconds: float = DEFAULT_SECONDS) -> StepWindow:
     """Return where the first step of a record is compared.
 
@@ -67,11 +103,9 @@ def step_window(record: Record, source: str, seconds: float = DEFAULT_SECONDS) -
     InputError
         If the input does not change, or nothing was recorded before the step.
     """
-    change = np.abs(np.diff(record[source]))
-    largest = float(change.max(initial=0.0))
-    if largest == 0.0:
+    start = _first_jump(record[source])
+    if start == 0:
         raise InputError(f"Record '{record.name}': the input '{source}' is constant, so there is no step.")
-    start = int(np.argmax(change >= _JUMP * largest)) + 1
     first = max(0, start - round(_BEFORE / record.dt))
     if start - first < _LEAST_BEFORE:
         raise InputError(

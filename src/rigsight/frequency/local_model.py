@@ -289,7 +289,8 @@ class LocalFit:
     sides
         Right-hand sides of the equations, shape (n_bands, n_equations).
     absorbed
-        Number of terms that were projected out of both before.
+        Number of equations that do not count, one for all bands or of shape (n_bands,): as many as terms were projected out of
+        both before, and those that are zero because a record has no such frequency.
 
     Attributes
     ----------
@@ -302,7 +303,10 @@ class LocalFit:
     """
 
     def __init__(
-        self, terms: NDArray[np.complex128], sides: NDArray[np.complex128], absorbed: int = 0
+        self,
+        terms: NDArray[np.complex128],
+        sides: NDArray[np.complex128],
+        absorbed: int | NDArray[np.intp] = 0,
     ) -> None:
         scales = np.linalg.norm(terms, axis=1, keepdims=True)
         scales[scales == 0.0] = 1.0

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from rigsight.errors import InputError
 from rigsight.frequency.frequency_response import FrequencyResponse
 from rigsight.frequency.local_model import SPARE, LocalFit
 from rigsight.frequency.signal_pair import excited, hold_response, line_frequencies, pair_unit
-from rigsight.records.periods import repeated_period
+from rigsight.records.periods import mean_period
 from rigsight.records.record import Hold, Record
 
 _OWN_SHARE = 1e-4
@@ -174,7 +174,7 @@ def _moves(record: Record, source: str) -> bool:
 
 
 def _spectra(record: Record, sources: Sequence[str], smooth: Sequence[str]) -> _Spectra:
-    mean, n_periods = _mean_period(record, sources)
+    mean, n_periods = mean_period(record, [source for source in sources if _moves(record, source)])
     n = mean.n_samples
     omega = line_frequencies(n, mean.dt)
     # Averaging over periods lowers the noise by the square root of their number.
@@ -197,25 +197,6 @@ def _spectra(record: Record, sources: Sequence[str], smooth: Sequence[str]) -> _
         scale,
         n_periods == 0,
     )
-
-
-def _mean_period(record: Record, sources: Sequence[str]) -> tuple[Record, int]:
-    """Return the mean of all common periods of the moving inputs but the first, and their number; or the record and 0."""
-    period = 1
-    for source in sources:
-        if _moves(record, source):
-            own = repeated_period(record[source])
-            if own is None:
-                return record, 0
-            period = math.lcm(period, own)
-    count = record.n_samples // period
-    if count < 2:
-        return record, 0
-    kept = {
-        name: samples[period : count * period].reshape(count - 1, period).mean(axis=0)
-        for name, samples in record.signals.items()
-    }
-    return replace(record, signals=kept), count - 1
 
 
 def _long_enough(spectra: Sequence[_Spectra]) -> list[_Spectra]:
@@ -294,6 +275,7 @@ class _LocalModels:
         n_terms, n_inputs = self._order + 1, self._moving.size
         reach = max(0.5 * w * s.line for s, w in zip(self._spectra, self._widths, strict=True))
         collected: tuple[list[NDArray[np.complex128]], ...] = ([], [], [])
+        absorbed = np.zeros(omega.size, dtype=np.intp)
         for s, width, lines in zip(self._spectra, self._widths, self._lines, strict=True):
             center = np.round(omega / s.line).astype(np.intp) - 1
             picked = np.clip(center - width // 2, 0, s.omega.size - width)[:, None] + np.arange(width)
@@ -309,12 +291,12 @@ class _LocalModels:
                 -powers[..., 1 : self._poles + 1] * near,
                 near,
             ]
+            absorbed += np.where(heard[:, 0, 0], n_terms * s.has_transient, width)
             if s.has_transient:
                 own = _without(powers[..., :n_terms], own)
             for parts, part in zip(collected, own, strict=True):
                 parts.append(part)
         inputs, past, answers = (np.concatenate(parts, axis=1) for parts in collected)
-        absorbed = n_terms * sum(s.has_transient for s in self._spectra)
         fit = LocalFit(np.concatenate([inputs, past], axis=2), answers[..., 0], absorbed)
         first = [n_terms * i for i in range(n_inputs)]
         values = np.stack([fit.coefficient(term) for term in first], axis=1)

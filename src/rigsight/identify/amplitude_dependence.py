@@ -21,7 +21,7 @@ _MOVED = 1.15
 
 
 def amplitude_dependence(
-    records: Sequence[RecordIdentification], units: Mapping[str, str], input_unit: str
+    records: Sequence[RecordIdentification], units: Mapping[str, str]
 ) -> tuple[str, tuple[str, ...]]:
     """Return a sentence on whether parameters change with the amplitude, and the names of those that do.
 
@@ -33,30 +33,19 @@ def amplitude_dependence(
     records
         Results of each record.
     units
-        Unit by parameter.
-    input_unit
-        Unit of the amplitudes.
+        Unit by parameter and signal.
     """
     compared = _comparable(records)
     if len(compared) < 2:
-        if len({tuple(path.source for path in found.paths) for found in records}) > 1:
-            return (
-                "No two records drive the same inputs at different amplitudes, so they cannot show whether the parameters change "
-                "with it. Record one of them at another amplitude.",
-                (),
-            )
-        return (
-            "The records have only one amplitude, so they cannot show whether the parameters change with it. Record another "
-            "amplitude.",
-            (),
-        )
+        return _why_not(records), ()
     parts = ([*(path.physical for path in r.paths), r.own] for _, group in compared for r in group)
     names = [
         name
         for part in zip(*parts, strict=True)
         for name in _shared_names([() if own is None else _determined(own) for own in part])
     ]
-    span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g} {input_unit}".rstrip()
+    unit = units.get(compared[0][1][0].source, "")
+    span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g} {unit}".rstrip()
     if not names:
         return f"No parameter was found at all amplitudes {span}; nothing can be compared.", ()
     changing, told = [], []
@@ -116,22 +105,49 @@ def _moving_resonance(compared: Sequence[tuple[float, Sequence[RecordIdentificat
     )
 
 
+def _why_not(records: Sequence[RecordIdentification]) -> str:
+    """Say why no two records can be compared."""
+    if any(len(_by_amplitude(alike)) > 1 for alike in _alike(records)):
+        reason = "Parameters were found at only one amplitude of the same inputs in the same kind of record"
+        remedy = "Record others for longer, or over a wider band."
+    elif len({tuple(path.source for path in found.paths) for found in records}) > 1:
+        reason = "No two records drive the same inputs at different amplitudes"
+        remedy = "Record one of them at another amplitude."
+    elif len(_by_amplitude(records)) > 1:
+        reason = "No two records of the same kind have different amplitudes"
+        remedy = "Record one of them at another amplitude."
+    else:
+        reason, remedy = "The records have only one amplitude", "Record another amplitude."
+    return f"{reason}, so they cannot show whether the parameters change with it. {remedy}"
+
+
 def _comparable(
     records: Sequence[RecordIdentification],
 ) -> list[tuple[float, list[RecordIdentification]]]:
     """Return the amplitudes in increasing order with their records, for the kind of records with the most amplitudes."""
-    best: list[tuple[float, list[RecordIdentification]]] = []
-    for alike in dict.fromkeys(map(_driven_alike, records)):
-        groups: list[tuple[float, list[RecordIdentification]]] = []
-        own = [r for r in records if _driven_alike(r) == alike and _has_numbers(r)]
-        for found in sorted(own, key=lambda r: r.amplitude):
-            if groups and found.amplitude <= (1.0 + _SAME_AMPLITUDE) * groups[-1][0]:
-                groups[-1][1].append(found)
-            else:
-                groups.append((found.amplitude, [found]))
-        if len(groups) > len(best):
-            best = groups
-    return best
+    grouped = [_by_amplitude([r for r in alike if _has_numbers(r)]) for alike in _alike(records)]
+    return max(grouped, key=len, default=[])
+
+
+def _alike(records: Sequence[RecordIdentification]) -> list[list[RecordIdentification]]:
+    """Return the records that differ in nothing but amplitude together."""
+    return [
+        [r for r in records if _driven_alike(r) == alike]
+        for alike in dict.fromkeys(map(_driven_alike, records))
+    ]
+
+
+def _by_amplitude(
+    records: Sequence[RecordIdentification],
+) -> list[tuple[float, list[RecordIdentification]]]:
+    """Return the amplitudes in increasing order with their records."""
+    groups: list[tuple[float, list[RecordIdentification]]] = []
+    for found in sorted(records, key=lambda r: r.amplitude):
+        if groups and found.amplitude <= (1.0 + _SAME_AMPLITUDE) * groups[-1][0]:
+            groups[-1][1].append(found)
+        else:
+            groups.append((found.amplitude, [found]))
+    return groups
 
 
 def _determined(found: PhysicalEstimates) -> list[str]:
@@ -139,8 +155,8 @@ def _determined(found: PhysicalEstimates) -> list[str]:
 
 
 def _driven_alike(found: RecordIdentification) -> tuple[str, ...]:
-    """Return the properties that two records must share to be compared: their kind and their signal paths."""
-    return (found.record.kind, *(f"{path.source} -> {path.response}" for path in found.paths))
+    """Return the properties that two records must share to be compared: kind, signal of the amplitude, and signal paths."""
+    return (found.record.kind, found.source, *(f"{path.source} -> {path.response}" for path in found.paths))
 
 
 def _has_numbers(found: RecordIdentification) -> bool:

@@ -175,6 +175,11 @@ class _Quantity:
         return np.asarray(self.direction * self.power * (factor ** (1.0 / self.power) - 1.0))
 
 
+def _size_of_sum(value: float, first: _Quantity) -> float:
+    """Return the reference of relative changes of a sum: a sum that is zero by chance is as certain as its first term."""
+    return value if abs(value) > abs(first.size) else first.size
+
+
 class _Search:
     """Combines parameters until all are determined or reported as undetermined."""
 
@@ -262,7 +267,7 @@ class _Search:
             return together, f"{name} only as their {kind} {text}."
         weight = -(first.size * along_first) / (second.size * along_second)
         value = first.value + weight * second.value
-        size = value or first.size
+        size = _size_of_sum(value, first)
         text = sum_text(first.text, weight, second.text, first.unit == second.unit)
         plain_sum = f"{first.text} + {second.text}", f"{first.text} - {second.text}"
         kind = ("sum " if weight > 0.0 else "difference ") if text in plain_sum else ""
@@ -313,7 +318,7 @@ class _Search:
                 weight = -slope / slopes[shared]
                 text = sum_text(q.text, weight, held.text, q.unit == held.unit)
                 value = q.value + weight * held.value
-                size = value or q.size
+                size = _size_of_sum(value, q)
                 made.append(
                     _Quantity(
                         text, (*q.members, *held.members), q.unit, value, size, q.direction * size / q.size

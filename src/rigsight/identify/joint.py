@@ -140,7 +140,7 @@ def fit_jointly(
         _check_kinds(records, list(groups))
     _check_moves(structure, records)
     held = dict(known or {})
-    begin = {**constants, **dict(start or {}), **held}
+    begin = {**dict(start or {}), **constants, **held}
     if any(p.name not in begin for p in structure.rig.parameters):
         begin = {**linear_start(structure.rig, records, constants, held), **begin}
     begin = {**{p.name: p.default for p in structure.parameters if p.default is not None}, **begin}

@@ -97,7 +97,7 @@ def identify_record(
     paths, warnings = [motion], _resolution_warning(motion, seen, record)
     warnings += [f"{motion.source} -> {motion.response}: read without the reference. {unused}"] * bool(unused)
     if rig.downstream:
-        paths.append(_lateral(record, constants, options, motion))
+        paths.append(_lateral(record, rig, constants, options, motion))
     warnings = [*(f"{p.source} -> {p.response}: {p.problem}" for p in paths if p.problem), *warnings]
     return RecordIdentification(
         record=record,
@@ -158,7 +158,11 @@ def _motion(
 
 
 def _lateral(
-    record: Record, constants: Mapping[str, float], options: EstimationOptions, motion: PathIdentification
+    record: Record,
+    rig: Rig,
+    constants: Mapping[str, float],
+    options: EstimationOptions,
+    motion: PathIdentification,
 ) -> PathIdentification:
     path = PathIdentification("psi", "y")
     if "y" not in record:
@@ -176,7 +180,15 @@ def _lateral(
             fit = fit_step(_from_rest(record, motion.fit), "psi", "y", "pt1")
         else:
             seen = record_response(
-                record, "psi", "y", "pt1", options.method, options.resolution, smooth, band
+                record,
+                "psi",
+                "y",
+                "pt1",
+                options.method,
+                options.resolution,
+                smooth,
+                band,
+                drive=rig.inputs[0].name,
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
             fit = _fit(seen.response, "pt1", seen, options)

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate
+
+from rigsight.records.record import Record
 
 _SAME = 1e-3
 """Largest difference between two periods of one signal, relative to its standard deviation."""
 _ALIKE = 0.01
 """Largest RMS difference of two signals that count as the same, relative to the standard deviation: both may be measured."""
+_SHORTEST = 31
+"""Samples of the shortest period; a shorter one counts several times."""
+_APART = 0.5
+"""Correlation below which a signal has left one period for the next: over the lags of a period its mean is zero, so it falls
+below, while noise as small as `_ALIKE` crosses it once."""
 _ROUGH = 0.5
 """Share of a difference that must be as rough as white noise: a slightly other amplitude or time is smooth."""
 
@@ -25,11 +36,48 @@ def repeated_period(samples: NDArray[np.float64]) -> int | None:
     correlation = np.fft.irfft(np.abs(padded) ** 2)[: n // 2 + 1]
     overlap = n - np.arange(correlation.size)
     normalized = correlation / overlap / size**2
-    peaks = np.flatnonzero(normalized > 0.99)
-    for lag in peaks[peaks > 30]:
+    energy = np.concatenate([[0.0], np.cumsum(centered**2)])
+    squares = (energy[overlap] + energy[n] - energy[n - overlap] - 2.0 * correlation) / overlap
+    # A slow signal resembles itself at all small lags, and around a period: only one lag of each peak can be a period.
+    peak_of = np.cumsum(normalized < _APART)
+    is_alike = (normalized > 0.99) & (squares <= (_ALIKE * size) ** 2) & (peak_of > 0)
+    lags = np.flatnonzero(is_alike)
+    lags = lags[lags >= _SHORTEST]
+    for peak in np.split(lags, np.flatnonzero(np.diff(peak_of[lags])) + 1) if lags.size else ():
+        lag = peak[np.argmin(squares[peak])]
         if differ_by_noise(samples[lag:], samples[:-lag], size):
             return int(lag)
     return None
+
+
+def mean_period(record: Record, drives: Sequence[str]) -> tuple[Record, int]:
+    """Return the mean of all common periods of some inputs but the first, which holds the transient, and their number.
+
+    Parameters
+    ----------
+    record
+        A record.
+    drives
+        Its inputs that move.
+
+    Returns
+    -------
+    The record and 0 if they do not repeat.
+    """
+    period = 1
+    for drive in drives:
+        own = repeated_period(record[drive])
+        if own is None:
+            return record, 0
+        period = math.lcm(period, own)
+    count = record.n_samples // period
+    if count < 2:
+        return record, 0
+    kept = {
+        name: samples[period : count * period].reshape(count - 1, period).mean(axis=0)
+        for name, samples in record.signals.items()
+    }
+    return replace(record, signals=kept), count - 1
 
 
 def differ_by_noise(first: NDArray[np.float64], second: NDArray[np.float64], size: float) -> bool:

@@ -53,6 +53,8 @@ class Record:
         Bandwidth [rad/s], by sensor, of the observer that pulls a simulation towards the measurement while it is fitted.
     free_offsets
         Outputs whose sensor has its own offset in this record: a fit estimates it together with the initial state.
+    window_of
+        Name of the record that this is a window of; empty for a whole record.
 
     Raises
     ------
@@ -74,6 +76,7 @@ class Record:
     constants: Mapping[str, float] = field(default_factory=dict)
     observed: Mapping[str, float] = field(default_factory=dict)
     free_offsets: tuple[str, ...] = ()
+    window_of: str = ""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.dt) and self.dt > 0.0):
@@ -137,6 +140,11 @@ class Record:
             f"Record({self.name!r}, {self.n_samples} samples of {', '.join(self.signals)}, dt={self.dt:.6g} s, "
             f"role={self.role!r}, kind={self.kind!r})"
         )
+
+    @property
+    def origin(self) -> str:
+        """Name of the record that this is a window of; of a whole record its own."""
+        return self.window_of or self.name
 
     @property
     def n_samples(self) -> int:

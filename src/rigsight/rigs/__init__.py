@@ -6,6 +6,7 @@ from rigsight.rigs.built_in import RIGS as RIGS
 from rigsight.rigs.built_in import ROLLING as ROLLING
 from rigsight.rigs.built_in import RUNNING_GEAR as RUNNING_GEAR
 from rigsight.rigs.built_in import declared_rig as declared_rig
+from rigsight.rigs.built_in import has_built_in_parameters as has_built_in_parameters
 from rigsight.rigs.built_in import is_built_in_motion as is_built_in_motion
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.coupled_inertia import has_short_inverse as has_short_inverse
@@ -46,6 +47,7 @@ __all__ = [
     "declared_rig",
     "evaluated",
     "force_symbol",
+    "has_built_in_parameters",
     "has_short_inverse",
     "is_built_in_motion",
     "joint_of",

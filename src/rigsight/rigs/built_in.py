@@ -102,3 +102,18 @@ def is_built_in_motion(rig: Rig) -> bool:
         The rig.
     """
     return any(rig.mechanism == own.mechanism for own in (AXIS, ELEMENT, RUNNING_GEAR))
+
+
+def has_built_in_parameters(rig: Rig) -> bool:
+    """Return True if a rig has the equations of a built-in one of one motion, and the same numbers of them are to be identified.
+
+    Parameters
+    ----------
+    rig
+        The rig. A number that is a parameter of the built-in one may be a constant of this one.
+    """
+    names = {parameter.name for parameter in rig.parameters}
+    return any(
+        rig.mechanism == own.mechanism and names == {parameter.name for parameter in own.parameters}
+        for own in (AXIS, ELEMENT, RUNNING_GEAR)
+    )

@@ -200,7 +200,7 @@ def _by_transfer_functions(
         found = [_over_time(record, joint) for record in found]
     found = [out_of_band(record, campaign, joint) for record in found]
     units = _units(campaign)
-    statement, changing = amplitude_dependence(found, units, units.get(campaign.rig.inputs[0].name, ""))
+    statement, changing = amplitude_dependence(found, units)
     model = Model.of(joint.fit.fit.structure, joint.fit.fit.values, campaign.estimation[0].hold).to_json()
     identification = Identification(
         title=campaign.title,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.windows import Windowing, cut, window_length
+from rigsight.diagnose.fitting.windows import Windowing, cut, readings, window_length
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS
@@ -44,9 +44,28 @@ def test_windows_keep_role_and_tell_their_record() -> None:
     assert [w.name[0] for w in windows] == ["a", "a", "b", "b"]
 
 
+def test_a_record_may_be_called_as_a_window_is() -> None:
+    whole = moving(2.0, name="a window 1")
+    windows = cut([whole, moving(2.0, name="a")], 20.0)
+    assert [w.name for w in windows] == [
+        "a window 1 window 1",
+        "a window 1 window 2",
+        "a window 1",
+        "a window 2",
+    ]
+    assert [w.origin for w in windows] == ["a window 1", "a window 1", "a", "a"]
+    assert list(readings([whole], "x")) == ["a window 1"]
+    # A window of a window is of the same record.
+    assert {w.origin for w in cut(windows[:1], 5.0)} == {"a window 1"}
+
+
 def test_no_length_leaves_records_whole() -> None:
     records = [moving(2.0), moving(1.0)]
     assert cut(records, None) == tuple(records)
+
+
+def test_a_window_holds_a_sample_however_short_it_should_be() -> None:
+    assert [w.n_samples for w in cut([moving(2.0, 300)], 1e-6)] == 300 * [1]
 
 
 def test_a_record_shorter_than_the_window_stays_whole() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -180,3 +181,18 @@ def test_a_servo_is_identified_without_any_start_values() -> None:
             < 0.1 * SERVO[parameter.name]
         )
     assert found.changing == ()
+
+
+def test_a_record_at_rest_is_no_motion_that_the_fit_misses(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng, rig = np.random.default_rng(3), RIGS["drive_train"]
+    moved = recorded("moved", rig, TRAIN, {"u": multisine(rng, 1.0, 100.0)}, rng)
+    noise = {s.name: 1e-3 * np.std(moved[s.name]) * rng.standard_normal(STILL.size) for s in rig.outputs}
+    still = recorded("rest", rig, TRAIN, {"u": STILL}, rng).with_signals(**noise)
+    rest = replace(still, kind="operation", amplitude=None)
+    found = identified(rig, [moved, rest], {"k_t": TRAIN["k_t"]}, TRAIN, monkeypatch)
+    assert min(found.joint.scores[1].nrmse.values()) > 0.9
+    assert found.joint.statement.startswith("One parameter set fits all 2 estimation records")
+    # A motion of the same size that the fit misses is another matter.
+    moving = {name: samples + 1e-3 * np.sin(0.01 * np.arange(STILL.size)) for name, samples in noise.items()}
+    missed = identified(rig, [moved, rest.with_signals(**moving)], {"k_t": TRAIN["k_t"]}, TRAIN, monkeypatch)
+    assert "reliable" in missed.joint.statement

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -16,12 +18,16 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.excitation import log_sweep
 from rigsight.identify.identification import Identification
-from rigsight.records import Role
+from rigsight.records import Record, Role
 from rigsight.report import identification_summary
 from rigsight.report.notebook import identification_html
-from rigsight.rigs import AXIS
+from rigsight.rigs import AXIS, rig_file_text
+from rigsight.rigs.reading.rig_file import rig_of_tables
 from rigsight.simulate.model import Model
+from rigsight.workflow.campaign.in_memory import make_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.compare import run_compare
+from rigsight.workflow.identification import hysteresis
 from rigsight.workflow.identification.hysteresis import CALIBRATING
 from rigsight.workflow.identify import run_identify
 from rigsight.workflow.run.progress import Step
@@ -163,6 +169,23 @@ def test_terminal_page_and_notebook_have_a_section(axis: Identification, axis_fo
     assert "--effect bouc_wen_hysteresis" in page
 
 
+def test_a_held_out_record_on_which_the_model_diverges_has_no_error(
+    axis: Identification, axis_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert axis.hysteresis is not None
+    calibration = axis.hysteresis.calibration
+    # With such a pair z grows without bound.
+    values = {**calibration.fit.values, "beta": -4000.0, "gamma": 3000.0}
+    diverging = replace(calibration, fit=replace(calibration.fit, values=values))
+    monkeypatch.setattr(hysteresis, "calibrate_to_records", lambda *_, **__: diverging)
+    campaign = read_campaign(axis_folder)
+    structure = hysteresis.structure_with_memory(campaign, [BOUC_WEN])
+    found = hysteresis.with_hysteresis(axis, campaign, structure, 0, 1, lambda _: None).hysteresis
+    assert found is not None
+    assert [score.role for score in found.scores] == 3 * ["estimation"]
+    assert "diverges on 'held out' of the held-out records: no error is given there." in found.statement
+
+
 def interrupted(step: Step) -> None:
     if step.stage == CALIBRATING and step.done == 3:
         raise KeyboardInterrupt
@@ -192,3 +215,17 @@ def test_rigs_and_effects_that_cannot_be_calibrated_are_refused(axis_folder: Pat
     with pytest.raises(InputError, match=r"this axis has none\. 'rigsight diagnose"):
         run_identify(axis_folder / "free.toml", tmp_path / "out", effects=[BOUC_WEN])
     assert not (tmp_path / "out").exists()
+
+
+def test_a_rig_without_a_spring_has_no_hysteresis_to_calibrate() -> None:
+    parameters = ("k", "x_off")
+    declaration = {**tomllib.loads(rig_file_text("axis")), "name": "cart"}
+    declaration["parameters"] = {n: p for n, p in declaration["parameters"].items() if n not in parameters}
+    joint = declaration["joints"]["dynamics"]
+    joint = {key: law for key, law in joint.items() if key not in ("stiffness", "rest")}
+    cart = rig_of_tables({**declaration, "joints": {"dynamics": joint}}, "cart.toml")
+    t = np.linspace(0.0, 1.0, 50)
+    record = Record("one", 0.02, {"u": np.sin(t), "x": np.cos(t)}, {"u": "N", "x": "m"})
+    campaign = make_campaign(cart, [record])
+    with pytest.raises(InputError, match=r"this cart has none\. 'rigsight diagnose"):
+        hysteresis.structure_with_memory(campaign, [BOUC_WEN])

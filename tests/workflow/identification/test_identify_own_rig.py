@@ -16,6 +16,7 @@ from rigsight.rigs import RIGS, read_rig_file, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.workflow.campaign.in_memory import make_campaign
 from rigsight.workflow.discover import regression_data
+from rigsight.workflow.identification import any_rig
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import checked_options, identify_campaign, run_identify, write_identification
 
@@ -207,3 +208,60 @@ def test_a_sensor_that_nobody_recorded_is_named_if_it_would_help(
     # The tachometer scales as the scale does.
     assert told.remedies == ("If 'laser' were also recorded, these inputs would determine all parameters.",)
     assert told.sentence.endswith(told.remedies[0])
+
+
+def _known_mass(also_a_parameter: str = "") -> str:
+    """The axis in a file of one's own whose mass was weighed; one of its other constants may be unknown."""
+    text = rig_file_text("axis").replace('name = "axis"', 'name = "weighed"')
+    text = text.replace(f"[constants.{also_a_parameter}]", f"[parameters.{also_a_parameter}]")
+    text = text.replace("[parameters.m]", "[constants.m]")
+    return text.replace('log = true\nabout = "moving mass"', 'about = "moving mass"')
+
+
+def test_a_declared_constant_of_the_axis_in_ones_own_file_stays_as_declared() -> None:
+    rng, rig = np.random.default_rng(1), rig_of_text(_known_mass())
+    values = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+    record = recorded("one", rig, values, {"u": multisine(rng, 1.0, 60.0)}, rng)
+    campaign = make_campaign(rig, [record], constants={"gain": 2.0, "m": 2.0})
+    found = identify_campaign(campaign, checked_options("local_rational", None))
+    assert found.joint.fit.fit.values["m"] == 2.0
+    assert found.model["constants"]["m"] == 2.0
+    assert found.joint.fit.fit.values["k"] == pytest.approx(200.0, rel=0.01)
+
+
+def test_an_axis_of_known_mass_and_unknown_gain_is_identified() -> None:
+    rng, rig = np.random.default_rng(1), rig_of_text(_known_mass("gain"))
+    values = {"gain": 2.0, "m": 2.0, "d": 3.2, "k": 200.0, "x_off": 0.0, "force_off": 0.0}
+    record = recorded("one", rig, values, {"u": multisine(rng, 1.0, 60.0)}, rng)
+    campaign = make_campaign(rig, [record], constants={"m": 2.0})
+    found = identify_campaign(campaign, checked_options("local_rational", None))
+    for name in ("gain", "d", "k"):
+        assert found.joint.fit.fit.values[name] == pytest.approx(values[name], rel=0.01), name
+
+
+def test_a_record_may_have_the_word_window_in_its_name() -> None:
+    rng, axis = np.random.default_rng(2), RIGS["axis"]
+    values = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+    names = ("lab window 1", "lab window 2", "lab")
+    records = [recorded(name, axis, values, {"u": multisine(rng, 1.0, 60.0)}, rng) for name in names]
+    campaign = make_campaign(axis, records, constants={"gain": 1.0})
+    found = identify_campaign(campaign, checked_options("local_rational", None))
+    assert [score.record for score in found.joint.scores] == list(names)
+    assert found.joint.statement.startswith("One parameter set fits all 3 estimation records")
+
+
+def test_given_values_that_diverge_within_a_sample_are_no_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = rig_of_text(
+        STAGE.replace('[parameters.leaf]\nunit = "N/m"\nlower = 0.0', '[parameters.leaf]\nunit = "N/m"')
+    )
+    rng = np.random.default_rng(6)
+    truth = {"force_constant": 12.0, "carriage": 0.8, "friction": 3.0, "leaf": 400.0}
+    record = recorded("sweep", rig, truth, {"current": linear_sweep(T, 0.5, 2.0, 60.0)}, rng)
+    diverging = {"carriage": 0.8, "friction": 3.0, "leaf": -4e8}
+    campaign = make_campaign(rig, [record], constants={"force_constant": 12.0}, parameters=diverging)
+    options = checked_options("local_rational", None)
+    found = identify_campaign(campaign, options).joint.fit.fit
+    assert found.values["leaf"] == pytest.approx(400.0, rel=0.01)
+    # Without another start they are all there is: nothing is found, but nothing breaks.
+    monkeypatch.setattr(any_rig, "linear_start", lambda *_: diverging)
+    assert identify_campaign(campaign, options).joint.statement

@@ -14,7 +14,6 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import Finding
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.fitting.windows import WINDOW
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
@@ -140,7 +139,7 @@ def means_of(context: FitContext, model: Scored) -> list[DifferingMeans]:
         records, residuals = [*records, *context.scoring], [*residuals, *model.residuals]
     if not (model.residuals and model.fit.residuals):
         return []
-    names = [record.name.split(WINDOW)[0] for record in records]
+    names = [record.origin for record in records]
     return differing_means(names, records, residuals, [signal.name for signal in context.rig.outputs])
 
 

@@ -15,9 +15,6 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.prescribed_motion import smooth_motion
 
-WINDOW = " window "
-"""Stands between a record's name and the number of its window."""
-
 
 @dataclass(frozen=True)
 class Windowing:
@@ -88,7 +85,7 @@ def readings(records: Sequence[Record], sensor: str) -> dict[str, NDArray[np.flo
     parts: dict[str, list[NDArray[np.float64]]] = {}
     for record in records:
         if sensor in record:
-            parts.setdefault(record.name.split(WINDOW)[0], []).append(record[sensor])
+            parts.setdefault(record.origin, []).append(record[sensor])
     free = any(sensor in record.free_offsets for record in records)
     joined = {name: np.concatenate(part) for name, part in parts.items()}
     return {name: whole - np.mean(whole) for name, whole in joined.items()} if free else joined
@@ -136,12 +133,15 @@ def typical_period(rig: Rig, records: Sequence[Record]) -> float:
 
 
 def cut(records: Sequence[Record], length: float | None) -> tuple[Record, ...]:
-    """Return the records cut into windows of `length` [s], whole where it is None; a short rest joins the last window."""
+    """Return the records cut into windows of `length` [s], whole where it is None; a short rest joins the last window.
+
+    A window holds one sample at least.
+    """
     if length is None:
         return tuple(records)
     windows: list[Record] = []
     for record in records:
-        count = max(1, int(record.n_samples * record.dt / length))
+        count = min(max(1, int(record.n_samples * record.dt / length)), record.n_samples)
         edges = np.linspace(0, record.n_samples, count + 1).astype(int)
         windows += _at(record, edges.tolist())
     return tuple(windows)
@@ -149,6 +149,6 @@ def cut(records: Sequence[Record], length: float | None) -> tuple[Record, ...]:
 
 def _at(record: Record, edges: Sequence[int]) -> list[Record]:
     return [
-        replace(record.slice(start, stop), name=f"{record.name}{WINDOW}{i}")
+        replace(record.slice(start, stop), name=f"{record.name} window {i}", window_of=record.origin)
         for i, (start, stop) in enumerate(itertools.pairwise(edges), start=1)
     ]

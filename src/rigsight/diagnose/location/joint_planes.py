@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.fitting.windows import WINDOW
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.state_plane import NOTHING, Plane, plane_parts, plane_units
 from rigsight.diagnose.location.trace import Trace
@@ -89,8 +88,8 @@ def _stretch(context: FitContext, trace: Trace, n_samples: int) -> Trace:
 
 
 def _record(context: FitContext, trace: Trace) -> Record:
-    origin = next(r for r in context.scoring if r.name.split(WINDOW)[0] == trace.record)
-    return replace(origin, name=trace.record, signals={**trace.inputs, **trace.measured})
+    origin = next(r for r in context.scoring if r.origin == trace.record)
+    return replace(origin, name=trace.record, window_of="", signals={**trace.inputs, **trace.measured})
 
 
 def _plane(context: FitContext, motion: JointMotion, lacks: bool) -> Plane:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.fitting.windows import WINDOW, readings
+from rigsight.diagnose.fitting.windows import readings
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
@@ -83,7 +83,7 @@ def _joined(
     names = [signal.name for signal in rig.outputs]
     groups: dict[str, list[int]] = {}
     for index, record in enumerate(records):
-        groups.setdefault(record.name.split(WINDOW)[0], []).append(index)
+        groups.setdefault(record.origin, []).append(index)
     traces = []
     for name, indices in groups.items():
         parts = [records[i] for i in indices]

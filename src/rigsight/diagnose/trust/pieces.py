@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.fitting.windows import WINDOW
 from rigsight.diagnose.policy import TRUST
 from rigsight.identify import Coordinates, FitResult, RecordDerivatives, derivatives, own_derivatives
 from rigsight.records.record import Record
@@ -113,7 +112,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
     whole: list[Piece] = []
     own: list[FitResult] = []
     for index, (record, common) in enumerate(zip(records, found.records, strict=True)):
-        name = record.name.split(WINDOW)[0]
+        name = record.origin
         alone = replace(
             fit, initial_states=(fit.initial_states[index],), substeps=(fit.substeps[index],), residuals=()
         )
@@ -131,7 +130,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
     made = Pieces(free, values, found.place, found.coordinates, found.error, tuple(whole), {})
     # The initial state of a hysteresis sticks and slips: its effect is not linear.
     remembers = bool(np.any(context.problem(fit.structure, records[:1]).data.limited))
-    if remembers or any(WINDOW in record.name for record in records):
+    if remembers or any(record.window_of for record in records):
         return made
     cut: dict[int, tuple[Piece, ...]] = {}
     for count in TRUST.windows:

@@ -218,8 +218,10 @@ def loop_area(structure: Structure, p: NDArray[np.float64], amplitude: float) ->
     bench = compose(ELEMENT, effects)
     known = dict(structure.fixed)
     values = np.zeros((len(bench.names), p.shape[1]))
-    stiffness = structure.rig.motion.stiffness.name
-    values[bench.names.index("k")] = p[structure.names.index(stiffness)]
+    stiffness = structure.rig.motion.stiffness
+    own = sorted(stiffness.free_symbols, key=lambda symbol: str(symbol.name))
+    rows = [p[structure.names.index(symbol.name)] for symbol in own]
+    values[bench.names.index("k")] = sp.lambdify(own, stiffness, "numpy")(*rows)
     for effect in effects:
         for parameter in effect.parameters:
             name = structure.parameter_name(effect, parameter.name)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, hold_response
+from rigsight.frequency.signal_pair import pair_unit
 from rigsight.records.record import Record
 
 _NEAREST = 0.75
@@ -50,13 +51,12 @@ class SpectralRatio:
         answer = np.fft.rfft(record[self.response])
         sums = [np.sum(weights * answer[near]) for near, weights in self._weights(record)]
         values = np.array(sums) / hold_response(self.omega, record.dt, record.hold)
-        above, below = (record.units.get(name) or "1" for name in (self.response, self.source))
         return FrequencyResponse(
             omega=self.omega,
             values=values,
             source=self.source,
             response=self.response,
-            unit=above if below == "1" else f"{above}/{below}",
+            unit=pair_unit(record, self.source, self.response),
             records=(record.name,),
             method=f"spectral ratio averaged over {self.width:g} of the frequency",
         )

@@ -54,14 +54,15 @@ def linear_start(
     InputError
         If the records do not move the rig.
     """
-    if not rig.has_one_motion:
+    if not rig.has_one_motion or not _knows_its_gain(rig, {**constants, **known}):
         return any_rig_start(rig, records, constants, known)
     driven = [record for record in records if not is_constant(record[rig.inputs[0].name])]
     if rig.is_driven and not driven:
         # A free decay consists only of end terms, which this method treats as transients to be removed.
         return any_rig_start(rig, records, constants, {**_one_offset(rig), **known})
     records = driven
-    found = _driven(rig, records, constants, known) if rig.is_driven else _prescribed(rig, records)
+    first = _driven if rig.is_driven else _prescribed
+    found = first(rig, records, constants, known)
     if rig.follower is not None:
         found |= _followed(rig, rig.follower, records, constants, found)
     parameters = {p.name: p for p in rig.parameters}
@@ -70,6 +71,10 @@ def linear_start(
         for name, value in found.items()
     }
     return {**clipped, **known}
+
+
+def _knows_its_gain(rig: Rig, known: Mapping[str, float]) -> bool:
+    return not rig.is_driven or all(symbol.name in known for symbol in rig.motion.drive_gain.free_symbols)
 
 
 def _one_offset(rig: Rig) -> dict[str, float]:
@@ -81,7 +86,7 @@ def _driven(
     rig: Rig, records: Sequence[Record], constants: Mapping[str, float], known: Mapping[str, float]
 ) -> dict[str, float]:
     motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
-    gain = evaluated(motion.drive_gain, constants)
+    gain = evaluated(motion.drive_gain, {**constants, **known})
     has_stiffness = known.get(str(motion.stiffness)) != 0.0
     inertia, damping, stiffness = second_order(records, source, response, gain, has_stiffness)
     offset = _mean(records, response) - gain * _mean(records, source) / stiffness if has_stiffness else 0.0
@@ -144,7 +149,9 @@ def _mean(records: Sequence[Record], name: str) -> float:
     return float(np.mean([np.mean(record[name]) for record in records]))
 
 
-def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
+def _prescribed(
+    rig: Rig, records: Sequence[Record], constants: Mapping[str, float], known: Mapping[str, float]
+) -> dict[str, float]:
     motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
     for name in (source, response):
         _check_moves(records, name)
@@ -154,9 +161,27 @@ def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
         rows.append(np.column_stack([v, x, np.ones_like(x)]))
         forces.append(record[response])
     solution = np.linalg.lstsq(np.concatenate(rows), np.concatenate(forces), rcond=None)[0]
-    return dict(
-        zip(map(str, (motion.damping, motion.stiffness, motion.bias)), map(float, solution), strict=True)
-    )
+    damping, stiffness, force = map(float, solution)
+    numbers, found = {**constants, **known}, dict[str, float]()
+    for expression, value in (
+        (motion.damping, damping),
+        (motion.stiffness, stiffness),
+        (motion.bias, force),
+        # What no constant force explains is a spring that rests elsewhere; with both, one is enough.
+        (motion.rest, _rest(motion.bias, force, stiffness, numbers)),
+    ):
+        if not expression.is_Symbol:
+            found |= _solved(expression, value, {**numbers, **found})
+        elif expression.name not in constants:
+            found[expression.name] = value
+    return found
+
+
+def _rest(bias: sp.Expr, force: float, stiffness: float, numbers: Mapping[str, float]) -> float:
+    """Return the rest position of a spring whose force is `force` at zero deflection, beside a constant force that is known."""
+    if stiffness == 0.0 or any(symbol.name not in numbers for symbol in bias.free_symbols):
+        return 0.0
+    return (evaluated(bias, numbers) - force) / stiffness
 
 
 def _check_moves(records: Sequence[Record], name: str) -> None:

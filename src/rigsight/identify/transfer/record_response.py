@@ -20,7 +20,7 @@ from rigsight.frequency import (
 )
 from rigsight.frequency.signal_pair import excited, line_frequencies
 from rigsight.identify.transfer.transfer_form import Order
-from rigsight.records.periods import repeated_period
+from rigsight.records.periods import mean_period
 from rigsight.records.record import Hold, Record
 
 Method = Literal["local_rational", "local_polynomial", "h1", "thesis"]
@@ -85,6 +85,7 @@ def record_response(
     with_coherence: bool = True,
     wanted: NDArray[np.float64] | None = None,
     instrument: str | None = None,
+    drive: str | None = None,
 ) -> RecordResponse:
     """Return the frequency response of one record.
 
@@ -116,6 +117,8 @@ def record_response(
         Required frequencies [rad/s]; a local method skips other lines. None for all.
     instrument
         The reference of a closed loop: a local method divides the responses to it, unless the source does not respond to it.
+    drive
+        The input whose periods are averaged: the noise of a measured source hides its period. None for the source.
 
     Raises
     ------
@@ -123,19 +126,29 @@ def record_response(
         If the record is too short or has no excitation, or no line is inside the band.
     """
     check_option("The method", method, METHODS)
-    unused = ""
+    drive, unused = drive or source, ""
     if instrument is not None and method not in _BAND_LINES:
         unused, instrument = f"The method '{method}' does not use it; local_rational does.", None
     coherence = _coherence(record, source, response, hold) if with_coherence else None
     if method == "thesis":
-        periodic, note = _mean_period(record, None)
+        periodic, note = _mean_period(record, drive)
         found, width, shared = _noted(_thesis(periodic, source, response, order), note), _line(periodic), 1.0
     elif method == "h1":
         width = resolution or _SEGMENTS * _line(record)
         found, shared = averaged_response(record, source, response, width, hold=hold), _HANN_LINES
     else:
         local = partial(
-            _local, record, source, response, method, resolution, hold, wanted, least_clearness, clear_alone
+            _local,
+            record,
+            source,
+            response,
+            drive,
+            method,
+            resolution,
+            hold,
+            wanted,
+            least_clearness,
+            clear_alone,
         )
         try:
             found, width, shared = local(instrument)
@@ -158,6 +171,7 @@ def _local(
     record: Record,
     source: str,
     response: str,
+    drive: str,
     method: Method,
     resolution: float | None,
     hold: Hold,
@@ -167,7 +181,7 @@ def _local(
     instrument: str | None,
 ) -> tuple[FrequencyResponse, float, float]:
     """Return the response by a local method, its resolution [rad/s] and its lines per independent value."""
-    periodic, note = _mean_period(record, instrument)
+    periodic, note = _mean_period(record, instrument or drive)
     line = _line(periodic)
     lines = max(_BAND_LINES[method], round((resolution or 0.0) / line))
     local = local_rational_response if method == "local_rational" else local_polynomial_response
@@ -189,19 +203,12 @@ def _noted(found: FrequencyResponse, note: str) -> FrequencyResponse:
     return replace(found, method=f"{found.method}, {note}") if note else found
 
 
-def _mean_period(record: Record, instrument: str | None) -> tuple[Record, str]:
-    """Return the mean of all periods but the first, if the instrument or input is periodic, or the unchanged record."""
-    drive = next(iter(record.signals.values())) if instrument is None else record[instrument]
-    period = repeated_period(drive)
-    count = record.n_samples // period if period else 1
-    if period is None or count < 2:
+def _mean_period(record: Record, drive: str) -> tuple[Record, str]:
+    """Return the mean of the periods of an input, and which these are; or the unchanged record and nothing."""
+    mean, count = mean_period(record, [drive])
+    if count == 0:
         return record, ""
-    kept = {
-        name: samples[period : count * period].reshape(count - 1, period).mean(axis=0)
-        for name, samples in record.signals.items()
-    }
-    which = "period 2" if count == 2 else f"mean of periods 2 to {count}"
-    return replace(record, signals=kept), which
+    return mean, "period 2" if count == 1 else f"mean of periods 2 to {count + 1}"
 
 
 def _coherence(record: Record, source: str, response: str, hold: Hold) -> FrequencyResponse | None:

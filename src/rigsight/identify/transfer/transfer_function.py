@@ -46,7 +46,6 @@ def fit_frequency_response(
     longest_dead_time: float = 0.0,
     magnitude_only: bool = False,
     weighting: Weighting | None = None,
-    dependent_lines: int = 0,
 ) -> TransferFit:
     """Fit a PT1 or PT2 to a frequency response.
 
@@ -64,9 +63,6 @@ def fit_frequency_response(
     weighting
         ``"variance"`` (maximum likelihood for circular normal errors), ``"uniform"`` (absolute errors) or ``"relative"``.
         Default: variances if there are any, else uniform.
-    dependent_lines
-        Number of neighbors with which the errors of a line are correlated, for a response without
-        `FrequencyResponse.noise_shares` (local models have them); 0 for independent lines.
 
     Returns
     -------
@@ -92,7 +88,7 @@ def fit_frequency_response(
             best = found
     assert best is not None
     values, chain = problem.form.natural(best.x)
-    covariance = propagated_covariance(problem.covariance(best.x, dependent_lines), np.diag(chain))
+    covariance = propagated_covariance(problem.covariance(best.x), np.diag(chain))
     errors = np.sqrt(np.diag(covariance))
     misfit = problem.misfit(best.x) if problem.weighting == "variance" else float("nan")
     notes = [] if best.status > 0 else [str(best.message)]
@@ -155,17 +151,14 @@ class _Problem:
         residual = self.residual(theta)
         return float(np.sqrt(residual @ residual / (residual.size - theta.size)))
 
-    def covariance(self, theta: NDArray[np.float64], dependent_lines: int) -> NDArray[np.float64]:
-        slopes, residual = self.jacobian(theta), self.residual(theta)
+    def covariance(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        slopes = self.jacobian(theta)
         bread = slopes.T @ slopes
         if self.measured.noise_shares is not None:
             widened = 1.0
             if self.weighting == "variance":
                 widened = max(self.misfit(theta), 1.0) ** 2 * _scattered_weights(self.measured.noise_freedom)
             return sandwich_covariance(bread, widened * self._shared_filling(theta))
-        if dependent_lines > 0:
-            per_line = (slopes * residual[:, None]).reshape(self.omega.size, -1, theta.size).sum(axis=1)
-            return sandwich_covariance(bread, _dependent_filling(per_line, dependent_lines))
         misfit = self.misfit(theta)
         size = max(misfit, 1.0) if self.weighting == "variance" else misfit
         return sandwich_covariance(bread, size**2 * bread)
@@ -335,12 +328,3 @@ def _scattered_weights(freedom: float) -> float:
         return 1.0
     n = max(2.0 * freedom, 5.0)
     return (n - 2.0) / (n - 4.0)
-
-
-def _dependent_filling(per_line: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
-    """Return the covariance of the summed rows of shape (n_lines, n_parameters), dependent over `reach` neighbors."""
-    filling = per_line.T @ per_line
-    for lag in range(1, min(reach, per_line.shape[0] - 1) + 1):
-        crossed = per_line[lag:].T @ per_line[:-lag] * (1.0 - lag / (reach + 1.0))
-        filling += crossed + crossed.T
-    return np.asarray(filling)

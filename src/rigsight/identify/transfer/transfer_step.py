@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.errors import InputError, check_option
+from rigsight.frequency.signal_pair import pair_unit
 from rigsight.identify.fit.covariance import propagated_covariance
 from rigsight.identify.transfer.step_residuals import step_covariance
 from rigsight.identify.transfer.transfer_fit import TransferFit
@@ -101,7 +102,6 @@ def fit_step(
             f"The step does not determine {' and '.join(poor)}: the response of '{response}' does not exceed the noise, or the "
             f"window ends before it settles."
         )
-    unit = f"{record.units.get(response, '1')}/{record.units.get(source, '1')}"
     return TransferFit(
         form=form,
         names=names,
@@ -114,7 +114,7 @@ def fit_step(
         message=" ".join(notes) or "Converged.",
         source=source,
         response=response,
-        unit=unit,
+        unit=pair_unit(record, source, response),
         method=f"output fit of a step, {problem.begin:g} to {problem.end:g} s",
         records=(record.name,),
     )

@@ -37,11 +37,11 @@ from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
-from rigsight.rigs import Rig, is_built_in_motion
+from rigsight.rigs import Rig, has_built_in_parameters, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
-from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters, parent
+from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters
 from rigsight.workflow.identification.warnings import (
     any_rig_warnings,
     beyond_identified_amplitudes,
@@ -61,11 +61,12 @@ _GROWTHS = 3.0
 def has_transfer_forms(campaign: Campaign) -> bool:
     """Return True for rigs with the equations of a built-in one of one motion: their transfer functions are fitted by record.
 
-    A rig with the same equations from a file has other names. Records with different constants have no common transfer function,
-    and records without excitation have none. Offsets that differ between records are estimated only in the time domain.
+    A rig with the same equations from a file has other names, or knows a number that a transfer function would estimate. Records
+    with different constants have no common transfer function, and records without excitation have none. Offsets that differ
+    between records are estimated only in the time domain.
     """
     rig = campaign.rig
-    if not is_built_in_motion(rig) or any(
+    if not has_built_in_parameters(rig) or any(
         record.constants or record.free_offsets for record in campaign.records
     ):
         return False
@@ -122,7 +123,7 @@ def identify_any_rig(
         views = tuple(_views(structure, joint.fit.fit.values, records, options, known))
     units = {p.name: p.unit for p in structure.parameters}
     units |= {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
-    statement, changing = amplitude_dependence(found, units, units.get(found[0].source, ""))
+    statement, changing = amplitude_dependence(found, units)
     told = None
     if known is not None:
         fit, windows = joint.fit, cut(records, length)
@@ -192,6 +193,12 @@ def _begin(
     if all(p.name in given for p in rig.parameters):
         starts.append({p.name: given[p.name] for p in rig.parameters})
     lengths = [_window_length(structure, {**constants, **start}, records) for start in starts]
+    # A window with no more samples than its own initial state has numbers follows any motion: such a start is no model of it.
+    shortest = (len(structure.states) + 1) * max(record.dt for record in records)
+    possible = [i for i, length in enumerate(lengths) if length is None or length >= shortest]
+    if possible:
+        starts, lengths = [starts[i] for i in possible], [lengths[i] for i in possible]
+    lengths = [None if length is None else max(length, shortest) for length in lengths]
     if len(starts) == 1:
         return starts[0], lengths[0]
     costs = [
@@ -279,7 +286,7 @@ def _with_errors(
     whole = fit.fit if factor is None else _with_unknown(fit.fit, factor.held)
     known, together = corrected(whole, windows)
     kinds = tuple(
-        replace(kind, fit=corrected(kind.fit, [w for w in windows if parent(w) == kind.kind])[1])
+        replace(kind, fit=corrected(kind.fit, [w for w in windows if w.origin == kind.kind])[1])
         for kind in fit.kinds
     )
     return known, replace(joint, fit=replace(fit, fit=together, kinds=kinds), names=together.free)

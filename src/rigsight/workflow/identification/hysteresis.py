@@ -53,7 +53,7 @@ def structure_with_memory(campaign: Campaign, effects: Sequence[Effect]) -> Stru
         raise InputError(
             f"Hysteresis is calibrated on rigs of one motion, and {rig.name} has more. {instead}"
         )
-    if campaign.drifts:
+    if campaign.drifts or rig.motion.stiffness == 0:
         raise InputError(
             f"Hysteresis is calibrated where a spring brings the rig back, and this {rig.name} has none. {instead}"
         )
@@ -130,10 +130,15 @@ def with_hysteresis(
                 fitted, calibration.fit.residuals, strict=bool(calibration.fit.residuals)
             )
         }
+        diverging = []
         for record in campaign.validation:
-            residuals[record.name] = _validation_residual(
+            residual = _validation_residual(
                 calibration.fit.structure, calibration.fit.values, record, outputs
             )
+            if residual is None:
+                diverging.append(record.name)
+            else:
+                residuals[record.name] = residual
     # A search that settles early takes fewer generations than were announced.
     listener(Step(CALIBRATING, "", _STEPS, _STEPS))
     without = {score.record: score.nrmse for score in joint.scores}
@@ -150,7 +155,7 @@ def with_hysteresis(
         held={p.name: values[p.name] for p in of_effects if p.name not in calibration.fit.free},
         units={p.name: p.unit for p in structure.parameters},
         meanings={p.name: p.description for p in structure.parameters},
-        statement=_statement(structure.effect_names, calibration.fit, scores),
+        statement=_statement(structure.effect_names, calibration.fit, scores) + _unscored(diverging),
         scores=scores,
     )
     model = Model.of(calibration.fit.structure, calibration.fit.values, campaign.estimation[0].hold)
@@ -189,12 +194,14 @@ def _reduced(record: Record, rig: Rig, outputs: Sequence[str]) -> Record:
 
 def _validation_residual(
     structure: Structure, values: Mapping[str, float], record: Record, outputs: Sequence[str]
-) -> np.ndarray:
+) -> np.ndarray | None:
+    """Return measured minus simulated of a record; None if the simulation diverges."""
     own = _reduced(record, structure.rig, outputs)
     scales = characteristic_scales(structure.rig, [own], values)
     noise = {name: float(np.std(own[name])) or 1.0 for name in outputs if name in own}
     # Only initial states are estimated: a record may start away from rest.
-    return GreyBoxFit(structure, [own], scales, noise).fit(values, ()).residuals[0]
+    residuals = GreyBoxFit(structure, [own], scales, noise).fit(values, ()).residuals
+    return residuals[0] if residuals else None
 
 
 def _score(
@@ -233,6 +240,13 @@ def _statement(effects: Sequence[str], fit: FitResult, scores: Sequence[EffectSc
     if worst > _HARDLY:
         return f"{text} The effects explain hardly any of the error; 'rigsight diagnose' says what the rig lacks."
     return text if fit.success else f"{text} {doubt}"
+
+
+def _unscored(diverging: Sequence[str]) -> str:
+    if not diverging:
+        return ""
+    names = " and ".join(f"'{name}'" for name in diverging)
+    return f" The calibrated model diverges on {names} of the held-out records: no error is given there."
 
 
 def _rms(values: Sequence[float]) -> float:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import WINDOW, cut, window_length
+from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
@@ -18,6 +19,7 @@ from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.metrics import nrmse
 from rigsight.records import Record
+from rigsight.records.periods import roughness
 from rigsight.records.plausibility import is_constant
 from rigsight.report.quantities import gap_percent
 from rigsight.simulate import Structure, compose
@@ -28,6 +30,7 @@ _SMALL_LOSS = 0.01
 _UNSERVED = 0.9
 """NRMSE from which a fit does not follow a motion at all."""
 _LATERAL = ("l_0", "c_y")
+_ORIGIN = attrgetter("origin")
 _BELOW = 1e-6
 
 
@@ -61,7 +64,7 @@ def identify_jointly(
     windows = [w for w in cut(records, length) if not is_constant(w[campaign.rig.inputs[0].name])]
     known = held_parameters(campaign, records, has_stiffness)
     fit = fit_jointly(
-        structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=parent
+        structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=_ORIGIN
     )
     pooled = _pooled(found) if fit.probability < _DIFFERENT and not known.keys() & _LATERAL else None
     if pooled is not None:
@@ -72,7 +75,7 @@ def identify_jointly(
             known={**known, **pooled.values},
             start=fit.fit.values,
             output_noise=fit.noise,
-            group_of=parent,
+            group_of=_ORIGIN,
         )
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
@@ -90,7 +93,7 @@ def identify_jointly(
         fit=fit,
         names=fit.fit.free,
         pooled=pooled,
-        statement=_statement(fit, scores, [name for name in amplitudes if name in names]),
+        statement=_statement(fit, scores, records),
         conicity=conicity,
         scores=scores,
         left_out=tuple(r.record.name for r in found if r.record.name not in names),
@@ -122,8 +125,9 @@ def fit_any_rig_jointly(
     length
         Of windows into which records are cut [s]; None leaves them whole.
     """
-    windows = cut([r.record for r in found], length)
-    fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=parent)
+    records = [r.record for r in found]
+    windows = cut(records, length)
+    fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=_ORIGIN)
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
         *_estimation_scores(fit, windows, amplitudes),
@@ -133,7 +137,7 @@ def fit_any_rig_jointly(
         fit=fit,
         names=fit.fit.free,
         pooled=None,
-        statement=_statement(fit, scores, list(amplitudes)),
+        statement=_statement(fit, scores, records),
         conicity=None,
         scores=scores,
         left_out=(),
@@ -166,11 +170,6 @@ def _start(found: Sequence[RecordIdentification], known: Mapping[str, float]) ->
     return {
         name: float(np.median([r.estimates[name][0] for r in found if name in r.estimates])) for name in names
     }
-
-
-def parent(record: Record) -> str:
-    """Return the name of the record that a window was cut from."""
-    return record.name.split(WINDOW)[0]
 
 
 def held_parameters(campaign: Campaign, records: Sequence[Record], has_stiffness: bool) -> dict[str, float]:
@@ -219,7 +218,7 @@ def _estimation_scores(
     outputs = [signal.name for signal in fit.fit.structure.rig.outputs]
     scores = []
     for own in fit.kinds:
-        places = [i for i, window in enumerate(windows) if parent(window) == own.kind]
+        places = [i for i, window in enumerate(windows) if window.origin == own.kind]
         records = [windows[i] for i in places]
         joint = [fit.fit.residuals[i] for i in places] if fit.fit.residuals else []
         scores.append(
@@ -250,22 +249,28 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
     )
 
 
-def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str]) -> str:
+def _moves(samples: NDArray[np.float64]) -> bool:
+    """Return True if a fit that leaves no more than the noise of an output would follow it: at rest there is only noise."""
+    return roughness(samples) < _UNSERVED * float(np.std(samples))
+
+
+def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Record]) -> str:
     if not fit.fit.success:
         return f"The joint fit did not converge: {fit.fit.message}. Its parameter values are not reliable."
-    if len(names) < 2:
+    if len(fitted) < 2:
         return (
             "Only one estimation record was fitted, so its parameters cannot be compared with others. Another kind of record, "
             "such as a step beside a sweep, or another amplitude would test them."
         )
     if not math.isfinite(fit.probability):
         return "There is no parameter that every record determines, so the records cannot be compared."
+    by_name = {record.name: record for record in fitted}
     unserved = [
         f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
         for score in scores
         if score.role == "estimation"
         for name in score.nrmse
-        if not score.nrmse[name] < _UNSERVED
+        if not score.nrmse[name] < _UNSERVED and _moves(by_name[score.record][name])
     ]
     if fit.probability >= _DIFFERENT and unserved:
         return (
@@ -274,12 +279,12 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str
         )
     if fit.probability >= _DIFFERENT:
         return (
-            f"One parameter set fits all {len(names)} estimation records: equally large differences arise by chance with "
+            f"One parameter set fits all {len(fitted)} estimation records: equally large differences arise by chance with "
             f"probability {fit.probability:.2g}."
         )
     chance = f"below {_BELOW:g}" if fit.probability < _BELOW else f"{fit.probability:.1g}"
     text = (
-        f"No single parameter set fits all {len(names)} estimation records (probability of chance {chance})."
+        f"No single parameter set fits all {len(fitted)} estimation records (probability of chance {chance})."
     )
     return f"{text} {_pull(fit, scores)}"
 

@@ -19,7 +19,6 @@ from rigsight.identify.record_identification import MISFIT
 from rigsight.identify.transfer.record_response import driven_band
 from rigsight.records import Record
 from rigsight.rigs import evaluated
-from rigsight.workflow.identification.joint import parent
 
 _TOLERANCE = 0.02
 """Relative tolerance with which an amplitude counts as inside the identified range."""
@@ -140,7 +139,7 @@ def offsets_of_records(
     fit, rig = joint.fit.fit, campaign.rig
     fitted = cut([r for r in campaign.estimation if r.name not in joint.left_out], length)
     units = {signal.name: signal.unit for signal in rig.outputs}
-    names = [parent(record) for record in fitted]
+    names = [record.origin for record in fitted]
     if not fit.offset_names:
         found = differing_means(names, fitted, fit.residuals, list(units))
         return [f"{told.sentence(units[told.output])} {OFFSETS_MEND}" for told in found]
