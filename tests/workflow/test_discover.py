@@ -13,7 +13,7 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.cli import app
-from rigsight.diagnose.fitting.windows import WINDOW, cut
+from rigsight.diagnose.fitting.windows import cut
 from rigsight.discover import MONOMIALS, RegressionData
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
@@ -70,7 +70,7 @@ def test_a_record_alone_is_not_joined_by_one_whose_name_begins_alike() -> None:
     data = RegressionData(Campaign("axis", AXIS, {"gain": 1.0}, {}, whole), {"x": 1e-3})
     assert [r.name for r in only(data, whole[0]).records] == ["sine_1", "other"]
     cut_up = replace(data, windows=cut(whole, 1.0))
-    assert {r.name.split(WINDOW)[0] for r in only(cut_up, whole[0]).records} == {"sine_1", "other"}
+    assert {r.origin for r in only(cut_up, whole[0]).records} == {"sine_1", "other"}
     assert len(only(cut_up, whole[0]).records) == 6
 
 

@@ -11,7 +11,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import WINDOW, cut, window_length
+from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
@@ -169,11 +169,7 @@ def only(data: RegressionData, record: Record) -> RegressionData:
     record
         One of the campaign's estimation records.
     """
-    own = tuple(
-        r
-        for r in data.records
-        if r.role == "validation" or r.name == record.name or r.name.startswith(f"{record.name}{WINDOW}")
-    )
+    own = tuple(r for r in data.records if r.role == "validation" or r.origin == record.name)
     return replace(data, windows=own)
 
 
