@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.location.trace import STAGES, Trace
-from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
+from rigsight.diagnose.noise.block_means import blocks_of
 from rigsight.diagnose.policy import MAPS
 
 Interval = tuple[float, float]
@@ -60,9 +60,8 @@ def gap_intervals(
         np.column_stack([(m - center) ** 2, *(residuals[stage][i] ** 2 for stage in stages)])
         for i, m in enumerate(measured)
     ]
-    blocks = block_means(squares)
-    draws = rng.integers(0, blocks.shape[0], size=(RESAMPLES, blocks.shape[0]))
-    means = np.mean(blocks[draws], axis=1)
+    blocks = blocks_of(squares)
+    means = blocks.resampled(blocks.draws(rng))
     with np.errstate(divide="ignore", invalid="ignore"):
         drawn = {stage: np.sqrt(means[:, 1 + i] / means[:, 0]) for i, stage in enumerate(stages)}
         if "before" in drawn and "after" in drawn:

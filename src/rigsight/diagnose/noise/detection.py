@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import helmert
 
-from rigsight.diagnose.noise.block_means import block_means
+from rigsight.diagnose.noise.block_means import blocks_of
 from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
 from rigsight.diagnose.policy import NOTES
 from rigsight.records.periods import differ_by_noise, repeated_period, roughness
@@ -76,11 +76,11 @@ def _interval(
     """Return 95 % limits of a standard deviation: those of blocks of independent pieces of the noise."""
     if lower_bound or not independent:
         return std, np.inf
-    squares = block_means([samples**2 for samples in independent])
-    degrees, mean = squares.size, float(np.mean(squares))
+    squares = blocks_of([samples[:, None] ** 2 for samples in independent])
+    mean = float(squares.mean[0])
     if mean == 0.0:
         return std, np.inf
-    spread = float(np.std(squares)) / mean / np.sqrt(degrees) if degrees > 1 else np.inf
+    spread = float(squares.standard_error[0]) / mean
     low, high = np.maximum(1.0 - 1.96 * spread, 0.0), 1.0 + 1.96 * spread
     return float(std * np.sqrt(low)), float(std * np.sqrt(high))
 

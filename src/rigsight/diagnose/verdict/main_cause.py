@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import Scored
-from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
+from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import VERDICT
 from rigsight.rigs import Rig
 
@@ -70,10 +70,9 @@ def main_cause(
     rng
         Source of the resampling.
     """
-    squares = np.column_stack([_blocks(model, noise) for model in (reidentified, best)])
-    draws = rng.integers(0, squares.shape[0], size=(RESAMPLES, squares.shape[0]))
-    gap, left = np.moveaxis(np.mean(squares[draws], axis=1), 1, 0)
-    share = _share(*np.mean(squares, axis=0))
+    squares = squared_errors([model.residuals for model in (reidentified, best)], noise)
+    gap, left = squares.resampled(squares.draws(rng)).T
+    share = _share(*squares.mean)
     lowest = float(np.quantile([_share(g, r) for g, r in zip(gap, left, strict=True)], VERDICT.surely))
     places = {rig.acts_at(effect) for effect in best.effects}
     elsewhere = [m for m in tied if places.isdisjoint(rig.acts_at(effect) for effect in m.effects)]
@@ -93,7 +92,3 @@ def _common_part(reidentified: Scored, one: Scored, other: Scored, noise: NDArra
 
 def _share(gap: float, left: float) -> float:
     return float((gap - left) / (gap - 1.0)) if gap > 1.0 else 0.0
-
-
-def _blocks(model: Scored, noise: NDArray[np.float64]) -> NDArray[np.float64]:
-    return block_means([np.nanmean((residual / noise) ** 2, axis=1) for residual in model.residuals])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import Scored
-from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
+from rigsight.diagnose.noise.block_means import Blocks, squared_errors
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several.one_law import is_linear
 from rigsight.effects.effect import Place
@@ -101,16 +101,15 @@ def rank(
         return Ranking(
             tuple(models), tuple(0.0 for _ in models), (), tuple(Grounds(0.0, 0.0, None) for _ in models)
         )
-    squares = np.column_stack([_blocks(m, noise) for m in usable])
-    draws = rng.integers(0, squares.shape[0], size=(RESAMPLES, squares.shape[0]))
-    means = np.mean(squares[draws], axis=1)
-    errors = np.sqrt(np.mean(squares, axis=0))
+    squares = squared_errors([m.residuals for m in usable], noise)
+    draws = squares.draws(rng)
+    errors = np.sqrt(squares.mean)
     best = float(np.min(errors))
     inexact = (VERDICT.model_error * max(best - 1.0, 0.0) + VERDICT.inexact * gap) / best
     tolerance = np.hypot(VERDICT.tie, inexact)
     # Far above the floor no model is exact, and a small difference does not indicate the true one.
     fine = VERDICT.inexact + VERDICT.model_error * max(best - VERDICT.at_floor, 0.0) / best
-    resampled = np.sqrt(means)
+    resampled = np.sqrt(squares.resampled(draws))
     floor = np.min(resampled, axis=1, keepdims=True)
     n_free = np.array([m.n_free for m in usable])
     prior = VERDICT.prior_per_effect ** np.array(
@@ -161,13 +160,13 @@ def rank(
     )
 
 
-def _error_of_choice(
-    squares: NDArray[np.float64], draws: NDArray[np.int64], winners: NDArray[np.int64]
-) -> float:
+def _error_of_choice(squares: Blocks, draws: NDArray[np.int64], winners: NDArray[np.int64]) -> float:
     """Return the error of each resampling's winner on the blocks that are not in it, root mean square."""
-    left_out = np.ones((draws.shape[0], squares.shape[0]), dtype=bool)
+    left_out = np.ones(draws.shape, dtype=bool)
     np.put_along_axis(left_out, draws, values=False, axis=1)
-    return float(np.sqrt(np.mean(squares[:, winners].T[left_out]))) if left_out.any() else math.nan
+    if not left_out.any():
+        return math.nan
+    return float(np.sqrt(np.average(squares.means[:, winners].T, weights=left_out * squares.sizes)))
 
 
 def _evidence_of(
@@ -226,11 +225,6 @@ def _unidentifiable_sensor_effect(model: Scored) -> bool:
     """Return True for a linear effect of the sensor of a rig with one output: it is equivalent to one of the drive."""
     one_output = len(model.fit.structure.rig.outputs) == 1
     return one_output and any(effect.place is Place.SENSOR and is_linear(effect) for effect in model.effects)
-
-
-def _blocks(model: Scored, noise: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean squared weighted residual of blocks long enough to be independent, shape (n_blocks,)."""
-    return block_means([np.nanmean((residual / noise) ** 2, axis=1) for residual in model.residuals])
 
 
 def noise_vector(outputs: Sequence[str], noise: Mapping[str, float]) -> NDArray[np.float64]:
