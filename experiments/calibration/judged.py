@@ -2,6 +2,7 @@
 
     .venv/bin/python experiments/calibration/judged.py BENCH... --state 40f2704    # adds trials to judged/40f2704.jsonl
     .venv/bin/python experiments/calibration/judged.py --state 40f2704             # prints the scores of all of them
+    .venv/bin/python experiments/calibration/judged.py --state 40f2704 edb9015     # of two states together
 
 A line of a file has of a trial what its scores depend on: the key without the numbers of the rig, and of the diagnosis verdict,
 ranking and errors. A calibration changes neither, so it may be trained while the trials that judge it run. All lines of a file
@@ -47,19 +48,24 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("bench", type=Path, nargs="*")
-    parser.add_argument("--state", required=True, help="commit of the code that ran the trials")
+    parser.add_argument("--state", required=True, nargs="+", help="commit of the code that ran the trials")
     given = parser.parse_args()
-    file = FOLDER / f"{given.state}.jsonl"
-    lines = read_lines(file) if file.exists() else []
+    files = [FOLDER / f"{state}.jsonl" for state in given.state]
+    lines = [line for file in files if file.exists() for line in read_lines(file)]
     if given.bench:
+        if len(files) > 1:
+            parser.error(f"benches are of one state, got {' '.join(given.state)}.")
+        (file,) = files
         lines = with_benches(lines, given.bench)
         file.write_text("".join(f"{json.dumps(line)}\n" for line in lines), encoding="utf-8")
         print(f"{len(lines)} trials in {file}.")
-    elif lines:
+    elif all(file.exists() for file in files):
         print(tables([scored(line, trained()) for line in lines]))
     else:
         known = ", ".join(sorted(path.stem for path in FOLDER.glob("*.jsonl")))
-        sys.exit(f"There are no trials of state {given.state}: name benches to add, or one of {known}.")
+        sys.exit(
+            f"There are no trials of {' or '.join(given.state)}: name benches to add, or states of {known}."
+        )
 
 
 def with_benches(known: Sequence[Line], benches: Sequence[Path]) -> list[Line]:
