@@ -47,7 +47,7 @@ TOLERANCES = {
     "LOOK_ACCURACY": "of an integration",
     "_TURNS": "draws of a test",
     "_PORTIONS": "memory",
-    "RESAMPLES": "draws of a bootstrap",
+    "_RESAMPLES": "draws of a bootstrap",
     "_MIN_BLOCKS": "draws of a bootstrap",
     "_FREE_MODES": "order of a subspace",
     "_MAX_HANKEL_ROWS": "memory",

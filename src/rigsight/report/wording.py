@@ -87,6 +87,11 @@ def _leaves_more(diagnosis: Diagnosis) -> bool:
     return diagnosis.adequate is False and (left is None or left.share > 0.0)
 
 
+def after_label(diagnosis: Diagnosis) -> str:
+    """Return what the simulation after the diagnosis is called in tables and legends."""
+    return list(stage_names(diagnosis).values())[0 if diagnosis.verdict == "none" else -1]
+
+
 def is_given(diagnosis: Diagnosis) -> bool:
     """Return whether a simulation was given at all; where none was, the first two stages are one and the same."""
     pairs: list[tuple[ArrayLike, ArrayLike]] = [

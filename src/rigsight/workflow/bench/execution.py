@@ -145,13 +145,16 @@ def _only_fatal_messages() -> Iterator[None]:
 
     Dask sets its levels when it is imported, so this must be called after the import.
     """
-    logger = logging.getLogger("distributed.client")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
+    # The level of the first is that of all loggers of Dask without one of their own; the client has one.
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        logger.setLevel(before)
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
 
 
 def _connected(address: str) -> Any:
