@@ -29,3 +29,12 @@ def test_a_state_of_a_vanished_effect_may_be_given() -> None:
     start = {"actuator_lag.u_a": 1.0, "x": 1e-3}
     plain = rs.simulate_model(rs.make_model("axis", AXIS), pushed, {"x": 1e-3})
     np.testing.assert_array_equal(rs.simulate_model(quick, pushed, start)["x"], plain["x"])
+
+
+def test_an_input_in_another_unit_is_converted_with_a_note() -> None:
+    model = rs.make_model("element", {"d": 20.0, "k": 3e3, "force_off": 0.0})
+    in_meters = rs.Record("pulled", 0.01, {"x": 5e-3 * np.sin(9.0 * T)}, {"x": "m"})
+    in_millimeters = rs.Record("pulled", 0.01, {"x": 5.0 * np.sin(9.0 * T)}, {"x": "mm"})
+    simulated = rs.simulate_model(model, in_millimeters)
+    np.testing.assert_allclose(simulated["force"], rs.simulate_model(model, in_meters)["force"], rtol=1e-12)
+    assert any("converted from mm" in note for note in simulated.notes)

@@ -23,6 +23,7 @@ from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.given_simulation import checked_numbers
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
+from rigsight.workflow.campaign.units_of_record import in_units_of
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.run.results import check_target, write_together
 
@@ -124,7 +125,7 @@ def simulate_model(
         The model.
     record
         Its inputs are simulated, with its hold and its own constants; its outputs are read only where initial states are
-        estimated.
+        estimated. Signals in other units than those of the rig are converted, with a note.
     initial_state
         States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
         input sample; ``"estimated"`` fits all of them to the outputs measured in the record, and nothing else.
@@ -136,7 +137,8 @@ def simulate_model(
     Raises
     ------
     InputError
-        If the record lacks an input, an initial state is unknown, or states cannot be estimated from the record.
+        If the record lacks an input, the unit of a signal is unknown or measures something else, an initial state is unknown, or
+        states cannot be estimated from the record.
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
 
@@ -151,6 +153,7 @@ def simulate_model(
     >>> print(f"{1e3 * moved['x'][-1]:.2f} mm at rest")
     5.00 mm at rest
     """
+    record = in_units_of(model.structure.rig, record)
     state = None
     if initial_state == "estimated":
         state = _estimated_state(model, record)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import get_args
 
 from rigsight.campaign import Campaign
@@ -11,7 +10,6 @@ from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import ParameterSet
 from rigsight.records import Hold, Record
-from rigsight.records.channel_units import UnknownUnitError, conversion, has_si
 from rigsight.records.plausibility import is_constant
 from rigsight.rigs import RIGS, Rig, rig_of_tables
 from rigsight.simulate import compose
@@ -20,6 +18,7 @@ from rigsight.workflow.campaign.campaign_file import Offsets
 from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation
 from rigsight.workflow.campaign.read_campaign import of_first_record
 from rigsight.workflow.campaign.record_notes import record_notes
+from rigsight.workflow.campaign.units_of_record import in_units_of
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_names import effects_on
 
@@ -207,33 +206,4 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
     checked_numbers(
         Where(f"{called}: record '{record.name}'"), ("constants",), rig, rig.constants, record.constants
     )
-    return _in_units_of(rig, record)
-
-
-def _in_units_of(rig: Rig, record: Record) -> Record:
-    units, signals, notes = dict(record.units), dict(record.signals), list(record.notes)
-    amplitude = record.amplitude
-    for signal in (*rig.inputs, *rig.outputs):
-        stated = record.units.get(signal.name, "")
-        if signal.name not in record or (stated and not has_si(signal.unit)):
-            continue
-        units[signal.name] = signal.unit
-        if not stated or stated == signal.unit or {stated, signal.unit} == {"", "1"}:
-            continue
-        try:
-            scale, offset = conversion(stated, signal.unit)
-        except UnknownUnitError as error:
-            raise InputError(
-                f"Record '{record.name}': the unit '{stated}' of {signal.name} {error}; {signal.name} is in {signal.unit}. Give "
-                f'the right unit, or units = {{"{signal.name}": "{signal.unit}"}} to take the values without conversion.'
-            ) from None
-        if (scale, offset) == (1.0, 0.0):
-            continue
-        signals[signal.name] = scale * record[signal.name] + offset
-        added = f"; {offset:.6g} {signal.unit} was added, as for an absolute temperature" if offset else ""
-        notes.append(
-            f"Record '{record.name}': {signal.name} was converted from {stated}, the unit of the record, to {signal.unit}{added}."
-        )
-        if amplitude is not None and [source.name for source in rig.inputs] == [signal.name]:
-            amplitude *= scale
-    return replace(record, units=units, signals=signals, notes=tuple(notes), amplitude=amplitude)
+    return in_units_of(rig, record)
