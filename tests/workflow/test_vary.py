@@ -63,7 +63,7 @@ def test_a_sweep_that_does_not_move_the_rig_is_told(
         content.update(effects=[effect], effect_parameters=values, units={})
 
     (variation,) = run_vary(write_model(held), ["d"], steps=2)
-    assert [variant.features["static_gain"] for variant in variation.variants] == [0.0, 0.0]
+    assert [variant.features["lowest_gain"] for variant in variation.variants] == [0.0, 0.0]
     assert "does not move 'x'; give a larger amplitude" in table_text(variation)
 
 

@@ -232,7 +232,7 @@ def _variant(
     if not np.any(moved):
         still = f"The sweep does not move '{ratio.response}'; give a larger amplitude with --amplitude."
         none = ("peak_omega", "peak_magnitude", "break_frequency", "fitted_break_frequency")
-        return Variant(value, response, {"static_gain": 0.0, **dict.fromkeys(none)}, still)
+        return Variant(value, response, {"lowest_gain": 0.0, **dict.fromkeys(none)}, still)
     top = peak(response)
     notes = [] if top.is_resonance else ["The magnitude has no peak inside the band."]
     features: dict[str, float | None] = {
