@@ -38,7 +38,7 @@ class BlindSummary:
         """Yield the figures, the reliability and the wrong trials."""
         content = self.content
         yield Text(
-            f"Blind bench: {content['n_trials']} trials ({bench_text(content)})",
+            f"Blind bench: {content['n_trials']} trial{'' if content['n_trials'] == 1 else 's'} ({bench_text(content)})",
             "bold",
         )
         table = Table.grid(padding=(0, 2))
