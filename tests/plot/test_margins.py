@@ -112,3 +112,13 @@ def test_a_figure_can_be_written_twice_and_stays_laid_out() -> None:
     first = plot.svg_text(figure, "a")
     assert figure.get_layout_engine() is not None
     assert plot.svg_text(figure, "a") == first
+
+
+def test_the_phase_of_a_model_that_is_far_off_is_seen() -> None:
+    measured = response(1.0)
+    flat = FrequencyResponse(measured.omega, np.full(60, 1.0 + 0.0j), "u", "psi", "rad/input")
+    panel = plot.ResponsesPanel("u to psi", flat, {"model": measured})
+    (_, bottom) = plot.model_responses([panel], plot.model_styles(["model"])).axes
+    low, high = bottom.get_ylim()
+    assert low < np.degrees(np.min(measured.phase))
+    assert high > 0.0

@@ -147,15 +147,16 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
             band = {"color": MEASURED, "alpha": 0.25, "linewidth": 0}
             top.fill_between(measured.omega, decibel(size - reach), decibel(size + reach), **band)
             bottom.fill_between(measured.omega, phase - turn, phase + turn, **band)
-        shown = [measured.magnitude_db]
+        shown, turns = [measured.magnitude_db], [phase]
         for name, response in panel.simulated.items():
             curve = thinned(response)
             top.plot(curve.omega, curve.magnitude_db, label=name, linewidth=1.3, **styles[name])
-            own = curve.phase_next_to(measured.omega, measured.phase)
-            bottom.plot(curve.omega, np.degrees(own), linewidth=1.3, **styles[name])
+            own = np.degrees(curve.phase_next_to(measured.omega, measured.phase))
+            bottom.plot(curve.omega, own, linewidth=1.3, **styles[name])
             shown.append(curve.magnitude_db)
+            turns.append(own)
         limit(top, np.concatenate(shown))
-        low, high = np.percentile(phase, [1.0, 99.0])
+        low, high = np.percentile(np.concatenate(turns), [1.0, 99.0])
         bottom.set_ylim(45.0 * np.floor(low / 45.0) - 20.0, 45.0 * np.ceil(high / 45.0) + 20.0)
         log_axis(bottom, [measured])
         top.set_title(panel.title)

@@ -133,7 +133,7 @@ def response_drawing(
         above.append(Line(curve.omega, curve.magnitude_db, color, 1.3, dashes, label=stages[stage]))
         turned = np.degrees(curve.phase_next_to(omega, measured.phase))
         below.append(Line(curve.omega, turned, color, 1.3, dashes))
-    low, high = np.percentile(phase, [1.0, 99.0])
+    low, high = np.percentile(np.concatenate([line.y for line in below]), [1.0, 99.0])
     turns = (45.0 * math.floor(low / 45.0) - 20.0, 45.0 * math.ceil(high / 45.0) + 20.0)
     in_size, in_phase = _bands(measured, phase)
     panels = [
