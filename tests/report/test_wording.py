@@ -115,6 +115,8 @@ def test_nearly_all_is_not_rounded_to_all() -> None:
         (2.5, float("inf"), Written("2.5", "", 0)),
         (2.5, 0.0, Written("2.5", "", 0)),
         (float("nan"), 1.0, Written("not finite", "", 0)),
+        (-0.0, 0.0, Written("0", "", 0)),
+        (-1e-3, 0.5, Written("0.00", "0.50", 0)),
     ],
 )
 def test_only_digits_that_the_records_support(value: float, std: float, expected: Written) -> None:

@@ -47,10 +47,10 @@ def written(value: float, std: float | None = None) -> Written:
     exponent = power if power >= 5 or power <= -4 else 0
     scale = 10.0**-exponent
     if not known or std is None:
-        return Written(f"{value * scale:.4g}", "", exponent)
+        return Written(f"{value * scale:z.4g}", "", exponent)
     # At most ten digits: beyond, the standard error says more about the optimizer than about the rig.
     decimals = min(max(0, 1 - math.floor(math.log10(std * scale))), 9)
-    return Written(f"{value * scale:.{decimals}f}", f"{std * scale:.{decimals}f}", exponent)
+    return Written(f"{value * scale:z.{decimals}f}", f"{std * scale:.{decimals}f}", exponent)
 
 
 def written_limits(low: float, high: float, std: float) -> tuple[Written, Written]:
@@ -60,7 +60,7 @@ def written_limits(low: float, high: float, std: float) -> tuple[Written, Writte
     exponent = power if power >= 5 or power <= -4 else 0
     scale = 10.0**-exponent
     decimals = min(max(0, 1 - math.floor(math.log10(std * scale))), 9)
-    first, last = (Written(f"{limit * scale:.{decimals}f}", "", exponent) for limit in (low, high))
+    first, last = (Written(f"{limit * scale:z.{decimals}f}", "", exponent) for limit in (low, high))
     return first, last
 
 
