@@ -19,6 +19,7 @@ _UNIT = r"[A-Za-zµμΩ°%]+(?:(?:\^|\*\*)?-?[1-4])?"
 _PRODUCT = re.compile(rf"{_UNIT}(?:\s*[*/·.⋅ ]\s*{_UNIT}){{0,5}}")
 _LONGEST = 40
 _ROUNDING = 1e-9
+"""Relative error up to which a conversion counts as linear."""
 _POWERS = str.maketrans({"²": "^2", "³": "^3", "⁻": "-", "¹": "1", "μ": "µ", "⋅": "*", "·": "*"})
 # As loggers write them; pint would not know these, or take Nm for something else.
 _USUAL = {

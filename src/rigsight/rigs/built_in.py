@@ -105,12 +105,12 @@ def is_built_in_motion(rig: Rig) -> bool:
 
 
 def has_built_in_parameters(rig: Rig) -> bool:
-    """Return True if a rig has the equations of a built-in one of one motion, and the same numbers of them are to be identified.
+    """Return True if a rig has the equations and the parameters of a built-in one of one motion.
 
     Parameters
     ----------
     rig
-        The rig. A number that is a parameter of the built-in one may be a constant of this one.
+        The rig; from a file it may have the same equations with a known mass among its constants.
     """
     names = {parameter.name for parameter in rig.parameters}
     return any(
