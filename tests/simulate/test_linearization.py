@@ -198,6 +198,14 @@ def test_what_nothing_holds_drifts_and_does_not_rest_under_a_force() -> None:
     assert np.isnan(pushed.damping_ratios[0])
 
 
+def test_a_rig_without_a_damper_is_undamped_and_does_not_drift() -> None:
+    axis = {"gain": 1.0, "m": 1.0, "d": 0.0, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+    found = linearize(compose(RIGS["axis"]), axis)
+    assert found.stability == "undamped"
+    np.testing.assert_allclose(np.sort(found.poles.imag), [-10.0, 10.0])
+    assert linearize(compose(RIGS["axis"]), {**axis, "d": 1.0}).stability == "stable"
+
+
 def test_a_pendulum_that_stands_falls() -> None:
     structure = compose(RIGS["cart_pendulum"])
     standing = linearize(structure, PENDULUM, state=np.array([0.0, np.pi, 0.0, 0.0]))

@@ -26,6 +26,7 @@ _TWO_SIDED = 1.96
 _STABLE = {
     "stable": "stable",
     "drifts": "stable except for free rigid-body motion",
+    "undamped": "not damped in all of its motions",
     "unstable": "unstable",
 }
 

@@ -21,7 +21,7 @@ from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.simulation import parameter_vector
 
 Floats = NDArray[np.float64]
-Stability = Literal["stable", "drifts", "unstable"]
+Stability = Literal["stable", "drifts", "undamped", "unstable"]
 
 _ROUNDED = 1e-7
 """Distance of two roots, over the largest pole, that may be rounding error: double roots are accurate to the root of 1e-16."""
@@ -85,11 +85,16 @@ class Linearization:
 
     @property
     def stability(self) -> Stability:
-        """Stability from the poles; ``"drifts"`` if a pole is on the imaginary axis, so that the rig does not return."""
-        furthest = float(np.max(self.poles.real, initial=-np.inf))
-        if furthest > self._rounding:
+        """Stability from the poles.
+
+        ``"drifts"`` if a pole is zero, so that the rig does not return; ``"undamped"`` if others are on the imaginary axis.
+        """
+        if np.any(self.poles.real > self._rounding):
             return "unstable"
-        return "stable" if furthest < -self._rounding or not self.poles.size else "drifts"
+        on_axis = self.poles[self.poles.real >= -self._rounding]
+        if not on_axis.size:
+            return "stable"
+        return "undamped" if np.any(np.abs(on_axis) > self._rounding) else "drifts"
 
     @property
     def _rounding(self) -> float:
