@@ -20,7 +20,7 @@ from rigsight.blind import Outcome, ParameterError, Trial, WithheldError, draw_t
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
-from rigsight.rigs import AXIS
+from rigsight.rigs import AXIS, Rig, read_rig_file
 from rigsight.simulate import compose, simulate
 
 # Timings decide no test: on a busy machine an example may take any time.
@@ -219,3 +219,22 @@ def wrong_outcome(outcome_like: Callable[..., Outcome]) -> Callable[..., Outcome
         return outcome_like(**(content | changes))
 
     return like
+
+
+@pytest.fixture
+def mass_on_spring(tmp_path: Path) -> Callable[..., Rig]:
+    """Make a rig of one mass on a spring, driven by a force, whose joint is written as asked."""
+
+    def make(units: dict[str, str], **joint: str) -> Rig:
+        lines = [
+            'name = "stage"', 'summary = "A mass on a spring."', 'inputs.u.unit = "N"', 'parameters.m.unit = "kg"',
+            *(f'parameters.{name}.unit = "{unit}"' for name, unit in units.items()),
+            'coordinates.x.unit = "m"', 'energy.kinetic = "m*d(x)^2/2"', 'joints.spring.motion = "x"',
+            *(f'joints.spring.{key} = "{expression}"' for key, expression in joint.items()),
+            'drives.motor = {signal = "u", force = "motor", along = "x"}', 'sensors.x = {reads = "x", unit = "m"}',
+        ]  # fmt: skip
+        file = tmp_path / "stage.toml"
+        file.write_text("\n".join(lines), encoding="utf-8")
+        return read_rig_file(file)
+
+    return make

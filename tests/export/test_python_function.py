@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 
 from rigsight.export import export_model
 from rigsight.records import Record
-from rigsight.rigs import read_rig_file
+from rigsight.rigs import Rig
 from rigsight.simulate import compose, rest_state
 from rigsight.simulate import simulate as simulate_engine
 from rigsight.simulate.input_hold import hold_input
@@ -112,24 +113,9 @@ def test_an_equilibrium_under_load_is_that_of_the_engine(case_named):
     )
 
 
-def test_a_rig_without_a_damper_starts_where_the_engine_does(tmp_path: Path):
-    path = tmp_path / "stage.toml"
-    path.write_text(
-        """name = "stage"
-summary = "A mass on a spring."
-inputs.u.unit = "N"
-parameters.m.unit = "kg"
-parameters.k.unit = "N/m"
-coordinates.x.unit = "m"
-energy.kinetic = "m*d(x)^2/2"
-joints.spring = {motion = "x", stiffness = "k"}
-drives.motor = {signal = "u", force = "motor", along = "x"}
-sensors.x = {reads = "x", unit = "m"}
-""",
-        encoding="utf-8",
-    )
+def test_a_rig_without_a_damper_starts_where_the_engine_does(mass_on_spring: Callable[..., Rig]):
     values = {"m": 1.0, "k": 100.0}
-    model = Model(compose(read_rig_file(path)), values, "foh")
+    model = Model(compose(mass_on_spring({"k": "N/m"}, stiffness="k")), values, "foh")
     record = Record(name="pulled", dt=0.01, signals={"u": 2.0 + np.sin(np.arange(100.0))}, units={"u": "N"})
     simulated = module_of(export_model(model, "python", source="model.json"))["simulate"](
         0.01 * np.arange(100), record["u"]

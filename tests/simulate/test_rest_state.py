@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from rigsight.effects import effect_named
-from rigsight.rigs import RUNNING_GEAR, read_rig_file
+from rigsight.rigs import RUNNING_GEAR, Rig
 from rigsight.simulate import compose, parameter_vector, record_input, rest_state, simulate
 
 
@@ -76,43 +76,14 @@ def test_a_chain_of_states_starts_from_exactly_zero(make_record):
     np.testing.assert_allclose(psi, near, atol=1e-6 * np.std(psi))
 
 
-STAGE = """
-name = "stage"
-summary = "A mass on a spring with a preload."
-[inputs.u]
-unit = "N"
-[parameters.m]
-unit = "kg"
-[parameters.k]
-unit = "N/m"
-{parameter}
-[parameters.preload]
-unit = "N"
-[coordinates.x]
-unit = "m"
-[energy]
-kinetic = "m*d(x)^2/2"
-[joints.spring]
-motion = "x"
-stiffness = "k"
-force = "preload"
-{damping}
-[drives.motor]
-signal = "u"
-force = "motor"
-along = "x"
-[sensors.x]
-reads = "x"
-unit = "m"
-"""
-
-
-@pytest.mark.parametrize("damping", ["", 'damping = "2*d_0"', 'damping = "d_0"'])
-def test_it_rests_whatever_its_damping_is_written_as(damping: str, tmp_path: Path, make_record):
-    path = tmp_path / "stage.toml"
-    parameter = '[parameters.d_0]\nunit = "N s/m"' if damping else ""
-    path.write_text(STAGE.format(damping=damping, parameter=parameter), encoding="utf-8")
-    structure = compose(read_rig_file(path), [effect_named("coulomb_friction")])
-    values = {"m": 1.0, "k": 100.0, "preload": -3.0, "T_c": 0.5, **({"d_0": 0.5} if damping else {})}
+@pytest.mark.parametrize("damping", ["", "2*d_0", "d_0"])
+def test_it_rests_whatever_its_damping_is_written_as(
+    damping: str, mass_on_spring: Callable[..., Rig], make_record
+):
+    of_damper = ({"d_0": "N s/m"}, {"damping": damping}, {"d_0": 0.5}) if damping else ({}, {}, {})
+    units, joint, numbers = of_damper
+    rig = mass_on_spring({"k": "N/m", "preload": "N", **units}, stiffness="k", force="preload", **joint)
+    structure = compose(rig, [effect_named("coulomb_friction")])
+    values = {"m": 1.0, "k": 100.0, "preload": -3.0, "T_c": 0.5, **numbers}
     simulated = simulate(structure, values, make_record(np.full(100, 2.0)))["x"]
     np.testing.assert_allclose(simulated, 0.045, rtol=1e-6)

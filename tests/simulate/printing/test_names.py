@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
 from rigsight.effects import effect_named
-from rigsight.rigs import AXIS, RUNNING_GEAR, read_rig_file
+from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
 from rigsight.simulate import compose
 from rigsight.simulate.printing.latex import latex_name, latex_text
 from rigsight.simulate.printing.names import ShownName, declared_name, shown_names
@@ -55,22 +55,6 @@ def test_the_displacement_bears_the_name_of_its_column() -> None:
         ]
 
 
-def test_two_names_that_would_be_shown_alike_stay_apart(tmp_path: Path) -> None:
-    path = tmp_path / "two.toml"
-    path.write_text(
-        """name = "two"
-summary = "Two springs."
-inputs.u.unit = "N"
-parameters.m.unit = "kg"
-parameters.k0.unit = "N/m"
-parameters.k_0.unit = "N/m"
-coordinates.x.unit = "m"
-energy.kinetic = "m*d(x)^2/2"
-joints.spring = {motion = "x", stiffness = "k0 - k_0"}
-drives.motor = {signal = "u", force = "motor", along = "x"}
-sensors.x = {reads = "x", unit = "m"}
-""",
-        encoding="utf-8",
-    )
-    names = shown_names(compose(read_rig_file(path)))
-    assert {ShownName("k0"), ShownName("k", ("0",))} <= set(names.values())
+def test_two_names_that_would_be_shown_alike_stay_apart(mass_on_spring: Callable[..., Rig]) -> None:
+    rig = mass_on_spring({"k0": "N/m", "k_0": "N/m"}, stiffness="k0 - k_0")
+    assert {ShownName("k0"), ShownName("k", ("0",))} <= set(shown_names(compose(rig)).values())
