@@ -28,8 +28,8 @@ from rigsight.diagnose.search.several.one_law import split_distinguishable
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.verdict.judgement import Judgement, judge, most_left
 from rigsight.diagnose.verdict.main_cause import main_cause
-from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
-from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank
+from rigsight.diagnose.verdict.plausibility import doubts, plausible_first, without_influence
+from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
 from rigsight.effects import Effect
 from rigsight.identify import FitMemory
 from rigsight.rigs import Rig
@@ -135,18 +135,16 @@ def examine(
     checks = models.checks
     vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)
     ranking, imitations = _ranked(models, effects, vector, allowed, rng)
-    if ranking.order and ranking.order[0].residuals:
-        best, tied = ranking.order[0], ranking.tied
-        judgement = judge(
-            before.error_over_noise,
-            reidentified,
-            best,
-            checks.is_adequate,
-            lambda: main_cause(campaign.rig, reidentified, best, tied, vector, rng),
-            lower_bound,
-        )
-    else:
-        judgement = Judgement("unknown", reidentified, "No candidate could be fitted.")
+    is_usable = bool(ranking.order) and bool(ranking.order[0].residuals) and ranking.probabilities[0] > 0.0
+    best, tied = (ranking.order[0], ranking.tied) if is_usable else (reidentified, ())
+    judgement = judge(
+        before.error_over_noise,
+        reidentified,
+        best,
+        checks.is_adequate,
+        lambda: main_cause(campaign.rig, reidentified, best, tied, vector, rng),
+        lower_bound,
+    )
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
     left = checks.of(judgement.model) if judgement.model.residuals else None
@@ -200,7 +198,8 @@ def _ranked(
     if not models.are_in_windows:
         stand = beyond_disturbance(evidence, singles, models.forms.with_own_evidence(singles, several))
         several = with_parts(stand, several)
-    candidates = [*singles, *several]
+    fitted = [*singles, *several]
+    candidates = [model for model in fitted if not without_influence(model)]
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
     # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.
     counts = likeliest is not None and models.checks.is_adequate(likeliest)
@@ -213,7 +212,7 @@ def _ranked(
             )
         if ranking.order[0].error_over_noise > allowed:
             ranking = plausible_first(ranking, reidentified, _places(context.rig, ranking))
-    return ranking, tuple(imitations)
+    return with_last(ranking, [model for model in fitted if without_influence(model)]), tuple(imitations)
 
 
 def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:

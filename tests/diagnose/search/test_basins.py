@@ -110,7 +110,7 @@ def test_the_best_one_starts_from_the_numbers_of_the_next_too(
         asked[own.names] = starts
         return own
 
-    monkeypatch.setattr(basins, "_lowest", noted)
+    monkeypatch.setattr(basins, "in_lowest_basin", noted)
     in_lowest_basins(bench, [next_one, best])
     (start,) = asked[best.names]
     assert start["k"] == next_one.fit.values["k"] != best.fit.values["k"]

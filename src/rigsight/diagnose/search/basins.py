@@ -51,13 +51,13 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
     def lowest(own: Scored) -> Scored:
         starts = [] if is_explained else _starts(own)
         others = nearest[1:2] if own is leader else [leader]
-        return _lowest(context, own, [*starts, *(_as_in(other, own) for other in others)])
+        return in_lowest_basin(context, own, [*starts, *(values_in(other, own) for other in others)])
 
     found = dict(zip(map(id, nearest), context.threads.side_by_side(lowest, nearest), strict=True))
     return [found.get(id(model), model) for model in models]
 
 
-def _as_in(leader: Scored, model: Scored) -> dict[str, float]:
+def values_in(leader: Scored, model: Scored) -> dict[str, float]:
     """Return the parameters of a model with the values that another one has for those of both.
 
     An effect that is a special case of one of the other's has its parameters, too: a friction those of a friction that also
@@ -74,7 +74,8 @@ def _as_in(leader: Scored, model: Scored) -> dict[str, float]:
     return {**fit.values, **{name: value for name, value in common.items() if name in fit.free}}
 
 
-def _lowest(context: FitContext, model: Scored, starts: Sequence[dict[str, float]]) -> Scored:
+def in_lowest_basin(context: FitContext, model: Scored, starts: Sequence[dict[str, float]]) -> Scored:
+    """Return a model in the lowest minimum that is reached from where it is and from other starts."""
     fit = model.fit
     rough = context.problem(fit.structure, context.estimation, LOOK_ACCURACY)
 
@@ -84,12 +85,12 @@ def _lowest(context: FitContext, model: Scored, starts: Sequence[dict[str, float
     here, *elsewhere = map(roughly, [fit.values, *starts])
     lowest = min([here, *elsewhere], key=lambda found: found.cost)
     # Roughly simulated, so that what looks lower may not be, and conversely: the finished fit decides.
-    if not (_is_lower(lowest, fit) or _is_lower(lowest, here)):
+    if not (is_lower(lowest, fit) or is_lower(lowest, here)):
         return model
     finished = context.problem(fit.structure, context.estimation).fit(
         lowest.values, fit.free, lowest.initial_states, SEARCH.basin_finish_evaluations, _TOLERANCE
     )
-    if not (finished.residuals and _is_lower(finished, fit)):
+    if not (finished.residuals and is_lower(finished, fit)):
         return model
     return context.score(model.effects, finished)
 
@@ -107,6 +108,6 @@ def _starts(model: Scored) -> list[dict[str, float]]:
     ]
 
 
-def _is_lower(one: FitResult, other: FitResult) -> bool:
+def is_lower(one: FitResult, other: FitResult) -> bool:
     """Return True if one cost is significantly lower, in units of its own residual variance."""
     return one.cost + VERDICT.standard_errors**2 * one.cost / max(one.n_samples, 1) < other.cost

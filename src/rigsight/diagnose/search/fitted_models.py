@@ -13,6 +13,7 @@ from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing, leading_output
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.search.nested_models import lowered_by_extensions
 from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
@@ -115,15 +116,42 @@ def single_models(
         raise SimulationError(
             f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
-    bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
-    if bent or not campaign.rig.has_one_motion:
-        # Motion and forces between the sensors are known once the equations fit, or from the given simulation.
-        known = {**campaign.constants, **reidentified.fit.values, **(campaign.given if bent else {})}
-        context = replace(context, scales=characteristic_scales(campaign.rig, campaign.estimation, known))
     say("re-identified")
+    while True:
+        context = _with_known_motion(campaign, context, reidentified)
+        search, singles = _singles(context, reidentified, effects, say, prepare)
+        lowered = lowered_by_extensions(context, reidentified, singles)
+        if lowered is reidentified:
+            break
+        # What was compared with a local minimum of the equations was compared with a gap that does not exist.
+        reidentified = lowered
+        say("re-identified from a candidate")
     before = _before(campaign, context, reidentified)
     if campaign.given:
         say("given simulation")
+    return SingleModels(windowing, context, before, reidentified, singles, search)
+
+
+def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: Scored) -> FitContext:
+    """Return the context with scales from the motion and the forces between the sensors.
+
+    These are known once the equations fit, or from the given simulation.
+    """
+    bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
+    if not bent and campaign.rig.has_one_motion:
+        return context
+    known = {**campaign.constants, **reidentified.fit.values, **(campaign.given if bent else {})}
+    return replace(context, scales=characteristic_scales(campaign.rig, campaign.estimation, known))
+
+
+def _singles(
+    context: FitContext,
+    reidentified: Scored,
+    effects: Sequence[Effect],
+    say: Callable[[str], None],
+    prepare: Prepare | None,
+) -> tuple[Search, list[Scored]]:
+    """Return where was searched, and every effect by itself."""
     search = search_places(context, reidentified, context.offered(effects))
     say("suspects")
     if prepare is not None:
@@ -137,7 +165,7 @@ def single_models(
         if prepare is not None:
             prepare([context.simplest((effect,)) for effect in search.others])
         singles = fit_candidates(context, reidentified, search.others, say, singles)
-    return SingleModels(windowing, context, before, reidentified, singles, search)
+    return search, singles
 
 
 def with_several_effects(

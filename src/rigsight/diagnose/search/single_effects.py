@@ -22,13 +22,13 @@ from rigsight.diagnose.search.first_look import (
     mean_square,
     widened,
 )
+from rigsight.diagnose.search.nested_models import at_least_as_good, ordered_by_inclusion
 from rigsight.diagnose.search.same_equation import without_repeated_equations
-from rigsight.diagnose.search.starts import restart_values, sized, start_values
+from rigsight.diagnose.search.starts import restart_values
 from rigsight.effects import Effect
-from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
+from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult, off_bounds
 from rigsight.simulate import Structure
 
-_FAINT = 1e-3
 _ROUGH_TOLERANCE = 1e-4
 _HOPELESS_TOLERANCE = 1e-2
 
@@ -37,13 +37,17 @@ def reidentify(context: FitContext, start: Mapping[str, float]) -> Scored:
     """Re-identify the equations without an effect.
 
     Starts from the parameters of a regression, or from those of the given simulation if the rig cannot be simulated with the
-    former: the regression does not determine all parameters if no sensor reads a coordinate.
+    former: the regression does not determine all parameters if no sensor reads a coordinate. Where parameters start at a bound,
+    such as a friction given as zero, also from inside of it.
     """
     structure = context.composed()
     problem, free = context.problem(structure, context.estimation), context.free_parameters(structure)
     fit = problem.fit(start, free)
     if not fit.residuals and context.given:
         fit = problem.fit({**start, **context.given}, free)
+    inside = off_bounds(structure, start, free, context.scales)
+    if inside is not None:
+        fit = min(fit, problem.fit(inside, free), key=lambda found: found.cost)
     return context.score((), fit)
 
 
@@ -82,32 +86,14 @@ def fit_candidates(
         found = wide.get(found.newest, found)
         promising = found.newest in wide and found.cost <= SEARCH.promising * lowest
         scored = followed(context, found, promising)
-        if scored.fit.cost > (1.0 + SEARCH.worth_restarting) * reidentified.fit.cost:
-            scored = min(
-                scored, _from_hardly_any(context, found, reidentified.fit), key=lambda model: model.fit.cost
-            )
+        scored = at_least_as_good(context, scored, reidentified)
         if progress is not None:
             progress(found.newest)
         return scored
 
     models = list(context.threads.side_by_side(one, looks))
     refined = in_lowest_basins(context, refine(context, [*known, *models]))
-    return without_repeated_equations(context, refined)
-
-
-def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> Scored:
-    """Fit a candidate from nearly zero effect, where its equations equal those of the base, so that it cannot end worse."""
-    structure, (effect,) = look.structure, look.effects
-    start = next(start_values(context, structure, effect, base, {}))
-    faint = {
-        (name := structure.parameter_name(effect, p.name)): sized(start[name], p.null, _FAINT)
-        for p in effect.parameters
-        if p.null is not None
-    }
-    # A constant force that is held at its known value stays there.
-    known = context.constant_forces_beside(look.effects)
-    begin = replace(base, values={**start, **base.values, **faint, **known})
-    return _fitted(context, look.effects, structure, look.free, (begin,), promising=False)
+    return without_repeated_equations(context, ordered_by_inclusion(context, reidentified, refined))
 
 
 def _looks(

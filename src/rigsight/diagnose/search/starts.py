@@ -18,7 +18,7 @@ from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value
 
-_ENDLESS = 1e100
+ENDLESS = 1e100
 """Null values from here on stand for infinity."""
 
 
@@ -137,7 +137,7 @@ def sized(value: float, null: float, factor: float) -> float:
     factor
         Not zero; a negative one reverses the effect.
     """
-    return null + factor * (value - null) if abs(null) < _ENDLESS else value / factor
+    return null + factor * (value - null) if abs(null) < ENDLESS else value / factor
 
 
 def _known(origin: FitResult, parent: str | None) -> dict[str, float]:

@@ -184,4 +184,4 @@ def _logistic(coefficients: Mapping[str, float], figures: Mapping[str, float]) -
 
 def _in_proportion(total: float, shares: Sequence[float]) -> list[float]:
     whole = math.fsum(shares)
-    return [total * share / whole if whole > 0.0 else total / len(shares) for share in shares]
+    return [total * share / whole if whole > 0.0 else 0.0 for share in shares]

@@ -7,10 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2, norm
 
 from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.diagnose.policy import NOTES, VERDICT
+from rigsight.diagnose.search.starts import ENDLESS
 from rigsight.diagnose.verdict.ranking import Ranking
+from rigsight.effects import Effect
 
 _AT_BOUND = 1e-6
 """Distance from a bound of the search, relative to it, that counts as standing there."""
@@ -66,6 +69,35 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
         if name not in own and declared.lower == 0.0 and value < 0.0:
             found.append(Doubt(f"{name} = {value:.3g} is negative.", False))
     return tuple(found)
+
+
+def without_influence(model: Scored) -> bool:
+    """Return True if the size of one of the effects of a model does not differ from zero.
+
+    Sizes are the parameters with a null value, tested together by Wald's chi square; an infinite null value is compared in the
+    reciprocal. Such a model equals the one without that effect, and cannot name it.
+    """
+    return any(_size_is_zero(model, effect) for effect in model.effects)
+
+
+def _size_is_zero(model: Scored, effect: Effect) -> bool:
+    fit = model.fit
+    sizes = {
+        name: value - p.null if abs(p.null) < ENDLESS else value
+        for p in effect.parameters
+        if p.null is not None
+        if (name := fit.structure.parameter_name(effect, p.name)) in fit.free
+        for value in [fit.values[name]]
+    }
+    if not sizes:
+        return False
+    known = [name for name in sizes if 0.0 < fit.standard_errors[name] < math.inf]
+    if not known:
+        return all(fit.standard_errors[name] == math.inf or not sizes[name] for name in sizes)
+    at = [fit.free.index(name) for name in known]
+    distance = np.array([sizes[name] for name in known])
+    square = distance @ np.linalg.pinv(fit.covariance[np.ix_(at, at)], hermitian=True) @ distance
+    return bool(chi2.sf(square, len(known)) > 2.0 * norm.sf(VERDICT.standard_errors))
 
 
 def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str, str]) -> Ranking:

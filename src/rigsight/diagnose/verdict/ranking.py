@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,9 +98,7 @@ def rank(
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     failed = [m for m in models if m not in usable]
     if not usable:
-        return Ranking(
-            tuple(models), tuple(0.0 for _ in models), (), tuple(Grounds(0.0, 0.0, None) for _ in models)
-        )
+        return with_last(Ranking((), (), (), ()), models)
     squares = squared_errors([m.residuals for m in usable], noise)
     draws = squares.draws(rng)
     errors = np.sqrt(squares.mean)
@@ -148,15 +146,23 @@ def rank(
     ]
     rest = sorted((i for i in range(len(usable)) if i != chosen), key=lambda i: errors[i])
     order = [chosen, *rest]
-    return Ranking(
-        order=(*(usable[i] for i in order), *failed),
-        probabilities=(*(float(probabilities[i]) for i in order), *(0.0 for _ in failed)),
+    ranking = Ranking(
+        order=tuple(usable[i] for i in order),
+        probabilities=tuple(float(probabilities[i]) for i in order),
         tied=tuple(usable[i] for i in sorted(tied, key=lambda i: errors[i])),
-        grounds=(
-            *(Grounds(float(probabilities[i]), float(wins[i]), evidence[i]) for i in order),
-            *(Grounds(0.0, 0.0, None) for _ in failed),
-        ),
+        grounds=tuple(Grounds(float(probabilities[i]), float(wins[i]), evidence[i]) for i in order),
         error_of_choice=_error_of_choice(squares, draws, np.argmax(won, axis=1)),
+    )
+    return with_last(ranking, failed)
+
+
+def with_last(ranking: Ranking, models: Sequence[Scored]) -> Ranking:
+    """Return a ranking with models at its end that cannot be the cause."""
+    return replace(
+        ranking,
+        order=(*ranking.order, *models),
+        probabilities=(*ranking.probabilities, *(0.0 for _ in models)),
+        grounds=(*ranking.grounds, *(Grounds(0.0, 0.0, None) for _ in models)),
     )
 
 
