@@ -28,7 +28,7 @@ from rigsight.diagnose.search.several.one_law import split_distinguishable
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.verdict.judgement import Judgement, judge, most_left
 from rigsight.diagnose.verdict.main_cause import main_cause
-from rigsight.diagnose.verdict.plausibility import doubts, plausible_first, without_influence
+from rigsight.diagnose.verdict.plausibility import doubts, has_size_of_zero, plausible_first
 from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
 from rigsight.effects import Effect
 from rigsight.identify import FitMemory
@@ -199,7 +199,9 @@ def _ranked(
         stand = beyond_disturbance(evidence, singles, models.forms.with_own_evidence(singles, several))
         several = with_parts(stand, several)
     fitted = [*singles, *several]
-    candidates = [model for model in fitted if not without_influence(model)]
+    candidates, of_no_size = [], []
+    for model in fitted:
+        (of_no_size if has_size_of_zero(model, [reidentified, *fitted]) else candidates).append(model)
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
     # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.
     counts = likeliest is not None and models.checks.is_adequate(likeliest)
@@ -212,7 +214,7 @@ def _ranked(
             )
         if ranking.order[0].error_over_noise > allowed:
             ranking = plausible_first(ranking, reidentified, _places(context.rig, ranking))
-    return with_last(ranking, [model for model in fitted if without_influence(model)]), tuple(imitations)
+    return with_last(ranking, of_no_size), tuple(imitations)
 
 
 def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:

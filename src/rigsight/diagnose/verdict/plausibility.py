@@ -11,6 +11,7 @@ from scipy.stats import chi2, norm
 
 from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.diagnose.policy import NOTES, VERDICT
+from rigsight.diagnose.search.basins import is_lower
 from rigsight.diagnose.search.starts import ENDLESS
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.effects import Effect
@@ -71,33 +72,42 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
     return tuple(found)
 
 
-def without_influence(model: Scored) -> bool:
-    """Return True if the size of one of the effects of a model does not differ from zero.
+def has_size_of_zero(model: Scored, others: Sequence[Scored]) -> bool:
+    """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named.
 
-    Sizes are the parameters with a null value, tested together by Wald's chi square; an infinite null value is compared in the
-    reciprocal. Such a model equals the one without that effect, and cannot name it.
+    It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
+    of that, tested together by Wald's chi square. Where these are determined only with others, the former decides alone.
+
+    Parameters
+    ----------
+    model
+        Fitted and scored.
+    others
+        Models among which are those without one of its effects.
     """
-    return any(_size_is_zero(model, effect) for effect in model.effects)
+    fits = {frozenset(other.names): other.fit for other in others}
+
+    def is_zero(effect: Effect) -> bool:
+        without = fits.get(frozenset(model.names) - {effect.name})
+        return (without is not None and not is_lower(model.fit, without)) or _is_within_errors(model, effect)
+
+    return any(map(is_zero, model.effects))
 
 
-def _size_is_zero(model: Scored, effect: Effect) -> bool:
+def _is_within_errors(model: Scored, effect: Effect) -> bool:
+    """Return True if the size of an effect is determined and does not differ from zero, an infinite one in the reciprocal."""
     fit = model.fit
     sizes = {
-        name: value - p.null if abs(p.null) < ENDLESS else value
+        name: fit.values[name] - (p.null if abs(p.null) < ENDLESS else 0.0)
         for p in effect.parameters
-        if p.null is not None
-        if (name := fit.structure.parameter_name(effect, p.name)) in fit.free
-        for value in [fit.values[name]]
+        if p.null is not None and (name := fit.structure.parameter_name(effect, p.name)) in fit.free
     }
-    if not sizes:
+    if not sizes or not all(0.0 < fit.standard_errors[name] < math.inf for name in sizes):
         return False
-    known = [name for name in sizes if 0.0 < fit.standard_errors[name] < math.inf]
-    if not known:
-        return all(fit.standard_errors[name] == math.inf or not sizes[name] for name in sizes)
-    at = [fit.free.index(name) for name in known]
-    distance = np.array([sizes[name] for name in known])
+    at = [fit.free.index(name) for name in sizes]
+    distance = np.array(list(sizes.values()))
     square = distance @ np.linalg.pinv(fit.covariance[np.ix_(at, at)], hermitian=True) @ distance
-    return bool(chi2.sf(square, len(known)) > 2.0 * norm.sf(VERDICT.standard_errors))
+    return bool(chi2.sf(square, len(sizes)) > 2.0 * norm.sf(VERDICT.standard_errors))
 
 
 def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str, str]) -> Ranking:
