@@ -199,7 +199,8 @@ def _ranked(
         stand = beyond_disturbance(evidence, singles, models.forms.with_own_evidence(singles, several))
         several = with_parts(stand, several)
     fitted = [*singles, *several]
-    candidates, of_no_size = [], []
+    candidates: list[Scored] = []
+    of_no_size: list[Scored] = []
     for model in fitted:
         (of_no_size if has_size_of_zero(model, [reidentified, *fitted]) else candidates).append(model)
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
