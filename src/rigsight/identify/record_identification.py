@@ -222,7 +222,7 @@ def _fit(seen: RecordResponse, order: Order, of_rate: bool, options: EstimationO
     )
     assert response is not None
     fitted = plain or response
-    fit = fit_frequency_response(fitted, order, magnitude_only=by_magnitude)
+    fit = seen.fit or fit_frequency_response(fitted, order, magnitude_only=by_magnitude)
     factor = 1.0 if plain is not None or response.noise_shares is not None else seen.lines_per_value
     if fit.misfit > MISFIT and order == "pt2" and not by_magnitude:
         longest = _LONGEST_DELAY / float(response.omega[np.argmax(response.magnitude)])

@@ -21,6 +21,7 @@ from rigsight.frequency import (
 )
 from rigsight.frequency.signal_pair import excited, line_frequencies
 from rigsight.identify.transfer.relative_fit import fit_with_relative_error
+from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.records.periods import mean_period
@@ -71,6 +72,8 @@ class RecordResponse:
     plain
         The plain ratio of the spectra in the band in which it exceeds its uncertainty, for a fit of a form with the free motion
         of the record; None if the form of that is unknown, or whole periods were averaged, or an instrument was used.
+    fit
+        The fit of the form of `order` to it; None if there is none.
     """
 
     response: FrequencyResponse
@@ -80,6 +83,7 @@ class RecordResponse:
     coherence: FrequencyResponse | None
     unused_instrument: str = ""
     plain: PlainRatio | None = None
+    fit: TransferFit | None = None
 
 
 def record_response(
@@ -146,7 +150,7 @@ def record_response(
     if instrument is not None and method not in _BAND_LINES:
         unused, instrument = f"The method '{method}' does not use it; local_rational does.", None
     coherence = _coherence(record, source, response, hold) if with_coherence else None
-    plain = None
+    plain, fit = None, None
     if method == "thesis":
         periodic, note = _mean_period(record, drive)
         found, width, shared = _noted(_thesis(periodic, source, response, order), note), _line(periodic), 1.0
@@ -159,20 +163,19 @@ def record_response(
                 plain_ratio(record, local, hold), _BAND_LINES["local_rational"], _CLEAR, _LEAST_SHARE
             )
     else:
-        estimator = _Local(record, source, response, drive, method, resolution, hold, wanted)
+        estimator = _Local(record, source, response, drive, method, resolution, hold, wanted, band)
         try:
-            found, plain = estimator.response(instrument, order, moves_freely)
+            found, plain, fit = estimator.response(instrument, order, moves_freely)
         except InputError as error:
             if instrument is None:
                 raise
             unused, instrument = str(error), None
-            found, plain = estimator.response(None, order, moves_freely)
+            found, plain, fit = estimator.response(None, order, moves_freely)
         lines, width, shared, note = estimator.resolved(instrument)
         found = _noted(_clear(found, lines, least_clearness, 0.0 if clear_alone else _LEAST_SHARE), note)
     if band is not None:
         found = found.band(*band)
-        plain = plain if plain is None else plain.band(*band)
-    return RecordResponse(found, shared, width, _PEAK_LINES[method] * width, coherence, unused, plain)
+    return RecordResponse(found, shared, width, _PEAK_LINES[method] * width, coherence, unused, plain, fit)
 
 
 def _line(record: Record) -> float:
@@ -192,6 +195,7 @@ class _Local:
     resolution: float | None
     hold: Hold
     wanted: NDArray[np.float64] | None
+    band: tuple[float, float] | None
 
     def resolved(self, instrument: str | None) -> tuple[int, float, float, str]:
         """Return lines of a band, the resolution [rad/s], lines per independent value, and which periods were averaged."""
@@ -202,29 +206,30 @@ class _Local:
 
     def response(
         self, instrument: str | None, order: Order, moves_freely: FreeMotion
-    ) -> tuple[FrequencyResponse, PlainRatio | None]:
-        """Return the response, and the plain ratio if the free motion of the record has a known form."""
+    ) -> tuple[FrequencyResponse, PlainRatio | None, TransferFit | None]:
+        """Return the response, and the plain ratio and its fit if the free motion of the record has a known form."""
         periodic, _ = _mean_period(self.record, instrument or self.drive)
         found = self._estimated(periodic, periodic is self.record, instrument)
         if moves_freely == "unknown" or periodic is not self.record or instrument is not None:
-            return found, None
+            return found, None, None
         every = plain_ratio(self.record, found, self.hold)
         plain = _clear(every, _BAND_LINES[self.method], _CLEAR, _LEAST_SHARE)
+        plain = plain if self.band is None else plain.band(*self.band)
         own, scale = plain, np.ones_like(found.omega)
         if moves_freely == "as its integral":
             own, every, scale = own.rate(), every.rate(), found.omega**-2
         try:
-            fit = fit_frequency_response(own, order)
+            fit = near = fit_frequency_response(own, order)
             if fit.misfit > MISFIT:
-                fit, _ = fit_with_relative_error(own, order, magnitude_only=False)
+                near, _ = fit_with_relative_error(own, order, magnitude_only=False)
         except InputError:
-            return found, plain
-        poles = fit.form.poles(fit.theta)
-        moved = self.record[self.name] - own.free_motion(fit.free_motion, poles)
+            return found, plain, None
+        poles = near.form.poles(near.theta)
+        moved = self.record[self.name] - own.free_motion(near.free_motion, poles)
         alone = self._estimated(self.record.with_signals(**{self.name: moved}), False, None)
         motions = every.free_motions(poles)
-        spread = np.einsum("ki,ij,kj->k", motions.conj(), fit.free_motion_covariance, motions).real
-        return _smaller_variance(found, alone, scale * np.maximum(spread, 0.0)), plain
+        spread = np.einsum("ki,ij,kj->k", motions.conj(), near.free_motion_covariance, motions).real
+        return _smaller_variance(found, alone, scale * np.maximum(spread, 0.0)), plain, fit
 
     def _estimated(self, record: Record, transient: bool, instrument: str | None) -> FrequencyResponse:
         local = local_rational_response if self.method == "local_rational" else local_polynomial_response
