@@ -269,7 +269,8 @@ def _coherence(record: Record, source: str, response: str, hold: Hold) -> Freque
 def _thesis(record: Record, source: str, response: str, order: Order) -> FrequencyResponse:
     omega = line_frequencies(record.n_samples, record.dt)
     power = np.abs(np.fft.rfft(record[source] - np.mean(record[source]))[1 : omega.size + 1]) ** 2
-    smooth = np.convolve(power, np.full(15, 1.0 / 15.0), mode="same")
+    width = min(15, power.size)
+    smooth = np.convolve(power, np.full(width, 1.0 / width), mode="same")
     heard = omega[excited(omega, smooth, None, f"Record '{record.name}': the source '{source}'")]
     # The cuts are those of the thesis's rig, whose resonance is near 12 rad/s.
     upper = min(_THESIS_CUTS[order], float(heard[-1]))
