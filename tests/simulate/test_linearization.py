@@ -14,7 +14,7 @@ from rigsight.effects import effect_named, placed
 from rigsight.rigs import ELEMENT, RIGS, read_rig_file
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.equations.structure import TIME, input_symbols
-from rigsight.simulate.linearization import Linearization, linearize
+from rigsight.simulate.linearization import Linearization, is_linear, linearize
 
 OMEGA = np.geomspace(0.1, 300.0, 25)
 
@@ -221,3 +221,39 @@ def test_dry_friction_is_left_out_and_the_rest_stays() -> None:
     np.testing.assert_array_equal(
         with_friction.state_matrix, linearize(compose(rig), TRAIN, {"u": 0.3}).state_matrix
     )
+
+
+@pytest.mark.parametrize(("effect", "delay"), [("input_delay", "T_d"), ("sensor_delay", "T_s")])
+@pytest.mark.parametrize("late", [0.0, 0.02, 0.2])
+def test_a_delay_inside_a_loop_acts_inside_the_loop(
+    effect: str, delay: str, late: float, tmp_path: Path
+) -> None:
+    (tmp_path / "loop.toml").write_text(PI_LOOP, "utf-8")
+    structure = compose(read_rig_file(tmp_path / "loop.toml"), [effect_named(effect)])
+    J, d, k_i, k_p = 0.01, 0.02, 0.3, 0.1
+    values = {"J": J, "d": d, "k_i": k_i, "k_p": k_p, delay: late}
+    found = linearize(structure, {name: values[name] for name in structure.names})
+    s, law = 1j * OMEGA, k_p + k_i / (1j * OMEGA)
+    turned = np.exp(-s * late)
+    closed = law * turned / (J * s + d + law * turned)
+    np.testing.assert_allclose(found.frequency_response(OMEGA)[:, 0, 0], closed, rtol=1e-9)
+    # The open loop loses more than 180 degrees before its magnitude falls below 1 (near 10.4 rad/s) for delays above 0.12 s.
+    assert found.is_unstable == (late > 0.12)
+
+
+def test_a_model_is_linear_if_its_equations_are(tmp_path: Path) -> None:
+    axis = {"gain": 1.0, "m": 2.0, "d": 40.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+    for effect, own, expected in (
+        ("input_delay", {"T_d": 0.1}, True),
+        ("sensor_lag", {"T_m": 0.1}, True),
+        ("cubic_stiffness", {"k_3": 1.0}, False),
+        ("cubic_stiffness", {"k_3": 0.0}, True),
+        ("coulomb_friction", {"T_c": 1.0}, False),
+        ("input_saturation", {"u_max": 1.0}, False),
+        ("periodic_disturbance", {"T_p": 1.0, "w_p": 3.0, "phi": 0.0}, False),
+    ):
+        structure = compose(RIGS["axis"], [effect_named(effect)])
+        values = {**axis, **own}
+        assert is_linear(structure, {name: values[name] for name in structure.names}) is expected, effect
+    arm = compose(RIGS["two_link_arm"])
+    assert not is_linear(arm, {name: ARM.get(name, 1.0) for name in arm.names})

@@ -21,6 +21,58 @@ from rigsight.workflow.run.progress import Step
 from rigsight.workflow.vary import run_vary, table_text
 
 
+def test_delays_and_lags_of_a_linear_model_change_its_response_as_their_closed_form(
+    write_model: Callable[..., Path],
+) -> None:
+    late = {"T_d": 0.5, "T_s": 0.3, "T_a": 0.05, "T_m": 0.02}
+
+    def delayed(content: dict[str, Any]) -> None:
+        effects = ["input_delay", "sensor_delay", "actuator_lag", "sensor_lag"]
+        content.update(effects=effects, effect_parameters=late, units={}, hold="foh")
+        content["parameters"] |= {"m": 2.0, "d": 40.0, "k": 800.0}
+
+    for name in ("T_d", "T_s"):
+        (variation,) = run_vary(write_model(delayed), [name], low=0.0, high=2.0, steps=3)
+        for variant in variation.variants:
+            assert variant.response is not None
+            s, own = 1j * variant.response.omega, {**late, name: variant.value}
+            lags = (own["T_a"] * s + 1.0) * (own["T_m"] * s + 1.0)
+            expected = np.exp(-s * (own["T_d"] + own["T_s"])) / (2.0 * s**2 + 40.0 * s + 800.0) / lags
+            np.testing.assert_allclose(variant.response.values, expected, rtol=1e-9)
+            assert variant.error == 0.0
+        first, *others = (variant.features for variant in variation.variants)
+        assert all(features == pytest.approx(first) for features in others)
+
+
+def test_a_resonance_stays_where_it_is_however_late_the_drive_acts(write_model: Callable[..., Path]) -> None:
+    def delayed(content: dict[str, Any]) -> None:
+        content.update(effects=["input_delay"], effect_parameters={"T_d": 0.5}, units={})
+        content["parameters"] |= {"m": 2.0, "d": 40.0, "k": 800.0}
+
+    (variation,) = run_vary(write_model(delayed), ["T_d"])
+    for variant in variation.variants:
+        assert variant.features["peak_magnitude"] == pytest.approx(1.0 / (40.0 * math.sqrt(300.0)), rel=1e-5)
+        assert variant.features["peak_omega"] == pytest.approx(math.sqrt(200.0), rel=1e-4)
+        assert variant.features["break_frequency"] == pytest.approx(20.0, rel=1e-3)
+
+
+def test_a_delay_of_a_nonlinear_model_turns_its_response_and_the_error_is_given(
+    write_model: Callable[..., Path],
+) -> None:
+    def stiffening(content: dict[str, Any]) -> None:
+        effects, own = ["input_delay", "cubic_stiffness"], {"T_d": 0.5, "k_3": 1e6}
+        content.update(effects=effects, effect_parameters=own, units={})
+        content["parameters"] |= {"m": 2.0, "d": 40.0, "k": 800.0}
+
+    (variation,) = run_vary(write_model(stiffening), ["T_d"], low=0.0, high=1.0, steps=2, amplitude=2.0)
+    prompt, late = (variant.response for variant in variation.variants)
+    assert prompt is not None
+    assert late is not None
+    np.testing.assert_allclose(late.values, prompt.values * np.exp(-1j * late.omega), rtol=1e-9)
+    assert all(variant.error is not None and 0.0 < variant.error < 0.02 for variant in variation.variants)
+    assert "error" in table_text(variation)
+
+
 def test_a_larger_share_of_the_spring_without_memory_breaks_later_and_gives_less_static_gain() -> None:
     """Figure 6.5: "increasing a leads to a shift of the break frequency to a larger angular frequency ... and a smaller
     static gain"."""

@@ -13,6 +13,8 @@ from rigsight.frequency.harmonics import HarmonicTrack as HarmonicTrack
 from rigsight.frequency.harmonics import track_harmonics as track_harmonics
 from rigsight.frequency.local_model import local_polynomial_response as local_polynomial_response
 from rigsight.frequency.local_model import local_rational_response as local_rational_response
+from rigsight.frequency.plain_ratio import PlainRatio as PlainRatio
+from rigsight.frequency.plain_ratio import plain_ratio as plain_ratio
 from rigsight.frequency.several_inputs import ResponsesOfInputs as ResponsesOfInputs
 from rigsight.frequency.several_inputs import responses_of_inputs as responses_of_inputs
 from rigsight.frequency.signal_pair import hold_response as hold_response
@@ -24,12 +26,14 @@ __all__ = [
     "DetectedDistortion",
     "FrequencyResponse",
     "HarmonicTrack",
+    "PlainRatio",
     "ResponsesOfInputs",
     "averaged_response",
     "fast_best_linear_approximation",
     "hold_response",
     "local_polynomial_response",
     "local_rational_response",
+    "plain_ratio",
     "responses_of_inputs",
     "robust_best_linear_approximation",
     "thesis_response",

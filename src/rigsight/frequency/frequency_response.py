@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,9 @@ class FrequencyResponse:
         Correlation of the errors of neighboring values, shape (n_frequencies, n_shares), None if they are independent or it is
         unknown: the error of value i is ``sum_j noise_shares[i, j] xi[noise_lines[i, j]]`` with independent circular xi of
         variance 1.
+    line_noise
+        Variance of the noise in the spectrum of the responding signal, as of a plain Fourier transform, shape (n_frequencies,),
+        None if it was not estimated.
     noise_freedom
         Complex degrees of freedom from which each variance was estimated, infinite if it is known in another way.
     shared_width
@@ -66,6 +69,7 @@ class FrequencyResponse:
     method: str = ""
     noise_shares: NDArray[np.complex128] | None = None
     noise_lines: NDArray[np.intp] | None = None
+    line_noise: NDArray[np.float64] | None = None
     noise_freedom: float = float("inf")
     shared_width: float = 0.0
 
@@ -144,7 +148,7 @@ class FrequencyResponse:
         near = np.interp(self.omega, omega, phase)
         return near + (np.angle(self.values) - near + np.pi) % (2.0 * np.pi) - np.pi
 
-    def band(self, lower: float, upper: float) -> FrequencyResponse:
+    def band(self, lower: float, upper: float) -> Self:
         """Return the part from `lower` to `upper` [rad/s], both included.
 
         Raises
@@ -154,7 +158,7 @@ class FrequencyResponse:
         """
         return self.at((self.omega >= lower) & (self.omega <= upper), f"from {lower:g} to {upper:g} rad/s")
 
-    def at(self, kept: NDArray[np.bool_], which: str = "as chosen") -> FrequencyResponse:
+    def at(self, kept: NDArray[np.bool_], which: str = "as chosen") -> Self:
         """Return the frequencies where `kept`, shape (n_frequencies,), is true.
 
         Raises
@@ -172,6 +176,18 @@ class FrequencyResponse:
             if isinstance(getattr(self, field.name), np.ndarray)
         }
         return replace(self, **changed)
+
+    def rate(self) -> Self:
+        """Return the response of the rate of the responding signal."""
+        variance, shares = self.variance, self.noise_shares
+        return replace(
+            self,
+            values=1j * self.omega * self.values,
+            response=f"{self.response}'",
+            unit=f"{self.unit}/s",
+            variance=None if variance is None else self.omega**2 * variance,
+            noise_shares=None if shares is None else 1j * self.omega[:, None] * shares,
+        )
 
     def to_control(self) -> Any:
         """Return the values as a ``control.FrequencyResponseData`` with one input and one output."""

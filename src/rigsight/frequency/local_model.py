@@ -259,9 +259,9 @@ def _local_response(
             raise InputError(
                 f"{what}: the source '{source}' is not correlated with the instrument '{instrument}'."
             )
-        parts = [(values, shares, near) for values, shares, near, _ in ratios]
+        parts = [ratio[:4] for ratio in ratios]
         method = f"{method} by {instrument}"
-    values, shares, near = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    values, shares, near, noise = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     held = hold_response(omega[lines], record.dt, hold)
     shares = np.asarray(shares / held[:, None])
     return FrequencyResponse(
@@ -275,6 +275,7 @@ def _local_response(
         method=f"{method}, order {order}, {width} lines",
         noise_shares=shares,
         noise_lines=near,
+        line_noise=noise,
         noise_freedom=float(width - unknowns),
     )
 
@@ -342,10 +343,10 @@ def _solve(
     Y: NDArray[np.complex128],
     lines: NDArray[np.intp],
     model: _LocalModel,
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp]]:
-    """Return the values at some lines, the shares of the noise in them, and the lines that this noise is from."""
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64]]:
+    """Return the values at some lines, the shares of the noise in them, the lines that this noise is from, and its power."""
     fit, picked = _fit(U, Y, lines, model)
-    return fit.coefficient(0), fit.shares(0) * np.sqrt(fit.noise)[:, None], picked
+    return fit.coefficient(0), fit.shares(0) * np.sqrt(fit.noise)[:, None], picked, fit.noise
 
 
 def _solve_ratio(
@@ -354,7 +355,9 @@ def _solve_ratio(
     Y: NDArray[np.complex128],
     lines: NDArray[np.intp],
     model: _LocalModel,
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64]]:
+) -> tuple[
+    NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]
+]:
     """Return the results of `_solve` for the ratio of the responses of Y and U to R, and the power of U's over its variance.
 
     The noise of a line in both signals is treated as one noise, with the phase that it has in Y: noise that feedback brings
@@ -374,7 +377,7 @@ def _solve_ratio(
     shares = np.sqrt(np.maximum(variance, 0.0)) * np.exp(1j * np.angle(of_Y)) / denominator[:, None]
     unsure = np.sum(np.abs(below.shares(0)) ** 2, axis=1) * below.noise
     clearness = np.abs(denominator) ** 2 / np.maximum(unsure, np.finfo(np.float64).tiny)
-    return values, shares, picked, clearness
+    return values, shares, picked, above.noise, clearness
 
 
 def _fit(

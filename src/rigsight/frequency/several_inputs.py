@@ -40,6 +40,8 @@ _NEIGHBORS, _MOST_OF_THEM = 9, 0.8
 """By chance, one value exceeds the noise in twenty bands; eight of nine neighbors do not."""
 _FEWEST = 8
 """Fewest values of a curve."""
+_ONE_TONE = 0.9
+"""Share of an input's power within one local band, from which it is a tone: a tone between two lines leaves 3 % outside of it."""
 _STILL = 1e-12
 _CHUNK = 128
 
@@ -145,7 +147,7 @@ def responses_of_inputs(
                 together[tuple(sorted((source, *rivals), key=list(sources).index))] = None
                 problems[source, response] = _inseparable(source, rivals)
             else:
-                problems[source, response] = (
+                problems[source, response] = local.tone(index, source) or (
                     f"the response of '{response}' to '{source}' does not exceed its noise. Excite '{source}' more strongly, or "
                     f"for longer."
                 )
@@ -243,9 +245,12 @@ class _LocalModels:
             return None, tuple(sources[self._moving[i]] for i in alone or others)
         values, variance = self._values[:, column], self._variance[:, column]
         stands_out = excites & apart & (np.abs(values) ** 2 > _STANDS_OUT * variance)
+        if stands_out.size < _FEWEST:
+            return None, ()
         # One value may exceed the noise by chance, but not its neighbors as well.
-        around = np.convolve(stands_out, np.ones(_NEIGHBORS), mode="same")
-        present = np.convolve(np.ones(stands_out.size), np.ones(_NEIGHBORS), mode="same")
+        neighbors = np.ones(min(_NEIGHBORS, stands_out.size))
+        around = np.convolve(stands_out, neighbors, mode="same")
+        present = np.convolve(np.ones(stands_out.size), neighbors, mode="same")
         kept = stands_out & (around >= _MOST_OF_THEM * present)
         if np.count_nonzero(kept) < _FEWEST:
             return None, ()
@@ -263,6 +268,23 @@ class _LocalModels:
             records=names,
             method=f"{kind}, {len(sources)} inputs, {len(names)} records together",
         ), ()
+
+    def tone(self, index: int, source: str) -> str:
+        """Return a sentence if an input is a single tone in all records; an empty one if it is not."""
+        tones = []
+        for s, width in zip(self._spectra, self._widths, strict=True):
+            if not s.moves[index]:
+                continue
+            power = np.abs(s.inputs[index]) ** 2
+            inside = np.convolve(power, np.ones(min(width, power.size)), mode="same")
+            if np.max(inside) < _ONE_TONE * np.sum(power):
+                return ""
+            tones.append(float(s.omega[np.argmax(power)]))
+        named = " and ".join(f"{tone:.4g}" for tone in sorted(set(tones)))
+        return (
+            f"'{source}' excites a single frequency, {named} rad/s, which gives no frequency response. Record a sweep or a "
+            f"multisine of it."
+        )
 
     def _solved(
         self, omega: NDArray[np.float64]

@@ -15,7 +15,8 @@ from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.transfer.axis_parameters import axis_parameters, springless_parameters
 from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
 from rigsight.identify.transfer.driven_offsets import driven_offsets
-from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
+from rigsight.identify.transfer.record_response import MISFIT, Method, RecordResponse, record_response
+from rigsight.identify.transfer.relative_fit import fit_with_relative_error
 from rigsight.identify.transfer.running_gear_parameters import (
     PhysicalEstimates,
     lateral_parameters,
@@ -36,15 +37,12 @@ _SURE = 0.1
 _PEAK = 1.1
 """Height over the lowest lines from which a largest magnitude counts as a resonance."""
 _LOWEST = 10
-MISFIT = 3.0
-"""Residuals in units of the noise above which the order of a model is too low."""
 _LONGEST_DELAY = 0.5 * math.pi
 """Largest phase shift by a dead time at the largest magnitude [rad]."""
 _TURNED = -0.5
 """Correlation of fitted and measured values below which the sign of one signal is reversed."""
 _WELL_BELOW = 0.5
 """Share of the break frequency up to which a response follows its source, so that a delay changes the phase little."""
-_SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))
 
 
 @dataclass(frozen=True)
@@ -147,9 +145,10 @@ def _motion(
                 options.resolution,
                 record.hold,
                 instrument=instrument,
+                moves_freely="as the form" if has_stiffness else "as its integral",
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(seen.response if has_stiffness else _velocity(seen.response), order, seen, options)
+            fit = _fit(seen, order, not has_stiffness, options)
         return _judged(path, fit, physical), seen
     except InputError as error:
         if options.resolution is not None and "too short for a resolution" in str(error):
@@ -189,9 +188,10 @@ def _lateral(
                 smooth,
                 band,
                 drive=rig.inputs[0].name,
+                moves_freely="as the form",
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(seen.response, "pt1", seen, options)
+            fit = _fit(seen, "pt1", False, options)
         return _judged(path, fit, lambda found: lateral_parameters(found, constants))
     except InputError as error:
         return replace(path, problem=str(error))
@@ -213,17 +213,20 @@ def _dynamic_stiffness(record: Record, rig: Rig, options: EstimationOptions) -> 
     return replace(path, measured=seen.response, coherence=seen.coherence)
 
 
-def _fit(
-    response: FrequencyResponse, order: Order, seen: RecordResponse, options: EstimationOptions
-) -> TransferFit:
+def _fit(seen: RecordResponse, order: Order, of_rate: bool, options: EstimationOptions) -> TransferFit:
     """Fit with standard errors that count independent values, not lines."""
     # The thesis fits magnitudes only (section 4.4), because its phases are rescaled.
     by_magnitude = options.method == "thesis"
-    fit = fit_frequency_response(response, order, magnitude_only=by_magnitude)
-    factor = 1.0 if response.noise_shares is not None else seen.lines_per_value
+    response, plain = (
+        one.rate() if one is not None and of_rate else one for one in (seen.response, seen.plain)
+    )
+    assert response is not None
+    fitted = plain or response
+    fit = seen.fit or fit_frequency_response(fitted, order, magnitude_only=by_magnitude)
+    factor = 1.0 if plain is not None or response.noise_shares is not None else seen.lines_per_value
     if fit.misfit > MISFIT and order == "pt2" and not by_magnitude:
         longest = _LONGEST_DELAY / float(response.omega[np.argmax(response.magnitude)])
-        late = fit_frequency_response(response, order, longest_dead_time=longest)
+        late = fit_frequency_response(fitted, order, longest_dead_time=longest)
         if late.misfit <= MISFIT:
             note = f"A dead time of {1e3 * late.values['dead_time']:.3g} ms was needed."
             fit = replace(late, message=f"{late.message} {note}")
@@ -234,21 +237,11 @@ def _fit(
 
 
 def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> TransferFit:
-    """Fit a form whose order is too low, with the same relative error assumed for every line.
+    """Fit a form whose order is too low.
 
-    With the variances of the noise alone, the few most certain lines would dominate, wherever they are. A PT2 is fitted to the
-    magnitude, as in the thesis (section 4.4), because other phase shifts would distort the peak.
+    A PT2 is fitted to the magnitude, as in the thesis (section 4.4), because other phase shifts would distort the peak.
     """
-    assert response.variance is not None
-    for share in _SHARES:
-        variance = response.variance + (share * response.magnitude) ** 2
-        fit = fit_frequency_response(
-            replace(response, variance=variance, noise_shares=None, noise_lines=None),
-            order,
-            magnitude_only=order == "pt2",
-        )
-        if fit.misfit <= 1.0:
-            break
+    fit, share = fit_with_relative_error(response, order, magnitude_only=order == "pt2")
     read = " The fit uses magnitudes only." if order == "pt2" else ""
     note = (
         f"The residuals are {misfit:.0f} times larger than the noise explains: the model order is too low.{read} An error of "
@@ -282,18 +275,6 @@ def _from_rest(record: Record, motion: TransferFit | None) -> Record:
     psi = record["psi"].copy()
     psi[0] = motion.values["offset"]
     return record.with_signals(psi=psi)
-
-
-def _velocity(response: FrequencyResponse) -> FrequencyResponse:
-    variance, shares = response.variance, response.noise_shares
-    return replace(
-        response,
-        values=1j * response.omega * response.values,
-        response=f"{response.response}'",
-        unit=f"{response.unit}/s",
-        variance=None if variance is None else response.omega**2 * variance,
-        noise_shares=None if shares is None else 1j * response.omega[:, None] * shares,
-    )
 
 
 def _judged(

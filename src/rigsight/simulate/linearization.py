@@ -7,17 +7,19 @@ because its jump at rest has no slope.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 from scipy.linalg import eigvals
 
 from rigsight.errors import SimulationError
 from rigsight.simulate.equations.derivatives import declared_start, slope_functions
-from rigsight.simulate.equations.structure import Structure
+from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
+from rigsight.simulate.equations.tree import FirstOrderState, Output, late
 from rigsight.simulate.simulation import parameter_vector
 
 Floats = NDArray[np.float64]
@@ -25,8 +27,35 @@ Stability = Literal["stable", "drifts", "undamped", "unstable"]
 
 _ROUNDED = 1e-7
 """Distance of two roots, over the largest pole, that may be rounding error: double roots are accurate to the root of 1e-16."""
+_HIGHEST, _MOST_TURNS = 1e4, 20_000
+"""Frequency over the quickest pole beyond which no loop answers, and points along the imaginary axis: 60 per turn of a delay up
+to 300 turns."""
 _VANISHES = 1e-10
 """Share of its parts below which a sum of products is rounding error."""
+
+
+@dataclass(frozen=True, eq=False)
+class LateSignals:
+    """Delayed signals of a linearization: each is its signal v plus the change ``(e^(-s T) - 1) v``.
+
+    Attributes
+    ----------
+    delays
+        T [s], shape (n_late,).
+    on_states, on_outputs, on_signals
+        Effect of the changes on z', y and v, shapes (n_states, n_late), (n_outputs, n_late) and (n_late, n_late).
+    from_states
+        v by z, shape (n_late, n_states).
+    from_inputs
+        v by the inputs and their first and second derivatives, shape (3, n_late, n_inputs).
+    """
+
+    delays: Floats
+    on_states: Floats
+    on_outputs: Floats
+    on_signals: Floats
+    from_states: Floats
+    from_inputs: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +79,8 @@ class Linearization:
         A, B and C, shapes (n_states, n_states), (n_states, n_inputs) and (n_outputs, n_states).
     feedthrough
         D, D_1 and D_2, shape (3, n_outputs, n_inputs).
+    late
+        Signals with a delay; None if there are none. The matrices, and the poles, are those without delays.
     """
 
     inputs: tuple[str, ...]
@@ -62,6 +93,7 @@ class Linearization:
     input_matrix: Floats
     output_matrix: Floats
     feedthrough: Floats
+    late: LateSignals | None = None
 
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
@@ -101,7 +133,7 @@ class Linearization:
         return _ROUNDED * float(np.max(np.abs(self.poles), initial=0.0))
 
     def frequency_response(self, omega: Floats) -> NDArray[np.complex128]:
-        """Return the response of every output to every input, shape (n_frequencies, n_outputs, n_inputs).
+        """Return the response of every output to every input, delays included, shape (n_frequencies, n_outputs, n_inputs).
 
         Parameters
         ----------
@@ -109,10 +141,51 @@ class Linearization:
             Angular frequencies [rad/s], shape (n_frequencies,); none may be a pole.
         """
         s = 1j * np.asarray(omega, dtype=np.float64)[:, None, None]
-        identity = np.eye(len(self.states))
-        inner = np.linalg.solve(s * identity - self.state_matrix, self.input_matrix.astype(np.complex128))
-        direct = self.feedthrough[0] + s * self.feedthrough[1] + s**2 * self.feedthrough[2]
-        return np.asarray(self.output_matrix @ inner + direct)
+        inner = self._states_by(s, self.input_matrix)
+
+        def direct(parts: Floats) -> NDArray[np.complex128]:
+            return np.asarray(parts[0] + s * parts[1] + s**2 * parts[2])
+
+        found = self.output_matrix @ inner + direct(self.feedthrough)
+        if self.late is None:
+            return np.asarray(found)
+        late = self.late
+        change = np.exp(-s * late.delays) - 1.0
+        signals = np.linalg.solve(
+            np.eye(late.delays.size) - self._loop(s), late.from_states @ inner + direct(late.from_inputs)
+        )
+        onto = self.output_matrix @ self._states_by(s, late.on_states) + late.on_outputs
+        return np.asarray(found + onto @ (np.swapaxes(change, 1, 2) * signals))
+
+    def _states_by(self, s: NDArray[np.complex128], into: Floats) -> NDArray[np.complex128]:
+        resolvent = s * np.eye(len(self.states)) - self.state_matrix
+        return np.asarray(np.linalg.solve(resolvent, into.astype(np.complex128)))
+
+    def _loop(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Return the effect of each change of a delayed signal on the signals, shape (n_frequencies, n_late, n_late)."""
+        assert self.late is not None
+        by_changes = self.late.from_states @ self._states_by(s, self.late.on_states) + self.late.on_signals
+        return np.asarray(by_changes * (np.exp(-s * self.late.delays) - 1.0))
+
+    @property
+    def is_unstable(self) -> bool:
+        """Whether motion grows, delays inside loops included.
+
+        By the argument principle: without delays stable, with delays unstable if ``det(1 - L)`` with the loop L of their changes
+        turns about zero along the imaginary axis.
+        """
+        if self.stability == "unstable":
+            return True
+        late = self.late
+        if late is None or not np.any(late.delays) or self.stability == "undamped":
+            return False
+        quick = max(float(np.max(np.abs(self.poles))), 1.0 / float(np.max(late.delays)))
+        omega = np.geomspace(1e-4 * quick, _HIGHEST * quick, _MOST_TURNS)
+        omega = np.union1d(
+            omega, np.linspace(0.0, _MOST_TURNS * 0.1 / float(np.max(late.delays)), _MOST_TURNS)[1:]
+        )
+        turned = np.linalg.det(np.eye(late.delays.size) - self._loop(1j * omega[:, None, None]))
+        return bool(abs(np.unwrap(np.angle(turned))[-1] - np.angle(turned[0])) > np.pi / 2.0)
 
     def transfer_function(self, source: str, response: str) -> TransferFunction:
         """Return numerator and denominator from one input to one output, without zeros and poles that cancel.
@@ -170,7 +243,7 @@ def linearize(
     Parameters
     ----------
     structure
-        Rig and effects; delays are left out.
+        Rig and effects.
     values
         Value of each of the structure's parameters, by name.
     inputs
@@ -188,11 +261,14 @@ def linearize(
     names = structure.rig.mechanism.inputs
     at_inputs = np.array([(inputs or {}).get(name, 0.0) for name in names], dtype=np.float64)
     p = parameter_vector(structure, values)
-    functions = slope_functions(structure)
+    opened, delays = _opened(structure)
+    functions = slope_functions(opened)
+    unchanged = np.zeros(len(delays))
     if state is None:
-        at_state = functions.resting(declared_start(structure, p) if near is None else near, at_inputs, p)
+        start = declared_start(structure, p) if near is None else near
+        at_state = functions.resting(np.append(start, unchanged), at_inputs, p)
     else:
-        at_state = np.asarray(state, dtype=np.float64)
+        at_state = np.append(np.asarray(state, dtype=np.float64), unchanged)
     try:
         slopes = functions.at(at_state, at_inputs, p)
     except np.linalg.LinAlgError:
@@ -205,17 +281,29 @@ def linearize(
     E_0 = A @ E_1 + direct[1]
     C = slopes.outputs_by_states
     D = slopes.outputs_by_inputs
+    B, through = direct[0] + A @ E_0, np.stack([D[0] + C @ E_0, D[1] + C @ E_1, D[2]])
+    n, n_outputs = len(structure.states), len(structure.rig.outputs)
+    known = dict(zip(structure.parameter_symbols, p, strict=True))
+    late_signals = LateSignals(
+        np.array([float(delay.xreplace(known)) for delay in delays]),
+        A[:n, n:],
+        C[:n_outputs, n:],
+        C[n_outputs:, n:],
+        C[n_outputs:, :n],
+        through[:, n_outputs:],
+    )
     found = Linearization(
         inputs=names,
         states=structure.state_names,
         outputs=tuple(signal.name for signal in structure.rig.outputs),
         at_inputs=at_inputs,
-        at_state=at_state,
+        at_state=at_state[:n],
         rests=slopes.rests,
-        state_matrix=A,
-        input_matrix=direct[0] + A @ E_0,
-        output_matrix=C,
-        feedthrough=np.stack([D[0] + C @ E_0, D[1] + C @ E_1, D[2]]),
+        state_matrix=A[:n, :n],
+        input_matrix=B[:n],
+        output_matrix=C[:n_outputs, :n],
+        feedthrough=through[:, :n_outputs],
+        late=late_signals if delays else None,
     )
     parts = (found.state_matrix, found.input_matrix, found.output_matrix, found.feedthrough)
     if not all(np.all(np.isfinite(part)) for part in parts):
@@ -224,6 +312,66 @@ def linearize(
             f"derivative there."
         )
     return found
+
+
+def is_linear(structure: Structure, values: Mapping[str, float]) -> bool:
+    """Return True if the equations are linear and do not depend on time: the linearization is then the model itself.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    values
+        Value of each of the structure's parameters, by name.
+    """
+    opened, _ = _opened(structure)
+    tree, motion = opened.tree, opened.tree.motion
+    triples = [input_symbols(index) for index in range(len(structure.rig.mechanism.inputs))]
+    moving = {*opened.states, *(symbol for triple in triples for symbol in triple), TIME}
+    numbers = map(sp.Float, parameter_vector(structure, values))
+    known = dict(zip(structure.parameter_symbols, numbers, strict=True))
+
+    def told(expression: sp.Expr) -> sp.Expr:
+        return tree.flattened(expression).xreplace(known)
+
+    if any(state.limit is not None for state in tree.states):
+        return False
+    # The mass matrix of an arm is the shortest part that shows that it is not linear.
+    if any(told(mass).free_symbols & moving for mass in motion.mass):
+        return False
+    parts = [*motion.forces, *(state.rate for state in tree.states)]
+    shown = [sp.Add(*output.terms) for output in tree.outputs]
+    return not any(
+        TIME in part.free_symbols or any(sp.diff(part, s).free_symbols & moving for s in part.free_symbols)
+        for part in map(told, [*parts, *shown])
+    )
+
+
+@lru_cache(maxsize=128)
+def _opened(structure: Structure) -> tuple[Structure, tuple[sp.Expr, ...]]:
+    """Return a structure with the change of each delayed signal by its delay as a further state, and the delays.
+
+    The changes are zero in equilibrium. The signals before their delays are further outputs.
+    """
+    tree = structure.tree
+    changes = {
+        d.symbol: sp.Symbol(f"change of {d.symbol.name}", real=True)
+        for d in tree.definitions
+        if isinstance(d.expression, late)
+    }
+    if not changes:
+        return structure, ()
+    definitions, outputs, delays = [], list(tree.outputs), []
+    for d in tree.definitions:
+        if d.symbol in changes:
+            signal, delay = d.expression.args
+            outputs.append(Output(d.symbol.name, (signal,)))
+            delays.append(delay)
+            d = replace(d, expression=signal + changes[d.symbol])
+        definitions.append(d)
+    states = (*tree.states, *(FirstOrderState(c, (-c,), "1", None, None) for c in changes.values()))
+    changed = replace(tree, definitions=tuple(definitions), states=states, outputs=tuple(outputs))
+    return replace(structure, tree=changed), tuple(delays)
 
 
 def _zeros(A: Floats, b: Floats, c: Floats, d: float) -> tuple[NDArray[np.complex128], float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,14 @@ import numpy as np
 
 from rigsight.errors import InputError, SimulationError, check_in_range, check_option
 from rigsight.frequency import FrequencyResponse
+from rigsight.frequency.signal_pair import pair_unit
 from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_break_frequency, peak
 from rigsight.parameters import Parameter
 from rigsight.plot.variation import Curve, picture_files, varied_responses
 from rigsight.records import Record
-from rigsight.simulate import simulate
+from rigsight.simulate import Structure, simulate
+from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate.linearization import is_linear, linearize
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import named_model
 from rigsight.workflow.run.kernels import prepare_kernels
@@ -28,6 +31,11 @@ VARY_FILE = "vary.json"
 VARYING = "Sweeping"
 SCHEMA_VERSION = 2
 _MOST_STEPS = 50
+_SLOWNESS = (1.0, 2.0, 4.0, 8.0)
+"""Durations of the sweeps of a nonlinear model over that of the first, which is as slow as the thesis's."""
+_SETTLED = 0.01
+"""Change of a response from one sweep to the next, relative to its largest magnitude, below which no longer one is simulated: a
+line in a figure is as wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +48,9 @@ class Variant:
         The parameter's value.
     response
         Frequency response, None where the model cannot be simulated with it.
+    error
+        Largest error of the response relative to its largest magnitude: 0 for a linear model, whose response is computed from its
+        equations, otherwise how much it changes with a sweep of half the duration. None without a response.
     features
         ``lowest_gain`` (the magnitude at the lowest frequency), ``peak_omega``, ``peak_magnitude``, ``break_frequency``,
         ``fitted_break_frequency``; None where the band does not show one.
@@ -49,6 +60,7 @@ class Variant:
 
     value: float
     response: FrequencyResponse | None
+    error: float | None
     features: dict[str, float | None]
     note: str
 
@@ -76,7 +88,10 @@ def run_vary(
     response: str | None = None,
     listener: Listener = silent,
 ) -> tuple[Variation, ...]:
-    """Simulate a sweep with several values of each parameter, all others unchanged.
+    """Return frequency responses with several values of each parameter, all others unchanged.
+
+    Those of a linear model are exact, delays included. Others are read from simulated sweeps, each twice as long as the one
+    before, until the response stays.
 
     Parameters
     ----------
@@ -128,14 +143,14 @@ def run_vary(
             "--from and --to can be used with one parameter only: name one parameter, or leave them out."
         )
     tries = [_values(p, read.values[p.name], low, high, steps) for p in chosen]
-    excitation, ratio = variation_sweep(read, pair, amplitude, band)
+    sweeps = _Sweeps(read, pair, amplitude, band)
     prepare_kernels([read.structure], 1, listener)
     stage = Stage(VARYING, sum(len(values) for values in tries), listener)
     variations = []
     for parameter, values in zip(chosen, tries, strict=True):
         variants = []
         for value in values:
-            variants.append(_variant(read, parameter, value, excitation, ratio))
+            variants.append(_variant(read, parameter, value, sweeps))
             stage.finished(f"{parameter.name} = {value:.4g}")
         if all(variant.response is None for variant in variants):
             raise InputError(
@@ -143,7 +158,7 @@ def run_vary(
             )
         variations.append(Variation(parameter, read.values[parameter.name], tuple(variants)))
     if out is not None:
-        _write(Path(out), str(model), read, variations, excitation, ratio, amplitude)
+        _write(Path(out), str(model), read, variations, sweeps)
     return tuple(variations)
 
 
@@ -162,6 +177,10 @@ def table_text(variation: Variation) -> str:
     for variant in variation.variants:
         cells = [variant.features.get(key) for key in columns]
         rows.append([_plain(variant.value), *("-" if cell is None else f"{cell:.4g}" for cell in cells)])
+    if any(variant.error for variant in variation.variants):
+        errors = [None if v.error is None else f"{100.0 * v.error:.1g}" for v in variation.variants]
+        for row, cell in zip(rows, ["error [% of the peak]", *errors], strict=True):
+            row.append(cell or "-")
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
     notes = [f"{_plain(v.value)}: {v.note}" for v in variation.variants if v.note]
@@ -218,38 +237,117 @@ def _values(
     return [float(value) for value in values]
 
 
-def _variant(
-    model: Model, parameter: Parameter, value: float, excitation: Record, ratio: SpectralRatio
-) -> Variant:
+@dataclass(frozen=True, eq=False)
+class _Sweeps:
+    """The sweeps of a model, which begin with one as slow as the thesis's."""
+
+    model: Model
+    pair: Pair
+    amplitude: float
+    band: tuple[float, float] | None
+    made: dict[float, tuple[Record, SpectralRatio]] = field(default_factory=dict)
+
+    def at(self, slowness: float = 1.0) -> tuple[Record, SpectralRatio]:
+        """Return the sweep of this duration over the first one's, and the estimator."""
+        if slowness not in self.made:
+            self.made[slowness] = variation_sweep(self.model, self.pair, self.amplitude, self.band, slowness)
+        return self.made[slowness]
+
+    def response(
+        self, structure: Structure, values: Mapping[str, float]
+    ) -> tuple[FrequencyResponse, float, float]:
+        """Return the response, its relative error, and the part of its delay [s] that only shifts the record.
+
+        Raises
+        ------
+        SimulationError
+            If the motion grows without bound.
+        """
+        structure, own = without_vanished_effects(structure, values)
+        late, prompt = self._shifts(structure, own)
+        structure, own = without_vanished_effects(structure, prompt)
+        omega = self.at()[1].omega
+        delay = np.exp(-1j * omega * late)
+        if is_linear(structure, own):
+            linear = linearize(structure, own)
+            if linear.is_unstable:
+                raise SimulationError("The model is unstable, so that it has no frequency response.")
+            row, column = linear.outputs.index(self.pair.response), linear.inputs.index(self.pair.source)
+            exact = linear.frequency_response(omega)[:, row, column] * delay
+            record = self.at()[0]
+            return (
+                FrequencyResponse(
+                    omega=omega,
+                    values=exact,
+                    source=self.pair.source,
+                    response=self.pair.response,
+                    unit=pair_unit(record, self.pair.source, self.pair.response),
+                    method="linear equations",
+                ),
+                0.0,
+                late,
+            )
+        before: FrequencyResponse | None = None
+        for slowness in _SLOWNESS:
+            record, ratio = self.at(slowness)
+            simulated = simulate(structure, own, record)
+            output = simulated[self.pair.response]
+            # The static equilibrium is not part of the response to the sweep.
+            found = ratio(simulated.with_signals(**{self.pair.response: output - output[0]}))
+            largest = float(np.max(found.magnitude))
+            error = math.inf
+            if before is not None and largest > 0.0:
+                error = float(np.max(np.abs(found.values - before.values))) / largest
+            before = found
+            if error <= _SETTLED or largest == 0.0:
+                break
+        return replace(found, values=found.values * delay), 0.0 if largest == 0.0 else error, late
+
+    def _shifts(self, structure: Structure, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+        """Return the delay [s] of the only input and of the reading, which only shift the record, and the values without them."""
+        place = [signal.name for signal in structure.rig.outputs].index(self.pair.response)
+        delays = [delay for delay in (structure.delay, structure.shown_late[place]) if delay is not None]
+        names = dict(zip(structure.parameter_symbols, structure.names, strict=True))
+        shifting = {names[symbol] for delay in delays for symbol in delay.free_symbols}
+        known = {symbol: values[name] for symbol, name in names.items() if name in shifting}
+        return float(sum(delay.xreplace(known) for delay in delays)), {
+            **values,
+            **dict.fromkeys(shifting, 0.0),
+        }
+
+
+def _variant(model: Model, parameter: Parameter, value: float, sweeps: _Sweeps) -> Variant:
     try:
-        simulated = simulate(model.structure, {**model.values, parameter.name: value}, excitation)
-    except SimulationError as error:
-        return Variant(value, None, {}, str(error))
-    output = simulated[ratio.response]
-    # The static equilibrium is not part of the response to the sweep.
-    moved = output - output[0]
-    response = ratio(simulated.with_signals(**{ratio.response: moved}))
-    if not np.any(moved):
-        still = f"The sweep does not move '{ratio.response}'; give a larger amplitude with --amplitude."
+        response, error, late = sweeps.response(model.structure, {**model.values, parameter.name: value})
+    except SimulationError as problem:
+        return Variant(value, None, None, {}, str(problem))
+    if not np.any(response.values):
+        still = f"The sweep does not move '{response.response}'; give a larger amplitude with --amplitude."
         none = ("peak_omega", "peak_magnitude", "break_frequency", "fitted_break_frequency")
-        return Variant(value, response, {"lowest_gain": 0.0, **dict.fromkeys(none)}, still)
+        return Variant(value, response, error, {"lowest_gain": 0.0, **dict.fromkeys(none)}, still)
     top = peak(response)
     notes = [] if top.is_resonance else ["The magnitude has no peak inside the band."]
+    if error > _SETTLED:
+        notes.append(
+            f"The response still changes by {100.0 * error:.2g} % of its peak with the duration of the sweep."
+        )
     features: dict[str, float | None] = {
         "lowest_gain": float(response.magnitude[0]),
         "peak_omega": top.omega if top.is_resonance else None,
         "peak_magnitude": top.magnitude if top.is_resonance else None,
     }
+    # A delay of the whole record turns the phase, and breaks nothing.
+    prompt = replace(response, values=response.values * np.exp(1j * response.omega * late))
     for name, read_off in (
         ("break_frequency", break_frequency),
         ("fitted_break_frequency", fitted_break_frequency),
     ):
         try:
-            features[name] = read_off(response)
-        except InputError as error:
+            features[name] = read_off(prompt)
+        except InputError as problem:
             features[name] = None
-            notes.append(str(error))
-    return Variant(value, response, features, " ".join(notes))
+            notes.append(str(problem))
+    return Variant(value, response, error, features, " ".join(notes))
 
 
 def _write(
@@ -257,11 +355,10 @@ def _write(
     name: str,
     model: Model,
     variations: Sequence[Variation],
-    excitation: Record,
-    ratio: SpectralRatio,
-    amplitude: float,
+    sweeps: _Sweeps,
 ) -> None:
-    rig = model.structure.rig
+    rig, amplitude = model.structure.rig, sweeps.amplitude
+    excitation, ratio = sweeps.at(max(sweeps.made))
     source = next(signal for signal in rig.inputs if signal.name == ratio.source)
     response = next(signal for signal in rig.outputs if signal.name == ratio.response)
     contents: dict[str, str | bytes] = {}
@@ -315,7 +412,13 @@ def _row(variant: Variant) -> dict[str, Any]:
             "magnitude": [float(value) for value in variant.response.magnitude],
             "phase": [float(value) for value in variant.response.phase],
         }
-    return {"value": variant.value, **variant.features, "note": variant.note, **curve}
+    return {
+        "value": variant.value,
+        "error": variant.error,
+        **variant.features,
+        "note": variant.note,
+        **curve,
+    }
 
 
 def _curves(variation: Variation) -> list[Curve]:

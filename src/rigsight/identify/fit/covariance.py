@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+from scipy.stats import norm, t
 
 from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
 
@@ -20,6 +22,8 @@ coordinates.
 An assumption: ten times the factor for the direction itself, chosen on an arm with three undetermined parameters.
 """
 _TAKES_PART = 1e-9
+LEVEL = 0.95
+"""Probability of all intervals."""
 SMOOTHED = 15
 """Lines over which a residual spectrum is averaged. A number of lines, not a share of them: the distance of lines depends on the
 duration of the record and not on the sample rate, and the resonance excited by a disturbance is several lines wide."""
@@ -30,6 +34,7 @@ def colored_covariance(
     n_common: int,
     n_outputs: Sequence[int] | None = None,
     derivative_error: float = 0.0,
+    for_intervals: bool = False,
 ) -> NDArray[np.float64]:
     """Return the covariance of the common coordinates, allowing for colored residuals.
 
@@ -48,6 +53,9 @@ def colored_covariance(
         For each record the number of outputs of equal length that follow each other in its residuals; by default one.
     derivative_error
         Relative error of the derivatives, by which linearly dependent columns may differ.
+    for_intervals
+        Widen each variance so that an interval of the normal distribution covers as often as that of Student's t with the degrees
+        of freedom of the noise that the coordinate reads: few for an offset, which reads the lines next to zero.
 
     Returns
     -------
@@ -56,7 +64,7 @@ def colored_covariance(
     References
     ----------
     L. Ljung, *System Identification* (Prentice Hall 1999), chapter 9; W. K. Newey and K. D. West, Econometrica 55
-    (1987) 703.
+    (1987) 703; F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110, for the degrees of freedom of a sum.
     """
     own_sizes = [derivative.shape[1] - n_common for _, derivative in sensitivities]
     n_total = n_common + sum(own_sizes)
@@ -69,8 +77,49 @@ def colored_covariance(
         first += n_own
         bread[np.ix_(columns, columns)] += derivative.T @ derivative
         filling[np.ix_(columns, columns)] += spectral_product(residual, derivative, count)
-    covariance = sandwich_covariance(bread, filling, derivative_error)
-    return np.asarray(covariance[:n_common, :n_common])
+    covariance = sandwich_covariance(bread, filling, derivative_error)[:n_common, :n_common]
+    if for_intervals and n_common:
+        inverse = sandwich_covariance(bread, bread, derivative_error)[:, :n_common]
+        inverse = np.where(np.isfinite(inverse), inverse, 0.0)
+        columns = [
+            np.concatenate([np.arange(n_common), np.arange(size) + n_common + sum(own_sizes[:index])])
+            for index, size in enumerate(own_sizes)
+        ]
+        reads = [
+            (residual, derivative @ inverse[place.astype(np.intp)], count)
+            for (residual, derivative), place, count in zip(sensitivities, columns, stacked, strict=True)
+        ]
+        widened = np.sqrt(_interval_factors(reads))
+        covariance = covariance * np.outer(widened, widened)
+    return np.asarray(covariance)
+
+
+def _interval_factors(
+    reads: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], int]],
+) -> NDArray[np.float64]:
+    """Return the factors on variances for the few degrees of freedom of the noise, shape (n,).
+
+    Each of the records has its residuals, the weights with which the estimates read them, and the number of its outputs.
+    """
+    size, spread = 0.0, 0.0
+    for residual, weights, count in reads:
+        by_output = residual.reshape(count, -1)
+        n = by_output.shape[1]
+        for own, read in zip(by_output, weights.reshape(count, n, -1), strict=True):
+            noise = smoothed_spectrum(np.abs(np.fft.rfft(own)) ** 2 + 0j).real
+            # A variance is a sum over lines, each of which counts with the weights of its neighbors too.
+            powers = np.abs(np.fft.rfft(read, axis=0)) ** 2
+            width = min(SMOOTHED, 2 * powers.shape[0] - 1)
+            shares = noise[:, None] * uniform_filter1d(powers, width, axis=0, mode="mirror")
+            # Lines above zero stand for those below it as well; the line at zero has one degree of freedom, the others two.
+            shares[1:] *= 2.0
+            size = size + np.sum(shares, axis=0)
+            spread = spread + 2.0 * shares[0] ** 2 + np.sum(shares[1:] ** 2, axis=0)
+    freedom = 2.0 * size**2 / np.maximum(spread, np.finfo(np.float64).tiny)
+    # The estimate itself took one.
+    left = np.maximum(freedom - 1.0, 1.0)
+    quantile = 0.5 + 0.5 * LEVEL
+    return np.asarray((left + 1.0) / left * (t.ppf(quantile, left) / norm.ppf(quantile)) ** 2)
 
 
 def sandwich_covariance(

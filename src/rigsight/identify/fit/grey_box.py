@@ -328,7 +328,7 @@ class GreyBoxFit:
         if finish and n_free:
             outputs = [int(np.count_nonzero(d.weights)) for d in self.data.records]
             covariance = colored_covariance(
-                problem.sensitivities(theta), n_free, outputs, problem.derivative_error
+                problem.sensitivities(theta), n_free, outputs, problem.derivative_error, for_intervals=True
             )
             covariance = propagated_covariance(covariance, coordinates.jacobian(theta[:n_free]))
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if n_free else np.zeros(0)

@@ -12,18 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
-from scipy.stats import norm, t
 
 from rigsight.errors import InputError
-from rigsight.identify.fit.covariance import SMOOTHED, colored_covariance
-from rigsight.identify.transfer.running_gear_parameters import LEVEL, PhysicalEstimates
+from rigsight.identify.fit.covariance import colored_covariance
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Hold, Record
 
 _LEAST_SAMPLES = 20
 _DIFFERENCE = 1e-4
-_NUMBERS = SMOOTHED - 1
-"""Degrees of freedom of the spectrum at frequency zero: lines below it mirror those above, and the offset takes one."""
 
 
 def driven_offsets(
@@ -78,20 +75,16 @@ def driven_offsets(
         designs.append(design)
     places = np.cumsum([0, *(design.shape[1] for design in designs)])[:-1]
     stacked = block_diag(*designs)
-    noise = colored_covariance([(np.concatenate(residuals), stacked)], stacked.shape[1], [len(parts)])
-    covariance = _few_numbers() * noise[np.ix_(places, places)]
+    noise = colored_covariance(
+        [(np.concatenate(residuals), stacked)], stacked.shape[1], [len(parts)], for_intervals=True
+    )
+    covariance = noise[np.ix_(places, places)]
     return PhysicalEstimates(
         tuple(values),
         values,
         covariance,
         f"(2.26), (2.27) from the residuals of the fits in record '{record.name}'",
     )
-
-
-def _few_numbers() -> float:
-    """Return the factor on the variance of an offset for the few degrees of freedom of the noise near frequency zero."""
-    share = 0.5 + 0.5 * LEVEL
-    return float((t.ppf(share, _NUMBERS) / norm.ppf(share)) ** 2 * SMOOTHED / _NUMBERS)
 
 
 def _unexplained(record: Record, fit: TransferFit, found: NDArray[np.float64]) -> NDArray[np.float64]:

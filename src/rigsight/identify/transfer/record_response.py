@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +12,24 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError, check_option
 from rigsight.frequency import (
     FrequencyResponse,
+    PlainRatio,
     averaged_response,
     local_polynomial_response,
     local_rational_response,
+    plain_ratio,
     thesis_response,
 )
 from rigsight.frequency.signal_pair import excited, line_frequencies
+from rigsight.identify.transfer.relative_fit import fit_with_relative_error
+from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order
+from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.records.periods import mean_period
 from rigsight.records.record import Hold, Record
 
+_Response = TypeVar("_Response", bound=FrequencyResponse)
 Method = Literal["local_rational", "local_polynomial", "h1", "thesis"]
+FreeMotion = Literal["unknown", "as the form", "as its integral"]
 METHODS: tuple[Method, ...] = ("local_rational", "local_polynomial", "h1", "thesis")
 
 _BAND_LINES = {"local_rational": 15, "local_polynomial": 13}
@@ -38,6 +44,8 @@ _PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thes
 _CLEAR = 100.0
 """Power over variance (20 dB) above which a local model of a noisy response can be trusted."""
 _MOSTLY, _LEAST_SHARE = 0.8, 0.05
+MISFIT = 3.0
+"""Residuals in units of the noise above which the order of a model is too low."""
 _THESIS_CUTS = {"pt2": 80.0, "pt1": 30.0}
 _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 
@@ -61,6 +69,11 @@ class RecordResponse:
         H1 with its coherence from segments of the same record; None if it is not requested or the record is too short for it.
     unused_instrument
         Reason why the given instrument was not used; empty if it was used, or if there is none.
+    plain
+        The plain ratio of the spectra in the band in which it exceeds its uncertainty, for a fit of a form with the free motion
+        of the record; None if the form of that is unknown, or whole periods were averaged, or an instrument was used.
+    fit
+        The fit of the form of `order` to it; None if there is none.
     """
 
     response: FrequencyResponse
@@ -69,6 +82,8 @@ class RecordResponse:
     narrowest: float
     coherence: FrequencyResponse | None
     unused_instrument: str = ""
+    plain: PlainRatio | None = None
+    fit: TransferFit | None = None
 
 
 def record_response(
@@ -86,6 +101,7 @@ def record_response(
     wanted: NDArray[np.float64] | None = None,
     instrument: str | None = None,
     drive: str | None = None,
+    moves_freely: FreeMotion = "unknown",
 ) -> RecordResponse:
     """Return the frequency response of one record.
 
@@ -97,7 +113,7 @@ def record_response(
     source, response
         Names of the signals.
     order
-        Assumed order of the response; only the thesis's pipeline needs it.
+        Assumed order of the response, for the thesis's pipeline and the free motion.
     method
         ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
     resolution
@@ -119,6 +135,10 @@ def record_response(
         The reference of a closed loop: a local method divides the responses to it, unless the source does not respond to it.
     drive
         The input whose periods are averaged: the noise of a measured source hides its period. None for the source.
+    moves_freely
+        Poles of the free motion that the ends of the record excite. With those of a form of this `order`, or of its integral, the
+        free motion is fitted to all lines together and removed where a local model cannot distinguish it from the response: where
+        a sweep begins or ends with the record.
 
     Raises
     ------
@@ -130,36 +150,32 @@ def record_response(
     if instrument is not None and method not in _BAND_LINES:
         unused, instrument = f"The method '{method}' does not use it; local_rational does.", None
     coherence = _coherence(record, source, response, hold) if with_coherence else None
+    plain, fit = None, None
     if method == "thesis":
         periodic, note = _mean_period(record, drive)
         found, width, shared = _noted(_thesis(periodic, source, response, order), note), _line(periodic), 1.0
     elif method == "h1":
         width = resolution or _SEGMENTS * _line(record)
         found, shared = averaged_response(record, source, response, width, hold=hold), _HANN_LINES
+        if moves_freely != "unknown" and _mean_period(record, drive)[0] is record:
+            local = local_rational_response(record, source, response, hold=hold)
+            plain = _clear(
+                plain_ratio(record, local, hold), _BAND_LINES["local_rational"], _CLEAR, _LEAST_SHARE
+            )
     else:
-        local = partial(
-            _local,
-            record,
-            source,
-            response,
-            drive,
-            method,
-            resolution,
-            hold,
-            wanted,
-            least_clearness,
-            clear_alone,
-        )
+        estimator = _Local(record, source, response, drive, method, resolution, hold, wanted, band)
         try:
-            found, width, shared = local(instrument)
+            found, plain, fit = estimator.response(instrument, order, moves_freely)
         except InputError as error:
             if instrument is None:
                 raise
-            unused = str(error)
-            found, width, shared = local(None)
+            unused, instrument = str(error), None
+            found, plain, fit = estimator.response(None, order, moves_freely)
+        lines, width, shared, note = estimator.resolved(instrument)
+        found = _noted(_clear(found, lines, least_clearness, 0.0 if clear_alone else _LEAST_SHARE), note)
     if band is not None:
         found = found.band(*band)
-    return RecordResponse(found, shared, width, _PEAK_LINES[method] * width, coherence, unused)
+    return RecordResponse(found, shared, width, _PEAK_LINES[method] * width, coherence, unused, plain, fit)
 
 
 def _line(record: Record) -> float:
@@ -167,36 +183,67 @@ def _line(record: Record) -> float:
     return 2.0 * math.pi / (record.n_samples * record.dt)
 
 
-def _local(
-    record: Record,
-    source: str,
-    response: str,
-    drive: str,
-    method: Method,
-    resolution: float | None,
-    hold: Hold,
-    wanted: NDArray[np.float64] | None,
-    least_clearness: float,
-    clear_alone: bool,
-    instrument: str | None,
-) -> tuple[FrequencyResponse, float, float]:
-    """Return the response by a local method, its resolution [rad/s] and its lines per independent value."""
-    periodic, note = _mean_period(record, instrument or drive)
-    line = _line(periodic)
-    lines = max(_BAND_LINES[method], round((resolution or 0.0) / line))
-    local = local_rational_response if method == "local_rational" else local_polynomial_response
-    found = local(
-        periodic,
-        source,
-        response,
-        bandwidth=resolution or lines * line,
-        transient=periodic is record,
-        hold=hold,
-        wanted=wanted,
-        instrument=instrument,
-    )
-    clear = _noted(_clear(found, lines, least_clearness, 0.0 if clear_alone else _LEAST_SHARE), note)
-    return clear, line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
+@dataclass(frozen=True)
+class _Local:
+    """A local method for one pair of signals of a record."""
+
+    record: Record
+    source: str
+    name: str
+    drive: str
+    method: Method
+    resolution: float | None
+    hold: Hold
+    wanted: NDArray[np.float64] | None
+    band: tuple[float, float] | None
+
+    def resolved(self, instrument: str | None) -> tuple[int, float, float, str]:
+        """Return lines of a band, the resolution [rad/s], lines per independent value, and which periods were averaged."""
+        periodic, note = _mean_period(self.record, instrument or self.drive)
+        line = _line(periodic)
+        lines = max(_BAND_LINES[self.method], round((self.resolution or 0.0) / line))
+        return lines, line * lines / _BAND_LINES[self.method], lines / _LOCAL_VALUES, note
+
+    def response(
+        self, instrument: str | None, order: Order, moves_freely: FreeMotion
+    ) -> tuple[FrequencyResponse, PlainRatio | None, TransferFit | None]:
+        """Return the response, and the plain ratio and its fit if the free motion of the record has a known form."""
+        periodic, _ = _mean_period(self.record, instrument or self.drive)
+        found = self._estimated(periodic, periodic is self.record, instrument)
+        if moves_freely == "unknown" or periodic is not self.record or instrument is not None:
+            return found, None, None
+        every = plain_ratio(self.record, found, self.hold)
+        plain = _clear(every, _BAND_LINES[self.method], _CLEAR, _LEAST_SHARE)
+        plain = plain if self.band is None else plain.band(*self.band)
+        own, scale = plain, np.ones_like(found.omega)
+        if moves_freely == "as its integral":
+            own, every, scale = own.rate(), every.rate(), found.omega**-2
+        try:
+            fit = near = fit_frequency_response(own, order)
+            if fit.misfit > MISFIT:
+                near, _ = fit_with_relative_error(own, order, magnitude_only=False)
+        except InputError:
+            return found, plain, None
+        poles = near.form.poles(near.theta)
+        moved = self.record[self.name] - own.free_motion(near.free_motion, poles)
+        alone = self._estimated(self.record.with_signals(**{self.name: moved}), False, None)
+        motions = every.free_motions(poles)
+        spread = np.einsum("ki,ij,kj->k", motions.conj(), near.free_motion_covariance, motions).real
+        return _smaller_variance(found, alone, scale * np.maximum(spread, 0.0)), plain, fit
+
+    def _estimated(self, record: Record, transient: bool, instrument: str | None) -> FrequencyResponse:
+        local = local_rational_response if self.method == "local_rational" else local_polynomial_response
+        lines, *_ = self.resolved(instrument)
+        return local(
+            record,
+            self.source,
+            self.name,
+            bandwidth=self.resolution or lines * _line(record),
+            transient=transient,
+            hold=self.hold,
+            wanted=self.wanted,
+            instrument=instrument,
+        )
 
 
 def _noted(found: FrequencyResponse, note: str) -> FrequencyResponse:
@@ -222,14 +269,32 @@ def _coherence(record: Record, source: str, response: str, hold: Hold) -> Freque
 def _thesis(record: Record, source: str, response: str, order: Order) -> FrequencyResponse:
     omega = line_frequencies(record.n_samples, record.dt)
     power = np.abs(np.fft.rfft(record[source] - np.mean(record[source]))[1 : omega.size + 1]) ** 2
-    smooth = np.convolve(power, np.full(15, 1.0 / 15.0), mode="same")
+    width = min(15, power.size)
+    smooth = np.convolve(power, np.full(width, 1.0 / width), mode="same")
     heard = omega[excited(omega, smooth, None, f"Record '{record.name}': the source '{source}'")]
     # The cuts are those of the thesis's rig, whose resonance is near 12 rad/s.
     upper = min(_THESIS_CUTS[order], float(heard[-1]))
     return thesis_response(record, source, response, _THESIS_DROPS[order], upper, float(heard[0]))
 
 
-def _clear(found: FrequencyResponse, lines: int, least: float, least_share: float) -> FrequencyResponse:
+def _smaller_variance(
+    found: FrequencyResponse, other: FrequencyResponse, extra: NDArray[np.float64]
+) -> FrequencyResponse:
+    """Return at each line the one of two local models of the same bands that has the smaller variance."""
+    assert found.variance is not None
+    assert other.variance is not None
+    assert found.noise_shares is not None
+    assert other.noise_shares is not None
+    better = other.variance + extra < found.variance
+    return replace(
+        found,
+        values=np.where(better, other.values, found.values),
+        variance=np.where(better, other.variance + extra, found.variance),
+        noise_shares=np.where(better[:, None], other.noise_shares, found.noise_shares),
+    )
+
+
+def _clear(found: _Response, lines: int, least: float, least_share: float) -> _Response:
     """Keep the lines between the outermost local bands in which most lines clearly exceed their uncertainty.
 
     Single lines may do so by chance, above all where the beginning of a sweep cannot be distinguished from a transient.

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from rigsight.errors import InputError
+from rigsight.identify.fit.covariance import LEVEL as LEVEL
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Record
 from rigsight.rigs import ROLLING, RUNNING_GEAR, Rig, evaluated, relative_slopes
 
-LEVEL = 0.95
-"""Confidence level of intervals if none is given."""
 _POSITIVE = frozenset({"J_z", "k_c", "k_d", "l_0", "c_y"})
 _RESTS = 1e-3
 _LEAST_SAMPLES = 20

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,8 @@ class TransferFit:
         Name of the method.
     records
         Names of the fitted records.
+    free_motion, free_motion_covariance
+        Weights of the free motions fitted to a `PlainRatio`, shape (n_motions,), and their covariance; empty for other data.
     """
 
     form: TransferForm
@@ -55,6 +57,8 @@ class TransferFit:
     unit: str
     method: str
     records: tuple[str, ...] = ()
+    free_motion: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    free_motion_covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def residual_rms(self) -> float:
@@ -66,20 +70,22 @@ class TransferFit:
         rows = [self.names.index(name) for name in names]
         return self.covariance[np.ix_(rows, rows)]
 
-    def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return G(j omega) of the fit, dead time included, shape (n_frequencies,)."""
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """Parameters as a vector of the form, shape (n_parameters,)."""
         theta = self.form.vector(
             self.values["omega_b"], self.values.get("zeta", 1.0), self.values.get("dead_time", 0.0)
         )
         theta[0] = self.values["gain"]
-        return self.form.response(omega, theta)
+        return theta
+
+    def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return G(j omega) of the fit, dead time included, shape (n_frequencies,)."""
+        return self.form.response(omega, self.theta)
 
     def standard_error_at(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the standard error ``sqrt(E |G - truth|^2)`` of G(j omega) by the delta method, shape (n_frequencies,)."""
-        theta = self.form.vector(
-            self.values["omega_b"], self.values.get("zeta", 1.0), self.values.get("dead_time", 0.0)
-        )
-        theta[0] = self.values["gain"]
+        theta = self.theta
         _, chain = self.form.natural(theta)
         slopes = self.form.derivatives(omega, theta) / chain
         own = self.covariance_of(*self.form.names)

@@ -35,6 +35,11 @@ class TransferForm:
         damping = ("zeta",) if self.order == "pt2" else ()
         return ("gain", "omega_b", *damping, *(("dead_time",) if self.with_dead_time else ()))
 
+    @property
+    def n_poles(self) -> int:
+        """Number of poles, and of the logarithms that set them."""
+        return 2 if self.order == "pt2" else 1
+
     def vector(self, omega_b: float, zeta: float, dead_time: float) -> NDArray[np.float64]:
         """Return the parameters for a gain of one, shape (n_parameters,)."""
         damping = [np.log(zeta)] if self.order == "pt2" else []
@@ -42,10 +47,10 @@ class TransferForm:
 
     def natural(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the parameters without logarithms and d natural / d theta (a diagonal), shape (n_parameters,) each."""
-        n_logarithms = 2 if self.order == "pt2" else 1
         values, chain = theta.copy(), np.ones_like(theta)
-        values[1 : 1 + n_logarithms] = np.exp(theta[1 : 1 + n_logarithms])
-        chain[1 : 1 + n_logarithms] = values[1 : 1 + n_logarithms]
+        shape = slice(1, 1 + self.n_poles)
+        values[shape] = np.exp(theta[shape])
+        chain[shape] = values[shape]
         return values, chain
 
     def _split(self, theta: NDArray[np.float64]) -> tuple[float, float, float, float]:
@@ -56,6 +61,13 @@ class TransferForm:
             zeta,
             float(theta[-1]) if self.with_dead_time else 0.0,
         )
+
+    def poles(self, theta: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return the poles [1/s], shape (order,)."""
+        _, omega_b, zeta, _ = self._split(theta)
+        if self.order == "pt1":
+            return np.array([-omega_b], dtype=np.complex128)
+        return np.asarray(omega_b * (-zeta + np.array([1.0, -1.0]) * np.sqrt(complex(zeta**2 - 1.0))))
 
     def response(self, omega: NDArray[np.float64], theta: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return G(j omega), shape (n_frequencies,)."""
@@ -85,6 +97,18 @@ class TransferForm:
         if self.with_dead_time:
             columns.append(-1j * omega * value)
         return np.column_stack(columns)
+
+    def sampled_response(
+        self, n_samples: int, dt: float, hold: Hold, theta: NDArray[np.float64]
+    ) -> NDArray[np.complex128]:
+        """Return the response of samples to those of a held input at each line of a record, shape (n_samples // 2 + 1,).
+
+        Exact like `over_time`. What a slow form still does after the end of the record is a free motion.
+        """
+        pulse = np.zeros(n_samples)
+        pulse[1] = 1.0
+        turn = np.exp(2j * np.pi * np.fft.rfftfreq(n_samples))
+        return np.asarray(np.fft.rfft(self.over_time(pulse, dt, hold, theta)) * turn)
 
     def over_time(
         self, u: NDArray[np.float64], dt: float, hold: Hold, theta: NDArray[np.float64]

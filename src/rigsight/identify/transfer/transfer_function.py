@@ -10,15 +10,15 @@ at every point of the grid. W. K. Newey and K. D. West, Econometrica 55 (1987) 7
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.errors import InputError, check_option
-from rigsight.frequency import FrequencyResponse
+from rigsight.frequency import FrequencyResponse, PlainRatio, hold_response
 from rigsight.identify.fit.covariance import propagated_covariance, sandwich_covariance
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order, TransferForm
@@ -38,6 +38,7 @@ _STANDS_OUT = 4.0
 """Power of a line over its variance above which it is informative (two standard deviations)."""
 _COHERENT = 0.05
 _MISFIT = 3.0
+_DIFFERENCE = 1e-5
 
 
 def fit_frequency_response(
@@ -52,7 +53,8 @@ def fit_frequency_response(
     Parameters
     ----------
     measured
-        The frequency response; cut it with `FrequencyResponse.band` first.
+        The frequency response; cut it with `FrequencyResponse.band` first. The free motion in a `PlainRatio` is fitted with the
+        form.
     order
         ``"pt1"`` (thesis, 2.7) or ``"pt2"`` (2.9).
     longest_dead_time
@@ -77,16 +79,9 @@ def fit_frequency_response(
         time is requested with magnitudes only.
     """
     problem = _problem(measured, order, longest_dead_time, magnitude_only, weighting)
-    lower, upper = problem.bounds()
-    best = None
-    for start in problem.starts():
-        inside = np.clip(start, lower, upper)
-        found = least_squares(
-            problem.residual, inside, jac=problem.jacobian, bounds=(lower, upper), x_scale="jac", ftol=1e-12
-        )
-        if best is None or found.cost < best.cost:
-            best = found
-    assert best is not None
+    thin = problem.thinned()
+    rough = min((thin.fit(start) for start in thin.starts()), key=lambda found: float(found.cost))
+    best = problem.fit(rough.x)
     values, chain = problem.form.natural(best.x)
     covariance = propagated_covariance(problem.covariance(best.x), np.diag(chain))
     errors = np.sqrt(np.diag(covariance))
@@ -96,6 +91,7 @@ def fit_frequency_response(
     success = not notes
     notes += _reading_notes(magnitude_only, misfit)
     names = problem.form.names
+    motion, motion_covariance = problem.free_motion(best.x)
     kind = "magnitude" if magnitude_only else "complex"
     return TransferFit(
         form=problem.form,
@@ -112,6 +108,8 @@ def fit_frequency_response(
         unit=measured.unit,
         method=f"{kind} least squares, {problem.weighting} weights, on {measured.method or 'a frequency response'}",
         records=measured.records,
+        free_motion=motion,
+        free_motion_covariance=motion_covariance,
     )
 
 
@@ -129,11 +127,20 @@ class _Problem:
     longest_dead_time: float
     measured: FrequencyResponse
 
+    def fitted(self, theta: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return what the form shows at the lines, with the images of a held source around multiples of the sample rate."""
+        ratio = self.measured
+        if not isinstance(ratio, PlainRatio) or ratio.hold == "band_limited" or ratio.integrators:
+            return self.form.response(self.omega, theta)
+        lines = np.round(self.omega * ratio.n_samples * ratio.dt / (2.0 * np.pi)).astype(np.intp)
+        sampled = self.form.sampled_response(ratio.n_samples, ratio.dt, ratio.hold, theta)[lines]
+        return np.asarray(sampled / hold_response(self.omega, ratio.dt, ratio.hold))
+
     def errors(self, theta: NDArray[np.float64]) -> NDArray[np.complex128] | NDArray[np.float64]:
-        fitted = self.form.response(self.omega, theta)
         if self.magnitude_only:
-            return np.asarray(np.abs(self.values) - np.abs(fitted))
-        return np.asarray(self.values - fitted)
+            return np.asarray(np.abs(self.values) - np.abs(self.form.response(self.omega, theta)))
+        left = self.values - self.fitted(theta)
+        return left - self.free_motions(theta) @ self._free(theta, left)
 
     def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         return _components(self.errors(theta) * self.weights)
@@ -145,7 +152,44 @@ class _Problem:
             size = np.abs(fitted)
             direction = fitted.conj() / np.where(size > 0.0, size, 1.0)
             return np.asarray(-np.real(direction[:, None] * slopes) * self.weights[:, None])
-        return _components(-slopes * self.weights[:, None])
+        weighted = _components(-self._with_moving_poles(theta, slopes) * self.weights[:, None])
+        basis = np.linalg.qr(_components(self.free_motions(theta) * self.weights[:, None]))[0]
+        return np.asarray(weighted - basis @ (basis.T @ weighted))
+
+    def free_motions(self, theta: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return the basis of the free motion in the values, shape (n_lines, n_motions); empty if they contain none."""
+        if not isinstance(self.measured, PlainRatio):
+            return np.zeros((self.omega.size, 0), dtype=np.complex128)
+        return self.measured.free_motions(self.form.poles(theta))
+
+    def _free(self, theta: NDArray[np.float64], left: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Return the best weights of the basis of the free motion in what the form leaves, shape (n_motions,)."""
+        basis, left = self.free_motions(theta) * self.weights[:, None], left * self.weights
+        return np.asarray(np.linalg.lstsq(_components(basis), _components(left), rcond=None)[0])
+
+    def _with_moving_poles(
+        self, theta: NDArray[np.float64], slopes: NDArray[np.complex128]
+    ) -> NDArray[np.complex128]:
+        """Add the change of the free motion with the poles to the derivatives."""
+        weights = self._free(theta, self.values - self.fitted(theta))
+        if not weights.size:
+            return slopes
+        found = slopes.copy()
+        for i in range(1, self.form.n_poles + 1):
+            step = np.zeros_like(theta)
+            step[i] = _DIFFERENCE
+            change = self.free_motions(theta + step) - self.free_motions(theta - step)
+            found[:, i] += change @ weights / (2.0 * _DIFFERENCE)
+        return found
+
+    def free_motion(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the weights of the free motion's basis and their covariance."""
+        weights = self._free(theta, self.values - self.fitted(theta))
+        slopes = self._with_moving_poles(theta, self.form.derivatives(self.omega, theta))
+        columns = _components(np.hstack([self.free_motions(theta), slopes]) * self.weights[:, None])
+        size = max(self.misfit(theta), 1.0)
+        covariance = sandwich_covariance(columns.T @ columns, size**2 * (columns.T @ columns))
+        return weights, covariance[: weights.size, : weights.size]
 
     def misfit(self, theta: NDArray[np.float64]) -> float:
         residual = self.residual(theta)
@@ -160,8 +204,10 @@ class _Problem:
                 widened = max(self.misfit(theta), 1.0) ** 2 * _scattered_weights(self.measured.noise_freedom)
             return sandwich_covariance(bread, widened * self._shared_filling(theta))
         misfit = self.misfit(theta)
-        size = max(misfit, 1.0) if self.weighting == "variance" else misfit
-        return sandwich_covariance(bread, size**2 * bread)
+        if self.weighting == "variance":
+            widened = max(misfit, 1.0) ** 2 * _scattered_weights(self.measured.noise_freedom)
+            return sandwich_covariance(bread, widened * bread)
+        return sandwich_covariance(bread, misfit**2 * bread)
 
     def _shared_filling(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance of J^T r from the shares of each independent line of noise in all values."""
@@ -180,6 +226,27 @@ class _Problem:
         np.add.at(gathered, lines - first, scores)
         return np.asarray(0.5 * np.real(gathered.conj().T @ gathered))
 
+    def fit(self, start: NDArray[np.float64]) -> Any:
+        """Return the result of the optimizer from a start."""
+        lower, upper = self.bounds()
+        inside = np.clip(start, lower, upper)
+        return least_squares(
+            self.residual, inside, jac=self.jacobian, bounds=(lower, upper), x_scale="jac", ftol=1e-12
+        )
+
+    def thinned(self) -> _Problem:
+        """Return the problem on few lines, which suffice for the choice of a start."""
+        every = slice(None, None, -(-self.omega.size // _MOST_GRID_LINES))
+        kept = np.zeros(self.omega.size, dtype=np.bool_)
+        kept[every] = True
+        return replace(
+            self,
+            omega=self.omega[every],
+            values=self.values[every],
+            weights=self.weights[every],
+            measured=self.measured.at(kept),
+        )
+
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         low, high = self._reach()
         lower = self.form.vector(low, _DAMPING_RANGE[0], 0.0)
@@ -193,9 +260,8 @@ class _Problem:
 
     def starts(self) -> list[NDArray[np.float64]]:
         """Return the best points of the grid, each with its best gain."""
-        thin = slice(None, None, -(-self.omega.size // _MOST_GRID_LINES))
-        omega, weights = self.omega[thin], self.weights[thin]
-        measured: NDArray[np.complex128] = self.values[thin]
+        omega, weights = self.omega, self.weights
+        measured: NDArray[np.complex128] = self.values
         low, high = self._reach()
         goal = np.abs(measured) if self.magnitude_only else measured
         dampings = _GRID_DAMPINGS if self.form.order == "pt2" else np.ones(1)
@@ -208,11 +274,15 @@ class _Problem:
         found = []
         for omega_b, zeta in itertools.product(np.geomspace(low, high, _GRID_FREQUENCIES), dampings):
             theta = self.form.vector(float(omega_b), float(zeta), 0.0)
-            shape = self.form.response(omega, theta)
+            shape = weights * self.form.response(omega, theta)
+            told = weights * goal
             if self.magnitude_only:
                 shape = np.abs(shape).astype(np.complex128)
-            energy = float(np.sum((weights * np.abs(shape)) ** 2))
-            crossed = weights**2 * shape.conj() * goal
+            else:
+                basis = np.linalg.qr(_components(self.free_motions(theta) * weights[:, None]))[0]
+                shape, told = (_projected(vector, basis) for vector in (shape, told))
+            energy = float(np.sum(np.abs(shape) ** 2))
+            crossed = shape.conj() * told
             projections = np.real(forward @ crossed)
             if self.magnitude_only:
                 projections = np.maximum(projections, 0.0)
@@ -315,6 +385,15 @@ def _components(
         return np.asarray(values, dtype=np.float64)
     parts = np.stack([values.real, values.imag], axis=1)
     return np.asarray(parts.reshape(2 * values.shape[0], *values.shape[1:]))
+
+
+def _projected(values: NDArray[np.complex128], basis: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return what an orthonormal basis of components leaves of some values, shape (n_lines,)."""
+    if not basis.size:
+        return values
+    parts = _components(values)
+    left = (parts - basis @ (basis.T @ parts)).reshape(-1, 2)
+    return np.asarray(left[:, 0] + 1j * left[:, 1])
 
 
 def _scattered_weights(freedom: float) -> float:
