@@ -11,6 +11,7 @@ import sympy as sp
 
 from rigsight.effects import symbols
 from rigsight.effects.effect import Effect, Place
+from rigsight.effects.symbols import derivative
 from rigsight.parameters import Parameter
 from rigsight.rigs.evaluation import evaluated
 from rigsight.rigs.mechanism import Mechanism
@@ -144,7 +145,7 @@ class Rig:
         drive_gain, inertia = sp.S.Zero, None
         if mechanism.free:
             (drive,) = mechanism.drives
-            drive_gain = sp.diff(drive.force, sp.Symbol(drive.name, real=True))
+            drive_gain = derivative(drive.force, sp.Symbol(drive.name, real=True))
             inertia = mechanism.mass_matrix[0, 0]
         bias = -joint.force if mechanism.free else joint.force
         return Motion(
@@ -269,7 +270,7 @@ class Rig:
         pushing = {
             s.name
             for s in joint.force.free_symbols
-            if s.name in own and not sp.diff(joint.force, s).free_symbols & moving
+            if s.name in own and not derivative(joint.force, s).free_symbols & moving
         }
         resting = {s.name for s in joint.rest.free_symbols if s.name in own and joint.stiffness != 0}
         return frozenset((pushing | resting) - self._read_elsewhere(joint))

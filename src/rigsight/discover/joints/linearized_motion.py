@@ -33,7 +33,7 @@ _MOST_STEPS = 32
 """Largest number of steps per piece of the input; a state too stiff for it is assumed to follow without delay."""
 _LOOKED_AT = 25
 """Number of samples of a record at which the fastest rate is computed."""
-_FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0), "DiracDelta": lambda x: 0.0 * x}
+_FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
 
 
 @dataclass(frozen=True, eq=False)
