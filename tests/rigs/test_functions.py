@@ -11,6 +11,7 @@ import sympy as sp
 
 from rigsight.discover.joints.linearized_motion import MotionEquations
 from rigsight.effects.symbols import derivative
+from rigsight.errors import InputError
 from rigsight.export.internal_step import internal_step
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.start.linearized_responses import LinearizedResponses
@@ -24,6 +25,7 @@ from rigsight.simulate import compose, simulate
 from rigsight.simulate.drift import can_drift
 from rigsight.simulate.equations.derivatives import slope_functions
 from rigsight.simulate.model import Model
+from rigsight.workflow.run.variation_sweep import Pair, variation_sweep
 
 RIG = """
 name = "every_function"
@@ -133,3 +135,10 @@ def test_derivatives_of_functions_of_functions_can_be_evaluated() -> None:
 def _number(expression: sp.Expr, symbols: tuple[sp.Symbol, ...], at: tuple[float, ...]) -> float:
     with np.errstate(all="ignore"):
         return float(array_function(symbols, expression)(*map(np.float64, at)))
+
+
+def test_a_band_is_asked_for_where_the_equations_have_no_value_at_rest() -> None:
+    text = RIG.format(force="c*sin(x/a) + c*tanh(d(x)/b)")
+    text = text.replace('force = "motor"', 'force = "motor + c*atan2(motor/c, motor/c)"')
+    with pytest.raises(InputError, match="--lowest and --highest"):
+        variation_sweep(Model(compose(rig_of_text(text)), VALUES, "foh"), Pair("u", "position"), 1.0, None)

@@ -76,6 +76,11 @@ class Mechanism:
         """The coordinates whose motion an input prescribes."""
         return tuple(c for c in self.coordinates if c.prescribed_by is not None)
 
+    @property
+    def first_joint(self) -> Joint:
+        """The joint that effects at drives and sensors read; without joints, the first motion, which nothing resists."""
+        return self.joints[0] if self.joints else Joint("", self.coordinates[0].symbol)
+
     @cached_property
     def has_one_motion(self) -> bool:
         """True for one joint along the one coordinate, moved by one input or following it, without feedback.

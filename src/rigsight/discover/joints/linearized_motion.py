@@ -233,7 +233,7 @@ class MotionEquations:
     def _accelerations(self, x: Floats, u: Floats, t: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
         n = self._n
         values = _evaluated(self._values, (*x, *u, t, *p), x.shape[1])
-        mass = np.moveaxis(values[: n * n].reshape(n, n, -1), 2, 0)
+        mass = np.moveaxis(values[: n * n].reshape(n, n, x.shape[1]), 2, 0)
         forces = values[n * n : n * n + n].T
         solved = np.linalg.solve(mass, forces[:, :, None])[:, :, 0] if n else forces
         return np.ascontiguousarray(solved.T), mass, values

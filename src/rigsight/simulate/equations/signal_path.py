@@ -269,7 +269,7 @@ class _Path:
 
     def _of_motion(self) -> dict[str, sp.Expr]:
         """Return the signals of the motion for effects at a drive, a sensor or a state: those of the first joint."""
-        return self._signals(self._rig.mechanism.joints[0])
+        return self._signals(self._rig.mechanism.first_joint)
 
     def _spring(
         self, effects: Sequence[Effect], signals: Mapping[str, sp.Expr], memories: list[FirstOrderState]
