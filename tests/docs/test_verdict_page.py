@@ -68,7 +68,7 @@ STATED = (
     ("search.basin_spread", 0.3, "some 30 % off"),
     ("bootstrap.replicates", 60, "up to 60 times"),
     ("bootstrap.most_replicate_steps", 2_000_000, "more than 2 million steps"),
-    ("notes.advised_amplitudes", (0.3, 1.0, 1.5), "0.3, 1 and 1.5 times the largest input"),
+    ("notes.advised_amplitudes", (0.3, 1.0), "0.3 and 1 times the largest that stays within"),
 )
 
 

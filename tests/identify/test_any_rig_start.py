@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rigsight.effects import CATALOGUE, placed
 from rigsight.errors import InputError
 from rigsight.identify import linear_start
 from rigsight.identify.rig_equations import equations_of
+from rigsight.identify.start.any_rig_start import _Rough
 from rigsight.identify.start.weak_equations import WeakEquations
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS, Rig
@@ -147,6 +149,52 @@ def test_records_without_a_sensor_or_without_motion_are_refused() -> None:
     still = Record("run", DT, {"u": chirp(1.0), "motor_angle": np.full_like(T, 0.3)}, {})
     with pytest.raises(InputError, match="No sensor moves"):
         linear_start(rig, [still], constants_of(rig), {})
+
+
+GYRO = """
+name = "gyro"
+[inputs.stepper]
+unit = "rad"
+[parameters.gain]
+unit = "1"
+[parameters.bias]
+unit = "rad/s"
+[coordinates.angle]
+unit = "rad"
+prescribed_by = "stepper"
+[sensors.rate]
+reads = "gain*d(angle) + bias"
+unit = "rad/s"
+"""
+
+
+def test_sensors_of_a_prescribed_motion_need_no_joint() -> None:
+    rig = rig_of_text(GYRO)
+    truth = {"gain": 1.05, "bias": 0.02}
+    record = measured(rig, truth, {"stepper": chirp(0.5)})
+    found = linear_start(rig, [record], {}, {})
+    assert found["gain"] == pytest.approx(1.05, rel=0.01)
+    noise = SHARE * np.std(record["rate"]) / np.sqrt(T.size)
+    assert found["bias"] == pytest.approx(0.02, abs=3.0 * noise)
+    every = [placed(own, place) for own in CATALOGUE for place in rig.places(own.place)]
+    offered = [effect for effect in every if rig.offers(effect)]
+    assert {effect.at for effect in offered} == {"rate"}
+    for effect in offered:
+        assert compose(rig, [effect]).effects == (effect,)
+    with pytest.raises(InputError, match="at least one"):
+        rig_of_text(GYRO.replace('prescribed_by = "stepper"', ""))
+
+
+@pytest.mark.parametrize("n_samples", [20, 50, 63])
+def test_a_short_record_is_cut_into_pieces_that_say_more_than_their_own_initial_states(
+    n_samples: int,
+) -> None:
+    rig = rig_of("quarter_car")
+    record = measured(rig, {**CAR, "m_b": 300.0}, {"road": chirp(0.02)}).slice(0, n_samples)
+    rough = _Rough(rig, [record], {"m_b": 300.0}, [p.name for p in rig.parameters])
+    _, whole = rough.lengthening({"m_b": 300.0, **{name: 1.3 * value for name, value in CAR.items()}})
+    assert np.isfinite(whole.cost)
+    assert rough.holds_at_any_length(whole)
 
 
 def test_the_error_of_true_equations_is_of_the_size_that_noise_makes_it() -> None:

@@ -47,6 +47,21 @@ def test_offsets_of_a_sweep_are_known_far_better_than_its_motion_is_large() -> N
         assert found.standard_errors[name] < 2e-6
 
 
+def test_a_command_that_is_constant_from_the_first_sample_is_a_step_with_which_the_record_begins() -> None:
+    t = DT * np.arange(2500)
+    whole = measured(step(t, 0.6, 1.0), "step")
+    record = whole.slice(200, t.size)
+    assert np.ptp(record["u"]) == 0.0
+    assert measured_amplitude(record, RUNNING_GEAR)[0] == pytest.approx(0.6)
+    found = identify_record(record, RUNNING_GEAR, CONSTANTS, True, EstimationOptions())
+    motion = found.paths[0].physical
+    assert motion is not None
+    assert found.offsets is not None
+    for estimates, name in ((motion, "J_z"), (motion, "k_c"), (motion, "k_d"), (found.offsets, "psi_off")):
+        assert abs(estimates.values[name] - VALUES[name]) < 4.0 * estimates.standard_errors[name], name
+        assert estimates.standard_errors[name] < 0.05 * abs(VALUES[name]), name
+
+
 def test_a_record_that_is_too_short_is_told_what_would_help() -> None:
     record = measured(log_sweep(DT * np.arange(600), 3e-3, 0.6, 60.0), "sweep")
     motion = identify_record(record, RUNNING_GEAR, CONSTANTS, True, EstimationOptions()).paths[0]

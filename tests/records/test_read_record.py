@@ -91,10 +91,23 @@ def test_a_still_input_is_a_free_motion_and_said(write_csv: WriteCsv) -> None:
     assert "column 'u': no input changes (u = 0.5)" in record.notes[-1]
 
 
+def test_a_still_input_of_a_step_is_a_step_with_which_the_record_begins(write_csv: WriteCsv) -> None:
+    record = read_record(write_csv(change=replaced(1, "0.5")), INPUTS, OUTPUTS, kind="step", amplitude=0.5)
+    assert set(record["u"]) == {0.5}
+    assert "column 'u': no input changes (u = 0.5); taken as a step" in record.notes[-1]
+    with pytest.raises(InputError, match="no input changes"):
+        read_record(write_csv(change=replaced(1, "0")), INPUTS, OUTPUTS, kind="step")
+
+
 @pytest.mark.parametrize(
     "options",
-    [{"kind": "sweep"}, {"amplitude": 0.5}, {"moving_inputs": ("u",)}],
-    ids=["kind", "amplitude", "element"],
+    [
+        {"kind": "sweep"},
+        {"amplitude": 0.5},
+        {"moving_inputs": ("u",)},
+        {"moving_inputs": ("u",), "kind": "step"},
+    ],
+    ids=["kind", "amplitude", "element", "element that steps"],
 )
 def test_a_still_input_that_is_said_to_move_is_refused(write_csv: WriteCsv, options: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=r"no input changes \(u = 0\.5\).* Check the column"):

@@ -9,6 +9,7 @@ from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.report.quantities import Written, estimate_text, gap_percent, written
 from rigsight.report.wording import (
+    advice_sentences,
     percent,
     remainder_sentence,
     verdict_name,
@@ -133,3 +134,13 @@ def test_an_estimate_in_ascii() -> None:
     assert estimate_text(Estimate(3.1e5, 2e3, "N m/rad^3")) == "(3.100 +/- 0.020)e+5 N m/rad^3"
     assert estimate_text(Estimate(0.5, 0.01, "1")) == "0.500 +/- 0.010"
     assert estimate_text(Estimate(0.5, float("inf"), "1")) == "not determined by these records"
+
+
+def test_a_separation_far_above_the_noise_is_not_told_as_a_number(
+    variant: Callable[[str], Diagnosis],
+) -> None:
+    advised = variant("advised")
+    far = replace(advised, advice=(replace(advised.advice[0], separation=9364682.0),))
+    (sentence,) = advice_sentences(far)
+    assert "9364682" not in sentence
+    assert "100" in sentence

@@ -105,7 +105,10 @@ def step_window(record: Record, source: str, seconds: float = DEFAULT_SECONDS) -
     """
     start = _first_jump(record[source])
     if start == 0:
-        raise InputError(f"Record '{record.name}': the input '{source}' is constant, so there is no step.")
+        raise InputError(
+            f"Record '{record.name}': the input '{source}' is constant from the first sample, so the offset before the step is "
+            "unknown. Record some time at rest before the step."
+        )
     first = max(0, start - round(_BEFORE / record.dt))
     if start - first < _LEAST_BEFORE:
         raise InputError(

@@ -140,8 +140,11 @@ def _menu(context: FitContext) -> Iterator[_Experiment]:
     middles = {name: float(np.median(samples)) for name, samples in recorded.items()}
     rest = {name: np.full(n_samples, middle) for name, middle in middles.items()}
     for source, samples in recorded.items():
-        largest = float(np.max(np.abs(samples - middles[source])))
+        below, above = middles[source] - float(np.min(samples)), float(np.max(samples)) - middles[source]
         for share in NOTES.advised_amplitudes:
             for waveform, band, drive in drives:
+                # A step goes to one side of the middle, the others to both.
+                largest = (above if above >= below else -below) if waveform == "step" else min(above, below)
                 moved = {**rest, source: middles[source] + drive(share * largest)}
-                yield _Experiment(waveform, source, share * largest, band, moved)
+                if largest != 0.0:
+                    yield _Experiment(waveform, source, share * largest, band, moved)

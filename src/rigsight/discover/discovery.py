@@ -80,6 +80,11 @@ def discover(
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
+    if not data.rig.mechanism.joints:
+        raise InputError(
+            f"The rig '{data.rig.name}' has no joint, so no force is missing in it. Use 'rigsight diagnose', which tries effects "
+            "of its sensors."
+        )
     if not data.rig.has_one_motion:
         if method != "discrepancy" or pointwise:
             raise InputError(

@@ -17,6 +17,7 @@ from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.own_regression import own_regression, rows_of
 from rigsight.discover.regression import Projected, alike, inclusion_probabilities
 from rigsight.discover.terms.library import candidates, plain_terms
+from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated
@@ -144,7 +145,7 @@ def missing_force(
     terms = []
     for i, coefficient in zip(taken, coefficients, strict=True):
         (parameter,) = library[i].effect.parameters
-        shape = sp.diff(library[i].effect.torque, sp.Symbol(parameter.name, real=True))
+        shape = derivative(library[i].effect.torque, sp.Symbol(parameter.name, real=True))
         unit = rig.with_unit(parameter).unit
         terms.append(ShapeTerm(_text(shape), float(coefficient) * force, unit, float(inclusion[i])))
     return MissingForce(tuple(terms), share)

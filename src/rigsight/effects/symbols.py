@@ -74,6 +74,41 @@ class positive_part(sp.Function):  # type: ignore[misc]  # noqa: N801
         return rf"\max\left(0,\ {printer.doprint(self.args[0])}\right)"
 
 
+class _RealSign(sp.Function):  # type: ignore[misc]
+    """Sign of a real number; the jump at zero has no slope."""
+
+    is_real = True
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:  # noqa: ARG002
+        return sp.S.Zero
+
+
+class _RealAbs(sp.Function):  # type: ignore[misc]
+    """Magnitude of a real number."""
+
+    is_real = True
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:  # noqa: ARG002
+        return _RealSign(self.args[0])
+
+
+def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """Return the derivative of an expression of real numbers, without the impulse where a sign jumps.
+
+    `sympy.diff` keeps the impulse, and does not differentiate a sign or magnitude whose argument could be infinite or complex:
+    ``sign(x/a)``, because a could be 0, or ``Abs(x**n)``. Such results cannot be evaluated.
+    """
+    if not expression.has(sp.sign, sp.Abs, positive_part):
+        return sp.diff(expression, symbol)
+    real = expression.replace(sp.sign, _RealSign).replace(sp.Abs, _RealAbs)
+    return (
+        sp.diff(real, symbol)
+        .replace(sp.sign, _RealSign)
+        .replace(_RealSign, sp.sign)
+        .replace(_RealAbs, sp.Abs)
+    )
+
+
 def beyond(expression: sp.Expr, half_width: sp.Expr) -> sp.Expr:
     """Return the part of `expression` that lies beyond [-half_width, half_width], zero inside."""
     return positive_part(expression - half_width) - positive_part(-expression - half_width)

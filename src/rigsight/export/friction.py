@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.export.equations import Exported
 from rigsight.simulate.equations.structure import TIME, input_symbols
 
@@ -42,4 +43,4 @@ def slip_rate(exported: Exported) -> sp.Expr:
         value, rate, curvature = input_symbols(index)
         along |= {value: rate, rate: curvature}
     switch = exported.frozen.switches[mode]
-    return sp.Add(*(sp.diff(switch, s) * rate for s, rate in along.items() if s in switch.free_symbols))
+    return sp.Add(*(derivative(switch, s) * rate for s, rate in along.items() if s in switch.free_symbols))

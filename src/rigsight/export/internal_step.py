@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.effects.symbols import derivative
 from rigsight.export.at_rest import no_input
 from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, rest_state
@@ -55,7 +56,9 @@ def internal_step(model: Model) -> float:
             ahead, behind = rest.copy(), rest.copy()
             ahead[i] += _NUDGE
             behind[i] -= _NUDGE
-            rise = np.array(rates(still, 0.0, ahead, modes)) - rates(still, 0.0, behind, modes)
+            # On a side that a kink never has, a root or logarithm may have no real value.
+            with np.errstate(all="ignore"):
+                rise = np.array(rates(still, 0.0, ahead, modes)) - rates(still, 0.0, behind, modes)
             jacobian[:, i] = rise / (2.0 * _NUDGE)
         step = min(step, _of_eigenvalues(jacobian))
     return _rounded(step if is_linear(frozen, structure) else CAUTION * step)
@@ -65,7 +68,8 @@ def _rates(
     structure: Structure, frozen: FrozenStructure, p: NDArray[np.float64]
 ) -> Callable[..., list[float]]:
     """Return the rates as a function of inputs, time, states and modes."""
-    inputs, modules = _input_symbols(structure), [{"absolute": abs}, "math"]
+    kinks = {"absolute": np.abs, "positive_part": lambda value: np.maximum(value, 0.0)}
+    inputs, modules = _input_symbols(structure), [kinks, "numpy"]
     if not frozen.steps:
         bound = dict(zip(structure.parameter_symbols, p, strict=True))
         rates: Callable[..., list[float]] = sp.lambdify(
@@ -89,7 +93,7 @@ def is_linear(frozen: FrozenStructure, structure: Structure) -> bool:
             return False
         equations += map(structure.tree.flattened, motion.forces)
     return not frozen.modes and all(
-        sp.diff(equation, a, b) == 0
+        derivative(derivative(equation, a), b) == 0
         for equation in equations
         for a in moving & equation.free_symbols
         for b in moving & equation.free_symbols

@@ -29,6 +29,10 @@ def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
     inputs = [signal.name for signal in rig.inputs]
     outputs = [signal.name for signal in rig.outputs if signal.name in record]
     moving = [name for name in inputs if not is_constant(record[name])]
+    if record.kind == "step" and not moving:
+        # The record begins with the step.
+        name = max(inputs, key=lambda own: abs(float(record[own][0])))
+        return abs(float(record[name][0])), name
     name = (moving or outputs or inputs)[0]
     # Not the deviation from mean or median, which are not zero for a sweep that begins slowly.
     spanned = float(np.ptp(record[name]))

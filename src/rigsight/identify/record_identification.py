@@ -26,7 +26,7 @@ from rigsight.identify.transfer.running_gear_parameters import (
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
-from rigsight.identify.transfer.transfer_step import fit_step
+from rigsight.identify.transfer.transfer_step import fit_step, input_at_rest
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
 from rigsight.records.reference import instrument_of
@@ -336,7 +336,7 @@ def _step_offsets(
     record: Record, rest: str, fit: TransferFit, lateral: PathIdentification | None
 ) -> PhysicalEstimates:
     """Return the offsets of a step from the responses at rest before it, by (2.26) and (2.27)."""
-    first = float(record[fit.source][0])
+    first = input_at_rest(record, fit.source)
     at_rest = fit.values["offset"]
     slope = np.array([1.0, -first])
     variance = float(slope @ fit.covariance_of("offset", "gain") @ slope)

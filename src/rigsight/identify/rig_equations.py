@@ -12,6 +12,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.effects.symbols import derivative
 from rigsight.records.record import Record
 from rigsight.rigs import Joint, Rig, applied_symbol
 from rigsight.simulate import compose, parameter_vector, record_input, record_values
@@ -94,7 +95,7 @@ class RigEquations:
             for sensor in self.rig.mechanism.sensors
             if sensor.name in measured and sensor.reads.free_symbols <= set(wanted)
         ]
-        slopes = sp.Matrix(read).jacobian(wanted) if read and wanted else sp.Matrix(0, 0, [])
+        slopes = sp.Matrix(len(read), len(wanted), [derivative(e, s) for e in read for s in wanted])
         return bool(slopes.is_symbolic() is False and slopes.rank() == len(wanted))
 
     @cached_property
@@ -209,9 +210,11 @@ class RigEquations:
         for c in mechanism.free:
             force = sp.S.Zero
             for drive in mechanism.drives:
-                force += sp.diff(drive.along, c.symbol) * drive.force
+                force += derivative(drive.along, c.symbol) * drive.force
             for joint in mechanism.joints:
-                force -= sp.diff(joint.motion, c.symbol) * sum(_resisting(joint, self.rig), start=sp.S.Zero)
+                force -= derivative(joint.motion, c.symbol) * sum(
+                    _resisting(joint, self.rig), start=sp.S.Zero
+                )
             applied.append(force)
         on_bodies = {applied_symbol(i): force for i, force in enumerate(applied)}
         forces = [force + own.xreplace(on_bodies) for force, own in zip(applied, of_bodies, strict=True)]
@@ -263,7 +266,7 @@ class RigEquations:
         """
         elimination = self.structure.elimination
         if elimination is None:
-            return self._function([*beside, *(sp.diff(e, s) for e in expressions for s in by)], *further)
+            return self._function([*beside, *(derivative(e, s) for e in expressions for s in by)], *further)
         line = straight_line([*beside, *expressions], elimination.begun(self.structure.steps))
         changes = slopes_of(StraightLine(line.parts, line.results[len(beside) :]), by)
         results = (*line.results[: len(beside)], *changes.results)
@@ -294,13 +297,13 @@ class RigEquations:
     @cached_property
     def _by_state(self) -> Any:
         return self._function(
-            [sp.diff(e, symbol) for e in self._sensor_expressions for symbol in self.structure.states]
+            [derivative(e, symbol) for e in self._sensor_expressions for symbol in self.structure.states]
         )
 
     @cached_property
     def _by_input(self) -> Any:
         inputs = [s for i in range(len(self.rig.inputs)) for s in input_symbols(i)]
-        return self._function([sp.diff(e, symbol) for e in self._sensor_expressions for symbol in inputs])
+        return self._function([derivative(e, symbol) for e in self._sensor_expressions for symbol in inputs])
 
     @cached_property
     def _of_places(self) -> tuple[list[str], Any]:
@@ -316,7 +319,7 @@ class RigEquations:
     def _along(self) -> Any:
         mechanism = self.rig.mechanism
         moved = [*(joint.motion for joint in mechanism.joints), *(drive.along for drive in mechanism.drives)]
-        slopes = [sp.diff(motion, c.symbol) for motion in moved for c in mechanism.free]
+        slopes = [derivative(motion, c.symbol) for motion in moved for c in mechanism.free]
         return self._function(self._bound(slopes))
 
     def _bound(self, expressions: list[sp.Expr]) -> list[sp.Expr]:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
 
 _MOST_ORDERED = 7
@@ -128,9 +129,9 @@ class _Reader:
         found = {}
         mechanism = self._mechanism
         for a, b in combinations(mechanism.coordinates, 2):
-            if sp.diff(mechanism.kinetic, a.rate, b.rate) != 0:
+            if derivative(derivative(mechanism.kinetic, a.rate), b.rate) != 0:
                 found[a.name, b.name] = "coupled inertia"
-            elif b.symbol in sp.diff(mechanism.potential, a.symbol).free_symbols:
+            elif b.symbol in derivative(mechanism.potential, a.symbol).free_symbols:
                 found[a.name, b.name] = "coupled potential"
         return found
 
@@ -200,7 +201,7 @@ class _Reader:
             )
         index = mechanism.free.index(coordinate)
         inertia = self._numbers(mechanism.mass_matrix[index, index])
-        potential = self._numbers(sp.diff(mechanism.potential, coordinate.symbol))
+        potential = self._numbers(derivative(mechanism.potential, coordinate.symbol))
         lines += [f"inertia {inertia}"] if inertia else []
         lines += [f"potential {potential}"] if potential else []
         return Body(coordinate.name, title, "free", tuple(lines))

@@ -201,7 +201,7 @@ def read_stretches(
         raw, found = moving(path, raw, table, needed, outputs)
         if role == "estimation":
             must_move = moving_inputs if may_rest else [signal.name for signal in recorded]
-            found += rest_notes(path, raw, table, recorded, must_move)
+            found += rest_notes(path, raw, table, recorded, must_move, kind == "step" and not moving_inputs)
     # A command stands at its extremes on purpose.
     found += clipping_notes(path, {name: v for name, v in raw.items() if name not in beside}, table)
     found += alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)

@@ -101,14 +101,20 @@ def rest_notes(
     table: Columns,
     recorded: Sequence[NamedSignal],
     must_move: Collection[str],
+    is_step: bool,
 ) -> list[str]:
-    """Tell of recorded inputs none of which changes: the rig moves freely, or a column is the wrong one."""
+    """Tell that no recorded input changes: the record begins with a step, the rig moves freely, or a column is wrong."""
     held = [signal.name for signal in recorded if signal.name in raw]
     if not held or not all(is_constant(raw[signal]) for signal in held):
         return []
     values = ", ".join(f"{signal} = {raw[signal][0]:g}" for signal in held)
     listed = ", ".join(f"'{table.labels[signal]}'" for signal in held)
     where = f"{path.name}, column{'s' if len(held) > 1 else ''} {listed}"
+    if is_step and any(raw[signal][0] != 0.0 for signal in held):
+        return [
+            f"{where}: no input changes ({values}); taken as a step from 0 with which the record begins. Record some time at "
+            "rest before the step: it shows the offset, and that the rig was at rest."
+        ]
     if set(held) & set(must_move):
         raise InputError(
             f"{where}: no input changes ({values}), so nothing is excited and nothing can be identified. Check the column. "

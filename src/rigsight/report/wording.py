@@ -21,6 +21,8 @@ _WITHOUT_EFFECT = "no effect, refitted parameters"
 _PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck", "iwan": "Iwan"}
 _SEPARATES = 1.0
 """RMS difference in standard deviations of the noise below which an experiment does not help."""
+_DECIDES = 100.0
+"""RMS difference in standard deviations of the noise above which a larger one decides no more: models err by more than noise."""
 _PLACES = {
     "actuator": "at the actuator",
     "sensor": "at the sensor",
@@ -316,6 +318,8 @@ def advice_sentences(diagnosis: Diagnosis) -> list[str]:
 def _deviations(separation: float) -> str:
     if separation < 0.1:
         return "less than 0.1 standard deviations"
+    if separation > _DECIDES:
+        return f"more than {_DECIDES:g} standard deviations"
     return (
         f"{separation:.0f} standard deviations"
         if separation >= 10.0

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.rigs.built_in import RUNNING_GEAR
 from rigsight.rigs.evaluation import evaluated
 
 (_CREEP_FACTOR,) = (a.value for a in RUNNING_GEAR.alternatives if a.parameter.name == "delta_0")
-_SLOPE = sp.diff(_CREEP_FACTOR, sp.Symbol("delta_0", real=True))
+_SLOPE = derivative(_CREEP_FACTOR, sp.Symbol("delta_0", real=True))
 
 
 def creep_factor(delta_0: float, r_0: float, b: float) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 
 _KINKS = {"positive_part": lambda value: max(value, 0.0)}
@@ -67,7 +68,7 @@ def relative_slopes(expression: sp.Expr, values: Mapping[str, float]) -> dict[st
         As for `evaluated`.
     """
     return {
-        symbol.name: evaluated(sp.diff(expression, symbol) * symbol / expression, values)
+        symbol.name: evaluated(derivative(expression, symbol) * symbol / expression, values)
         for symbol in sorted(expression.free_symbols, key=str)
     }
 

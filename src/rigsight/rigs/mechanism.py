@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 from sympy.simplify.fu import TR8
 
+from rigsight.effects.symbols import derivative
 from rigsight.rigs.coupled_inertia import has_short_inverse
 from rigsight.rigs.parts import (
     Coordinate,
@@ -75,6 +76,11 @@ class Mechanism:
         """The coordinates whose motion an input prescribes."""
         return tuple(c for c in self.coordinates if c.prescribed_by is not None)
 
+    @property
+    def first_joint(self) -> Joint:
+        """The joint that effects at drives and sensors read; without joints, the first motion, which nothing resists."""
+        return self.joints[0] if self.joints else Joint("", self.coordinates[0].symbol)
+
     @cached_property
     def has_one_motion(self) -> bool:
         """True for one joint along the one coordinate, moved by one input or following it, without feedback.
@@ -101,7 +107,7 @@ class Mechanism:
     def _is_plain(self, drive: Drive) -> bool:
         """Return True for a drive whose force is an input times a constant gain."""
         own = sp.Symbol(drive.name, real=True)
-        gain = sp.diff(drive.force, own)
+        gain = derivative(drive.force, own)
         read = gain.free_symbols | {own, *drive.signal.free_symbols}
         moving = {c.symbol for c in self.coordinates} | {c.rate for c in self.coordinates}
         moving |= {state.symbol for state in self.states} | set(self.signals)
@@ -117,7 +123,7 @@ class Mechanism:
         """``d^2 T / d q' d q'`` of the degrees of freedom, shape (n, n)."""
         rates, momenta = [c.rate for c in self.free], self._momenta
         entries = {
-            (i, j): _shortened(sp.diff(momenta[i], rates[j])) + self._simulated_mass(i, j)
+            (i, j): _shortened(derivative(momenta[i], rates[j])) + self._simulated_mass(i, j)
             for i in range(len(rates))
             for j in range(i + 1)
         }
@@ -150,7 +156,7 @@ class Mechanism:
         """Momentum of each degree of freedom, and its rate without drives and joints."""
         momenta, forces, rates = [], [], [c.rate for c in self.free]
         for i, (own, momentum) in enumerate(zip(self.free, self._momenta, strict=True)):
-            force = sp.diff(self.kinetic - self.potential, own.symbol) + self.simulated_forces[i]
+            force = derivative(self.kinetic - self.potential, own.symbol) + self.simulated_forces[i]
             row = [self._simulated_mass(i, j) for j in range(len(rates))]
             momenta.append(momentum + sp.Add(*(mass * rate for mass, rate in zip(row, rates, strict=True))))
             # The mass matrix turns with the motion: d(M v) / dt = M a + dM/dt v.
@@ -160,7 +166,7 @@ class Mechanism:
 
     @cached_property
     def _momenta(self) -> tuple[sp.Expr, ...]:
-        return tuple(sp.diff(self.kinetic, c.rate) for c in self.free)
+        return tuple(derivative(self.kinetic, c.rate) for c in self.free)
 
     @cached_property
     def generalized_forces(self) -> tuple[sp.Expr, ...]:
@@ -171,7 +177,7 @@ class Mechanism:
         """
         forces = []
         for coordinate, momentum in zip(self.free, self._momenta, strict=True):
-            lagrangian = sp.diff(self.kinetic - self.potential, coordinate.symbol)
+            lagrangian = derivative(self.kinetic - self.potential, coordinate.symbol)
             forces.append(_shortened(lagrangian - self._along_motion(momentum)))
         return tuple(forces)
 
@@ -183,16 +189,16 @@ class Mechanism:
         ahead = sp.Symbol("time ahead", real=True)
         moved = {c.symbol: c.symbol + ahead * c.rate for c in self.coordinates}
         moved |= {c.rate: c.rate + ahead * acceleration(c) for c in self.prescribed}
-        return sp.diff(expression.xreplace(moved), ahead).xreplace({ahead: sp.Integer(0)})
+        return derivative(expression.xreplace(moved), ahead).xreplace({ahead: sp.Integer(0)})
 
     def rate(self, expression: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression of the coordinates."""
-        return sum((sp.diff(expression, c.symbol) * c.rate for c in self.coordinates), start=sp.Integer(0))
+        return sum((derivative(expression, c.symbol) * c.rate for c in self.coordinates), start=sp.Integer(0))
 
     def prescribed_rate(self, expression: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression of prescribed coordinates and their rates."""
         along = sum(
-            (sp.diff(expression, c.rate) * acceleration(c) for c in self.prescribed), start=sp.Integer(0)
+            (derivative(expression, c.rate) * acceleration(c) for c in self.prescribed), start=sp.Integer(0)
         )
         return self.rate(expression) + along
 
@@ -207,30 +213,30 @@ class Mechanism:
         joint
             One of `joints`; its own spring and force are left out.
         """
-        along = [c for c in self.coordinates if sp.diff(joint.motion, c.symbol) != 0]
+        along = [c for c in self.coordinates if derivative(joint.motion, c.symbol) != 0]
         at_rest = {c.rate: sp.Integer(0) for c in self.coordinates}
         if len(along) == 1:
             (coordinate,) = along
-            slope = sp.diff(joint.motion, coordinate.symbol)
-            drives = [sp.diff(drive.along, coordinate.symbol) * drive.force for drive in self.drives]
+            slope = derivative(joint.motion, coordinate.symbol)
+            drives = [derivative(drive.along, coordinate.symbol) * drive.force for drive in self.drives]
             springs = [
-                sp.diff(other.motion, coordinate.symbol)
+                derivative(other.motion, coordinate.symbol)
                 * (other.stiffness * (other.motion - other.rest) + other.force.xreplace(at_rest))
                 for other in self.joints
                 if other is not joint
             ]
-            return sp.Add(*drives, sp.diff(self.potential, coordinate.symbol), *springs) / slope
+            return sp.Add(*drives, derivative(self.potential, coordinate.symbol), *springs) / slope
         pushing = []
         for drive in self.drives:
-            ratios = {sp.diff(drive.along, c.symbol) / sp.diff(joint.motion, c.symbol) for c in along}
-            others = any(sp.diff(drive.along, c.symbol) != 0 for c in self.coordinates if c not in along)
+            ratios = {derivative(drive.along, c.symbol) / derivative(joint.motion, c.symbol) for c in along}
+            others = any(derivative(drive.along, c.symbol) != 0 for c in self.coordinates if c not in along)
             if len(ratios) == 1 and not others:
                 pushing.append(ratios.pop() * drive.force)
         return sp.Add(*pushing)
 
     def moves_inertia(self, expression: sp.Expr) -> bool:
         """Return True if a force along an expression of the coordinates moves a degree of freedom."""
-        return any(sp.diff(expression, c.symbol) != 0 for c in self.free)
+        return any(derivative(expression, c.symbol) != 0 for c in self.free)
 
     @cached_property
     def has_short_inverse(self) -> bool:
@@ -242,7 +248,7 @@ class Mechanism:
 
         ``1 / (J M^-1 J^T)`` with the slopes J of the expression: O. Khatib, IEEE J. Robot. Autom. 3 (1987) 43.
         """
-        slopes = sp.Matrix([[sp.diff(expression, c.symbol) for c in self.free]])
+        slopes = sp.Matrix([[derivative(expression, c.symbol) for c in self.free]])
         if not self.moves_inertia(expression):
             return None
         mobility = (slopes * self.mass_matrix.LUsolve(slopes.T))[0, 0]
@@ -252,7 +258,7 @@ class Mechanism:
         """Return the number of `inertia_along` where coordinates and parameters have values; None where it moves nothing."""
         if not self.moves_inertia(expression):
             return None
-        slopes = [sp.diff(expression, c.symbol) for c in self.free]
+        slopes = [derivative(expression, c.symbol) for c in self.free]
         n, numbers = len(slopes), {sp.Symbol(name, real=True): value for name, value in values.items()}
         mass = np.array([float(entry.xreplace(numbers)) for entry in self.mass_matrix]).reshape(n, n)
         along = np.array([float(slope.xreplace(numbers)) for slope in slopes])

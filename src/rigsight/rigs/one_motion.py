@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.rigs.parts import Coordinate, RateState
 
 
@@ -68,7 +69,7 @@ class Follower:
 
 def follower_of(state: RateState, motion: Coordinate) -> Follower | None:
     """Return how a state follows the motion; None where its rate is not a sum of the two, each with a factor."""
-    gain, back = sp.diff(state.rate, motion.symbol), sp.diff(state.rate, state.symbol)
+    gain, back = derivative(state.rate, motion.symbol), derivative(state.rate, state.symbol)
     moving = {motion.symbol, motion.rate, state.symbol}
     if gain == 0 or back == 0 or (gain.free_symbols | back.free_symbols) & moving:
         return None

@@ -11,6 +11,7 @@ import sympy as sp
 
 from rigsight.effects import symbols
 from rigsight.effects.effect import Effect, Place
+from rigsight.effects.symbols import derivative
 from rigsight.parameters import Parameter
 from rigsight.rigs.evaluation import evaluated
 from rigsight.rigs.mechanism import Mechanism
@@ -144,7 +145,7 @@ class Rig:
         drive_gain, inertia = sp.S.Zero, None
         if mechanism.free:
             (drive,) = mechanism.drives
-            drive_gain = sp.diff(drive.force, sp.Symbol(drive.name, real=True))
+            drive_gain = derivative(drive.force, sp.Symbol(drive.name, real=True))
             inertia = mechanism.mass_matrix[0, 0]
         bias = -joint.force if mechanism.free else joint.force
         return Motion(
@@ -188,7 +189,7 @@ class Rig:
     @property
     def units(self) -> dict[str, str]:
         """Unit of each base quantity of its first joint: x, force, input, time, and length where a state follows."""
-        return self.units_at(self.mechanism.joints[0].name)
+        return self.units_at(self.mechanism.first_joint.name)
 
     def units_at(self, place: str) -> dict[str, str]:
         """Return the unit of each base quantity at a joint, a drive or a sensor.
@@ -199,7 +200,7 @@ class Rig:
             Its name; at a drive x and force are those of the first joint, at a sensor x is what it reads.
         """
         mechanism = self.mechanism
-        joint = next((joint for joint in mechanism.joints if joint.name == place), mechanism.joints[0])
+        joint = next((joint for joint in mechanism.joints if joint.name == place), mechanism.first_joint)
         coordinates = [c for c in mechanism.coordinates if c.symbol in joint.motion.free_symbols]
         x = coordinates[0].unit if coordinates else "1"
         force = {"rad": "N m", "m": "N"}.get(x, f"J/{x}" if " " not in x else f"J/({x})")
@@ -269,7 +270,7 @@ class Rig:
         pushing = {
             s.name
             for s in joint.force.free_symbols
-            if s.name in own and not sp.diff(joint.force, s).free_symbols & moving
+            if s.name in own and not derivative(joint.force, s).free_symbols & moving
         }
         resting = {s.name for s in joint.rest.free_symbols if s.name in own and joint.stiffness != 0}
         return frozenset((pushing | resting) - self._read_elsewhere(joint))
@@ -371,5 +372,5 @@ class Rig:
 
 def joint_of(rig: Rig, effect: Effect) -> Joint:
     """Return the joint at which an effect acts; the first one for an effect at a drive, a sensor or a state."""
-    joints = rig.mechanism.joints
-    return next((joint for joint in joints if joint.name == effect.at), joints[0])
+    mechanism = rig.mechanism
+    return next((joint for joint in mechanism.joints if joint.name == effect.at), mechanism.first_joint)

@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 from scipy.linalg import null_space
 
+from rigsight.effects.symbols import derivative
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.equations.structure import TIME, input_symbols
@@ -39,7 +40,7 @@ def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
         # Without velocities and input rates the forces are short; otherwise their slopes would be too long.
         zero = dict.fromkeys(still, sp.S.Zero)
         rates, shown = ([e.xreplace(zero) for e in own] for own in (rates, shown))
-    slopes = sp.Matrix([*rates, *shown]).jacobian(states)
+    slopes = sp.Matrix([[derivative(e, state) for state in states] for e in (*rates, *shown)])
     symbols = sorted(slopes.free_symbols, key=str)
     function = sp.lambdify(symbols, slopes, [{"positive_part": lambda x: np.maximum(x, 0.0)}, "numpy"])
     rng = np.random.default_rng(0)

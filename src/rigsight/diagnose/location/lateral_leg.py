@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 import scipy.signal
-import sympy as sp
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.diagnose.policy import MAPS
+from rigsight.effects.symbols import derivative
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
@@ -109,8 +109,8 @@ def _given(rig: Rig, values: Mapping[str, float]) -> _Numbers:
     rates = lateral.gain * lateral.creepage
     numbers = {s: values[s.name] for s in rates.free_symbols if s.name in values}
     x, y = rig.motion.displacement, lateral.symbol
-    rate = -float(sp.diff(rates, y).subs(numbers))
-    gain = float(sp.diff(rates, x).subs(numbers)) / rate
+    rate = -float(derivative(rates, y).subs(numbers))
+    gain = float(derivative(rates, x).subs(numbers)) / rate
     offset = float(rates.subs({**numbers, x: 0.0, y: 0.0})) / rate
     return _Numbers(rate, gain, offset)
 

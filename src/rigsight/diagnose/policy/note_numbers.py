@@ -153,11 +153,11 @@ class NoteNumbers:
         ),
     )
     advised_amplitudes: tuple[float, ...] = number(
-        (0.3, 1.0, 1.5),
+        (0.3, 1.0),
         "convention",
         (
-            "Amplitudes of an advised experiment in units of the largest input that was recorded: more than 1.5 times the "
-            "largest recorded input could damage the rig."
+            "Amplitudes of an advised experiment in units of the largest that stays within the recorded inputs: nothing shows "
+            "that the rig bears more."
         ),
     )
     advised_periods: float = number(

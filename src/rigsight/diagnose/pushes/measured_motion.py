@@ -6,6 +6,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.effects.symbols import derivative
 from rigsight.rigs import Rig
 
 _DETERMINED = 1e-6
@@ -63,7 +64,7 @@ def _slopes(
     expression: sp.Expr, coordinates: list[sp.Symbol], numbers: set[sp.Symbol]
 ) -> NDArray[np.float64] | None:
     """Return the derivatives by each coordinate of a sum of multiples of them and numbers; None for any other expression."""
-    slopes = [sp.diff(expression, coordinate) for coordinate in coordinates]
+    slopes = [derivative(expression, coordinate) for coordinate in coordinates]
     if any(not slope.is_number for slope in slopes) or not any(slopes):
         return None
     rest = sp.expand(expression - sum(s * c for s, c in zip(slopes, coordinates, strict=True)))

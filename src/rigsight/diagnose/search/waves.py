@@ -13,6 +13,7 @@ from rigsight.diagnose.pushes.measured_motion import Corrections
 from rigsight.diagnose.search.position_line import Answer, Floats, Law, Run, position_lines
 from rigsight.effects import Effect, Place, placed_dimension
 from rigsight.effects import symbols as canonical
+from rigsight.effects.symbols import derivative
 from rigsight.identify import FitResult
 from rigsight.rigs import evaluated, joint_of
 from rigsight.units import characteristic_value
@@ -48,7 +49,7 @@ def _law(effect: Effect) -> tuple[list[str], Law]:
     signal = canonical.position if effect.measured is None else canonical.reading
     wave = sp.Symbol(str(effect.wave_number), real=True)
     names = [p.name for p in effect.parameters if p.fitted and p.name != effect.wave_number]
-    slopes = [sp.diff(law, sp.Symbol(name, real=True)) for name in names]
+    slopes = [derivative(law, sp.Symbol(name, real=True)) for name in names]
     parts = sp.lambdify((signal, wave), slopes, "numpy")
 
     def along(way: Floats, wave_number: float) -> Sequence[Floats]:

@@ -33,7 +33,7 @@ _MOST_STEPS = 32
 """Largest number of steps per piece of the input; a state too stiff for it is assumed to follow without delay."""
 _LOOKED_AT = 25
 """Number of samples of a record at which the fastest rate is computed."""
-_FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0), "DiracDelta": lambda x: 0.0 * x}
+_FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +233,7 @@ class MotionEquations:
     def _accelerations(self, x: Floats, u: Floats, t: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
         n = self._n
         values = _evaluated(self._values, (*x, *u, t, *p), x.shape[1])
-        mass = np.moveaxis(values[: n * n].reshape(n, n, -1), 2, 0)
+        mass = np.moveaxis(values[: n * n].reshape(n, n, x.shape[1]), 2, 0)
         forces = values[n * n : n * n + n].T
         solved = np.linalg.solve(mass, forces[:, :, None])[:, :, 0] if n else forces
         return np.ascontiguousarray(solved.T), mass, values

@@ -23,6 +23,7 @@ from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.weak_form import Rows
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
+from rigsight.effects.symbols import derivative
 from rigsight.simulate.printing.text import TermPrinter
 
 _FORCE = sp.Symbol("F", real=True)
@@ -65,7 +66,7 @@ class ForceLaw:
         parameters: dict[str, str] = {}
         for parameter in effect.parameters:
             symbol = sp.Symbol(parameter.name, real=True)
-            slope = sp.diff(state.rate, symbol)
+            slope = derivative(state.rate, symbol)
             if slope != 0 and not slope.has(symbol):
                 term = slope.xreplace(written)
                 terms[_name(term)], parameters[_name(term)] = term, parameter.name

@@ -27,6 +27,7 @@ from rigsight.discover.weak_form import Rows
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Place
+from rigsight.effects.symbols import derivative
 from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
@@ -253,7 +254,7 @@ def _constant_name(name: str) -> Any:
 
 def _slope(effect: Effect, parameter: Parameter) -> sp.Expr:
     assert effect.torque is not None
-    return sp.diff(effect.torque, sp.Symbol(parameter.name, real=True))
+    return derivative(effect.torque, sp.Symbol(parameter.name, real=True))
 
 
 @dataclass(frozen=True, eq=False)

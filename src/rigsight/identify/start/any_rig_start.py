@@ -167,6 +167,8 @@ class _Rough:
         most = max(1, _MOST_SAMPLES // len(records))
         self._rig, self._values, self._free = rig, values, list(free)
         self._records = [record.slice(0, min(most, record.n_samples)) for record in records]
+        # The initial state of a piece alone takes as many readings as it has states, and the input between samples takes two.
+        self._most_cuts = min(r.n_samples for r in self._records) // (2 + len(compose(rig).states))
         self._noise = {signal.name: _noise(signal.name, records) for signal in rig.outputs}
 
     def explains(self, fit: FitResult) -> bool:
@@ -182,7 +184,7 @@ class _Rough:
         if not np.isfinite(whole.cost):
             return False
         scales = scales_at_places(self._rig, self._records, whole.values)
-        pieces = self._fitted(_LONG_PIECES, whole.values, scales)
+        pieces = self._fitted(max(1, min(_LONG_PIECES, self._most_cuts)), whole.values, scales)
         return whole.cost / whole.n_samples <= _GROWN**2 * pieces.cost / max(1, pieces.n_samples)
 
     def lengthening(self, start: Mapping[str, float]) -> tuple[FitResult | None, FitResult]:
@@ -196,7 +198,7 @@ class _Rough:
         """
         explained: FitResult | None = None
         values, scales = start, scales_at_places(self._rig, self._records, start)
-        for count in _PIECES:
+        for count in (count for count in _PIECES if count <= self._most_cuts):
             in_pieces = self._fitted(count, values, scales)
             values = in_pieces.values if np.isfinite(in_pieces.cost) else values
             if count <= _LONG_PIECES and self.explains(in_pieces):

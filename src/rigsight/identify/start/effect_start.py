@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
+from rigsight.effects.symbols import derivative
 from rigsight.identify.start.equation_error import Spectra, Term, solve_in_frequency, spectra_of
 from rigsight.parameters import Parameter
 from rigsight.records.record import Record
@@ -135,7 +136,7 @@ class EffectRegression:
     def _regressed(
         self, effect: Effect, linear: Sequence[Parameter], inner: Mapping[str, float]
     ) -> tuple[dict[str, float] | None, float]:
-        torques = [_function(sp.diff(effect.torque, sp.Symbol(p.name, real=True)), inner) for p in linear]
+        torques = [_function(derivative(effect.torque, sp.Symbol(p.name, real=True)), inner) for p in linear]
         deflection = _function(effect.deflection, inner) if effect.deflection is not None else None
         drive = _function(effect.drive, inner) if effect.drive is not None else None
         terms: list[list[Term]] = []
@@ -163,7 +164,7 @@ class EffectRegression:
 
 def _is_linear(expression: sp.Expr, parameter: Parameter) -> bool:
     symbol = sp.Symbol(parameter.name, real=True)
-    return not sp.diff(expression, symbol).has(symbol)
+    return not derivative(expression, symbol).has(symbol)
 
 
 def _function(expression: sp.Expr, inner: Mapping[str, float]):  # type: ignore[no-untyped-def]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import null_space
 
+from rigsight.effects.symbols import derivative
 from rigsight.identify.rig_equations import RigEquations
 from rigsight.records.record import Record
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -70,7 +71,7 @@ def sensor_factors(equations: RigEquations, free: frozenset[str]) -> dict[str, t
     given = set(structure.parameter_symbols) - unknown
     found = {}
     for name, reading in zip(equations.sensor_names, structure.outputs, strict=False):
-        factors = tuple(sp.diff(reading, state) for state in structure.states)
+        factors = tuple(derivative(reading, state) for state in structure.states)
         if all(factor.free_symbols <= given for factor in factors):
             found[name] = factors
     return found

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 from rigsight.identify.fit.covariance import LEVEL as LEVEL
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
@@ -194,7 +194,7 @@ def static_lateral(l_0: float) -> tuple[float, float]:
     gain = ROLLING.static_gain
     (length,) = gain.free_symbols
     numbers = {length.name: l_0}
-    return evaluated(gain, numbers), evaluated(sp.diff(gain, length), numbers)
+    return evaluated(gain, numbers), evaluated(derivative(gain, length), numbers)
 
 
 def check_fit(fit: TransferFit, order: str, which: str, ratio: str) -> None:

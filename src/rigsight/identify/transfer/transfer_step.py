@@ -22,6 +22,7 @@ from rigsight.identify.transfer.step_residuals import step_covariance
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order, TransferForm
 from rigsight.identify.undetermined import POORLY_KNOWN
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Hold, Record
 
 _GRID_FREQUENCIES = 17
@@ -187,6 +188,11 @@ class _Problem:
         return [theta for _, theta in found[:_STARTS]]
 
 
+def input_at_rest(record: Record, source: str) -> float:
+    """Return the input before a record of a step: its first sample, or 0 if the record begins with the step."""
+    return 0.0 if is_constant(record[source]) else float(record[source][0])
+
+
 def _problem(
     record: Record,
     source: str,
@@ -209,8 +215,8 @@ def _problem(
     first, last = int(inside[0]), int(inside[-1]) + 1
     before = max(first - 1, 0)
     u = record[source][before:last]
-    # If the record begins with the window, the first sample is taken as the value at rest.
-    u = np.concatenate([u[:1], u]) if first == before else u
+    if first == before:
+        u = np.concatenate([[input_at_rest(record, source)], u])
     scatter = float(np.median(np.abs(np.diff(u))))
     if np.ptp(u) <= max(_STEP_OVER_NOISE * scatter, 1e-12 * float(np.max(np.abs(u)))):
         raise InputError(

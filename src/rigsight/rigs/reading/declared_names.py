@@ -30,6 +30,9 @@ def check_declared_names(declaration: Declaration) -> None:
     """
     table = declaration.table
     for key, what in _NEEDED.items():
+        # Where every motion is prescribed, sensors alone may be what is identified.
+        if key == "joints" and table.coordinates and all(c.prescribed_by for c in table.coordinates.values()):
+            continue
         if not getattr(table, key):
             declaration.refuse((), f"a rig needs at least one [{key}.NAME], {what}")
     # Results and exported files are called after it.

@@ -45,7 +45,8 @@ FUNCTIONS: Mapping[str, Function] = {
     },
     "atan2": Function(("y", "x"), sp.atan2, "ratio"),
     "sqrt": Function(("x",), sp.sqrt, "root"),
-    "abs": Function(("x",), sp.Abs, "same"),
+    # sympy takes the magnitude of an exponential of a power for exp(re(...)), as if it could be complex.
+    "abs": Function(("x",), lambda x: sp.Abs(x).replace(sp.re, lambda real: real), "same"),
     "sign": Function(("x",), sp.sign, "sign"),
     "max": Function(("x", "y"), _larger, "same"),
     "min": Function(("x", "y"), _smaller, "same"),

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.simulate.compiled.c_functions import FUNCTIONS, elements, filled, function_body, real, template
 from rigsight.simulate.equations.expressions import gathered, hoist_constants
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
@@ -284,7 +285,8 @@ class KernelEquations:
         along |= {h.symbol: rate for h, rate in zip(self.structure.histories, self._late_rates, strict=True)}
         present = expression.free_symbols
         return sum(
-            (sp.diff(expression, s) * rate for s, rate in along.items() if s in present), start=sp.Integer(0)
+            (derivative(expression, s) * rate for s, rate in along.items() if s in present),
+            start=sp.Integer(0),
         )
 
     @property

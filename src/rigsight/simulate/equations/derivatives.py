@@ -12,7 +12,7 @@ import sympy as sp
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rigsight.effects.symbols import positive_part
+from rigsight.effects.symbols import derivative, positive_part
 from rigsight.rigs import evaluated
 from rigsight.simulate.equations.chain_rule import slopes_of
 from rigsight.simulate.equations.elimination import Elimination
@@ -184,7 +184,7 @@ def _whole(structure: Structure, arguments: Sequence[sp.Symbol], by: Sequence[sp
     forces = [tree.flattened(force) for force in motion.forces]
     rates = [tree.flattened(state.rate) for state in tree.states]
     of_forces, of_rates = (_function(arguments, _jacobian(own, by)) for own in (forces, rates))
-    of_mass = _function(arguments, [_slope(mass, symbol) for symbol in by])
+    of_mass = _function(arguments, [derivative(mass, symbol) for symbol in by])
     n = len(forces)
 
     def turned(*place: float) -> Floats:
@@ -221,13 +221,10 @@ def _in_parts(
 
 def _jacobian(expressions: Sequence[sp.Expr], by: Sequence[sp.Symbol]) -> sp.Matrix:
     return sp.Matrix(
-        len(expressions), len(by), [_slope(expression, symbol) for expression in expressions for symbol in by]
+        len(expressions),
+        len(by),
+        [derivative(expression, symbol) for expression in expressions for symbol in by],
     )
-
-
-def _slope(expression: Any, symbol: sp.Symbol) -> Any:
-    # The jump of a sign has no slope: terms with it are left out.
-    return sp.diff(expression, symbol).replace(sp.DiracDelta, lambda *_: sp.S.Zero)
 
 
 def _function(arguments: Sequence[sp.Symbol], expressions: Any) -> Callable[..., Any]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.simulate.equations.elimination import Elimination
 from rigsight.simulate.equations.straight_line import straight_line
 
@@ -77,4 +78,4 @@ def _number(expression: sp.Expr, numbers: Mapping[sp.Symbol, sp.Expr]) -> sp.Exp
 def _slope(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     # Term by term, because few terms of a long sum contain the symbol.
     terms = [term for term in sp.Add.make_args(expression) if symbol in term.free_symbols]
-    return sp.Add(*(sp.diff(term, symbol) for term in terms))
+    return sp.Add(*(derivative(term, symbol) for term in terms))

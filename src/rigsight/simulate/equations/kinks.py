@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from rigsight.effects.symbols import positive_part
+from rigsight.effects.symbols import derivative, positive_part
 from rigsight.errors import InputError
 from rigsight.simulate.equations.jumps import Jumps
 from rigsight.simulate.equations.structure import Structure
@@ -198,19 +198,21 @@ def _frictions(
     found = []
     for index, (switch, mode) in enumerate(modes.items()):
         moved = [v for v in velocities if v in switch.free_symbols]
-        if not moved or any(sp.diff(switch, a, b) != 0 for a in moved for b in moved):
+        if not moved or any(derivative(derivative(switch, a), b) != 0 for a in moved for b in moved):
             continue
         # At rest, one velocity follows from the others.
-        standstill = {moved[0]: moved[0] - switch / sp.diff(switch, moved[0])}
+        standstill = {moved[0]: moved[0] - switch / derivative(switch, moved[0])}
         if structure.elimination is None:
-            jump = sum((sp.diff(switch, v) * sp.diff(rates[v], mode) for v in moved), start=sp.Integer(0))
+            jump = sum(
+                (derivative(switch, v) * derivative(rates[v], mode) for v in moved), start=sp.Integer(0)
+            )
             if is_zero(jump.subs(standstill)):
                 continue
             alone = not any(mode in rates[v].free_symbols for v in velocities if v != moved[0])
         else:
             jumps = Jumps(structure.elimination, named, standstill)
             own = dict(zip(velocities, jumps.by(mode), strict=True))
-            slopes = jumps.numbers([_of_sympy(sp.diff(switch, v)) for v in moved])
+            slopes = jumps.numbers([_of_sympy(derivative(switch, v)) for v in moved])
             if abs(sp.Add(*(slope * own[v] for slope, v in zip(slopes, moved, strict=True)))) < _ROUNDED:
                 continue
             alone = not any(abs(own[v]) > _ROUNDED for v in velocities if v != moved[0])

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.rigs import Rig, applied_symbol
 from rigsight.simulate.equations.tree import EquationsOfMotion
 from rigsight.units import size_of
@@ -37,7 +38,7 @@ def equations_of_motion(
 
     def add(along: sp.Expr, forces: Sequence[sp.Expr]) -> None:
         for own, coordinate in zip(terms, free, strict=True):
-            slope = bound(sp.diff(along, coordinate.symbol))
+            slope = bound(derivative(along, coordinate.symbol))
             own += [slope * force for force in forces if slope != 0]
 
     for drive in mechanism.drives:

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.simulate.equations.kinks import absolute
 
 _TINY = sp.Float(1e-300)
@@ -67,7 +68,7 @@ def slope(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     total = sp.Add(*(_of_term(term, symbol) for term in terms))
     if total.is_Atom:
         return total
-    return total.replace(sp.DiracDelta, lambda *_: sp.Integer(0)).replace(_is_singular, _guarded)
+    return total.replace(_is_singular, _guarded)
 
 
 def _of_term(term: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
@@ -78,7 +79,7 @@ def _of_term(term: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
         if not any(symbol in factor.free_symbols for factor in others):
             # Most parts of long expressions have this form, for which sympy takes ten times as long.
             return sp.Mul(*others)
-    return sp.diff(term, symbol)
+    return derivative(term, symbol)
 
 
 def _is_singular(part: sp.Expr) -> bool:

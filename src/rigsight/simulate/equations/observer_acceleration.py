@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
+from rigsight.effects.symbols import derivative
 from rigsight.rigs import Coordinate
 
 
@@ -49,10 +50,10 @@ def observer_acceleration(
     bandwidth
         Bandwidth of the observer [rad/s].
     """
-    slopes = sp.Matrix([sp.diff(reads, c.rate) for c in free])
+    slopes = sp.Matrix([derivative(reads, c.rate) for c in free])
     if any(slope != 0 for slope in slopes):
         wanted = bandwidth * (measured[0] - shown[0])
     else:
-        slopes = sp.Matrix([sp.diff(reads, c.symbol) for c in free])
+        slopes = sp.Matrix([derivative(reads, c.symbol) for c in free])
         wanted = bandwidth**2 * (measured[0] - shown[0]) + sp.sqrt(2) * bandwidth * (measured[1] - shown[1])
     return slopes * (wanted / slopes.dot(slopes))

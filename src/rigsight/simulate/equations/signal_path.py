@@ -12,6 +12,7 @@ import sympy as sp
 
 from rigsight.effects import Effect, Energy, Place
 from rigsight.effects import symbols as canonical
+from rigsight.effects.symbols import derivative
 from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
 from rigsight.simulate.equations.binder import Binder
 from rigsight.simulate.equations.defined_signals import DefinedSignals
@@ -183,7 +184,7 @@ class _Path:
         for place, (name, bandwidth) in enumerate(self._bandwidths.items(), len(mechanism.inputs)):
             reading, delay = self._shown[name]
             shown = self._defined.flattened(reading)
-            rate = sp.Add(*(sp.diff(shown, s) * rates[s] for s in rates if s in shown.free_symbols))
+            rate = sp.Add(*(derivative(shown, s) * rates[s] for s in rates if s in shown.free_symbols))
             found += observer_acceleration(
                 mechanism.free,
                 self._defined.bound(sensors[name].reads),
@@ -255,7 +256,7 @@ class _Path:
             "k": self._defined.bound(joint.stiffness),
             "position": self._defined.bound(joint.motion),
         }
-        if not any(sp.diff(joint.motion, c.symbol) != 0 for c in mechanism.free):
+        if not any(derivative(joint.motion, c.symbol) != 0 for c in mechanism.free):
             signals["acceleration"] = self._defined.bound(mechanism.prescribed_rate(rate))
         if not any(effect.reads_inertia for effect in self._effects):
             return signals
@@ -268,7 +269,7 @@ class _Path:
 
     def _of_motion(self) -> dict[str, sp.Expr]:
         """Return the signals of the motion for effects at a drive, a sensor or a state: those of the first joint."""
-        return self._signals(self._rig.mechanism.joints[0])
+        return self._signals(self._rig.mechanism.first_joint)
 
     def _spring(
         self, effects: Sequence[Effect], signals: Mapping[str, sp.Expr], memories: list[FirstOrderState]
@@ -288,8 +289,9 @@ class _Path:
                 own = self._defined.states(effect, {**signals, "x": deflection, "v": rate})
                 before = sp.Symbol("deflection_before", real=True)
                 after = self._binder.effect(effect, effect.deflection, {**signals, "x": before})
-                rate = sp.diff(after, before).xreplace({before: deflection}) * rate + sum(
-                    (sp.diff(after, state.symbol) * state.limited_rate for state in own), start=sp.Integer(0)
+                rate = derivative(after, before).xreplace({before: deflection}) * rate + sum(
+                    (derivative(after, state.symbol) * state.limited_rate for state in own),
+                    start=sp.Integer(0),
                 )
                 deflection = self._defined.define(
                     Kind.DEFLECTION, effect, after.xreplace({before: deflection})

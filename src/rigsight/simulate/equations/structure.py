@@ -9,6 +9,7 @@ from functools import cached_property
 import sympy as sp
 
 from rigsight.effects import Effect
+from rigsight.effects.symbols import derivative
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig, joint_of
 from rigsight.simulate.equations.elimination import Elimination, steps_to_accelerations
@@ -257,7 +258,7 @@ class Structure:
             rates |= {value: rate, rate: curvature}
         slopes = [
             sum(
-                (_slope(reading, s) * rates[s] for s in rates if s in reading.free_symbols),
+                (derivative(reading, s) * rates[s] for s in rates if s in reading.free_symbols),
                 start=sp.Integer(0),
             )
             for reading, delay in zip(shown, self.shown_late, strict=True)
@@ -325,11 +326,6 @@ def bandwidth_name(sensor: str) -> str:
 def ahead_name(sensor: str) -> str:
     """Return the name of the time by which the measured motion of a delayed sensor is advanced for an observer."""
     return f"reading ahead of {sensor}"
-
-
-def _slope(reading: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Return the derivative of a reading, without the impulse at a jump."""
-    return sp.diff(reading, symbol).replace(sp.DiracDelta, lambda *_: sp.Integer(0))
 
 
 def carried_over(values: Mapping[str, float], source: Structure, target: Structure) -> dict[str, float]:

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import sympy as sp
 
-from rigsight.effects.symbols import positive_part
+from rigsight.effects.symbols import derivative, positive_part
 from rigsight.rigs import has_short_inverse
 from rigsight.simulate.equations.elimination import acceleration_symbols
 
@@ -252,7 +252,7 @@ class EquationTree:
         rates |= zip(motion.velocities, motion.accelerations, strict=True)
         rates |= {state.symbol: state.rate for state in self.states}
         present = [s for s in rates if s in flat.free_symbols]
-        return sum((sp.diff(flat, s) * self.flattened(rates[s]) for s in present), start=sp.Integer(0))
+        return sum((derivative(flat, s) * self.flattened(rates[s]) for s in present), start=sp.Integer(0))
 
     def shown_lateness(self, symbol: sp.Symbol) -> sp.Expr | None:
         """Return the delay of a reading that is applied after the simulation; None if there is none."""

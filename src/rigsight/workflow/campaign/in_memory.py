@@ -192,6 +192,8 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
     inputs = [signal.name for signal in rig.inputs]
     may_rest = record.kind == "operation" and record.amplitude is None
     must_move = {name: "input" for name in rig.moving_inputs if record.role == "estimation"}
+    begins_with_step = record.kind == "step" and any(record[name][0] != 0.0 for name in inputs)
+    may_rest = may_rest or begins_with_step
     if record.role == "estimation" and not may_rest and all(is_constant(record[name]) for name in inputs):
         must_move |= dict.fromkeys(inputs, "input")
     if rig.required_outputs or all(is_constant(record[name]) for name in outputs):

@@ -109,6 +109,11 @@ def _natural_frequencies(model: Model, amplitude: float) -> list[float]:
     if model.structure.rig.has_one_motion:
         return [_natural_frequency(model, amplitude)]
     poles = _poles(model)
+    if poles is None:
+        raise InputError(
+            "The equations of the model have no finite slope about its equilibrium, and so no natural frequency: give the band "
+            "with --lowest and --highest [rad/s]."
+        )
     sizes = np.abs(poles)
     found = sizes[np.abs(poles.imag) > _OSCILLATES * sizes]
     if found.size == 0:
@@ -118,8 +123,8 @@ def _natural_frequencies(model: Model, amplitude: float) -> list[float]:
     return [float(size) for size in np.unique(found)]
 
 
-def _poles(model: Model) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
-    """Return the eigenvalues of a model about its equilibrium without input."""
+def _poles(model: Model) -> np.ndarray[tuple[int], np.dtype[np.complex128]] | None:
+    """Return the eigenvalues of a model about its equilibrium without input; None if a slope is infinite there."""
     structure, values = without_vanished_effects(model.structure, model.values)
     p = parameter_vector(structure, values)
     n_inputs = len(structure.rig.inputs)
@@ -141,6 +146,8 @@ def _poles(model: Model) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
         step = np.zeros(rest.size)
         step[i] = _NUDGE
         jacobian[:, i] = (np.array(rates(rest + step)) - np.array(rates(rest - step))) / (2.0 * _NUDGE)
+    if not np.all(np.isfinite(jacobian)):
+        return None
     return np.asarray(np.linalg.eigvals(jacobian), dtype=np.complex128)
 
 

@@ -16,6 +16,7 @@ from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.diagnose.policy import VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
+from rigsight.effects.symbols import derivative
 from rigsight.rigs import Rig
 
 
@@ -124,7 +125,7 @@ def is_linear(effect: Effect) -> bool:
 
 def _is_linear_in(law: sp.Expr, signals: Sequence[sp.Symbol]) -> bool:
     own = [symbol for symbol in signals if symbol in law.free_symbols]
-    slopes = [sp.diff(law, symbol) for symbol in own]
+    slopes = [derivative(law, symbol) for symbol in own]
     return not any(slope.free_symbols & {*own, canonical.t} for slope in slopes)
 
 
