@@ -36,6 +36,7 @@ from rigsight.workflow.identification.warnings import (
     offsets_of_records,
     out_of_band,
 )
+from rigsight.workflow.own.effect_names import effects_on
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent, tell
 from rigsight.workflow.run.results import check_writable, json_text, write_together
@@ -59,7 +60,9 @@ def run_identify(
     listener: Listener = silent,
     command: str | None = None,
 ) -> Identification:
-    """Identify the linear rig behind the estimation records of a campaign, and the rig with effects of memory if some are named.
+    """Identify the rig behind the estimation records of a campaign, with the effects that its simulation has.
+
+    The rig with effects of memory is calibrated as well if some are named.
 
     Parameters
     ----------
@@ -168,6 +171,11 @@ def identify_campaign(
     """
     tell(campaign.notes, listener)
     structure = structure_with_memory(campaign, effects) if effects else None
+    # The rig is identified without the effects that are calibrated, also where its simulation has one of them already.
+    asked = {effect.name for effect in effects_on(campaign.rig, effects, "--effect")}
+    campaign = replace(
+        campaign, modelled=tuple(effect for effect in campaign.modelled if effect.name not in asked)
+    )
     if has_transfer_forms(campaign):
         identification = _by_transfer_functions(campaign, options, n_jobs, listener)
     else:

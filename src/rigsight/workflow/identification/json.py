@@ -50,6 +50,7 @@ def identification_json(identification: Identification, figures: Mapping[str, st
         "schema_version": SCHEMA_VERSION,
         "title": identification.title,
         "rig": identification.rig,
+        "effects": list(identification.model["effects"]),
         "method": identification.method,
         "level": LEVEL,
         "warnings": list(identification.warnings),
