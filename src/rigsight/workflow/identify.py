@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
@@ -21,6 +21,7 @@ from rigsight.identify.record_identification import EstimationOptions, identify_
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.report.identification_page import render_identification
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE
@@ -55,6 +56,7 @@ def run_identify(
     resolution: float | None = None,
     effects: Sequence[Effect] = (),
     own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
     seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
@@ -78,6 +80,8 @@ def run_identify(
         Effects with which the rig is calibrated as well, one of them with memory.
     own_effects
         Effects beside those of the catalogue that the simulation in question may have already.
+    own_rigs
+        Rigs that the campaign may name beside the built-in ones.
     seed
         Seed of the calibration.
     n_jobs
@@ -98,7 +102,7 @@ def run_identify(
     if out is not None:
         check_writable(Path(out), IDENTIFICATION_FILE, MODEL_FILE, PAGE_FILE)
     identification = identify_campaign(
-        read_campaign(campaign, own_effects), options, jobs, listener, effects=effects, seed=seed
+        read_campaign(campaign, own_effects, own_rigs), options, jobs, listener, effects=effects, seed=seed
     )
     if out is not None:
         asked = [word for effect in effects for word in ("--effect", effect.name)]
@@ -166,9 +170,14 @@ def identify_campaign(
     Raises
     ------
     InputError
-        If a record is too short for the resolution asked for, no record shows the motion, or the effects cannot be calibrated on
-        the rig.
+        If a record is too short for the resolution asked for, no record shows the motion, the effects cannot be calibrated on
+        the rig, or a seed is given without effects.
     """
+    if seed and not effects:
+        raise InputError(
+            f"Only the calibration of effects draws random numbers, so the seed {seed} would change nothing. Leave it out, or "
+            "name an effect (--effect)."
+        )
     tell(campaign.notes, listener)
     structure = structure_with_memory(campaign, effects) if effects else None
     # The rig is identified without the effects that are calibrated, also where its simulation has one of them already.
@@ -180,6 +189,7 @@ def identify_campaign(
         identification = _by_transfer_functions(campaign, options, n_jobs, listener)
     else:
         identification = identify_any_rig(campaign, options, n_jobs, listener)
+    identification = replace(identification, given=campaign.given)
     if structure is None:
         return identification
     return with_hysteresis(identification, campaign, structure, seed, n_jobs, listener)

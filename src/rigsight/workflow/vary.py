@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError, check_in_range, check_option
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_break_frequency, peak
 from rigsight.parameters import Parameter
 from rigsight.plot.variation import Curve, picture_files, varied_responses
 from rigsight.records import Record
+from rigsight.rigs import Rig
 from rigsight.simulate import simulate
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import named_model
@@ -74,6 +76,8 @@ def run_vary(
     band: tuple[float, float] | None = None,
     source: str | None = None,
     response: str | None = None,
+    own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
     listener: Listener = silent,
 ) -> tuple[Variation, ...]:
     """Simulate a sweep with several values of each parameter, all others unchanged.
@@ -97,6 +101,8 @@ def run_vary(
         all of its natural frequencies.
     source, response
         Names of the swept input (the others are at rest) and of the output; default is the first of each.
+    own_effects, own_rigs
+        Effects and rigs that the model may name beside those of the catalogue and the built-in ones.
     listener
         Told of every finished sweep.
 
@@ -107,7 +113,7 @@ def run_vary(
     """
     if out is not None:
         check_writable(Path(out), VARY_FILE)
-    read = named_model(model)
+    read = named_model(model, own_effects, own_rigs)
     rig = read.structure.rig
     if not rig.is_driven or not rig.inputs:
         why = "prescribes the motion" if rig.inputs else "has no input"
