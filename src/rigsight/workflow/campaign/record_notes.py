@@ -59,11 +59,11 @@ def _holds_same_samples(record: Record, other: Record) -> bool:
 
 
 def _other_holds(records: Sequence[Record]) -> Iterator[str]:
-    holds = list(dict.fromkeys(record.hold for record in records))
+    holds = list(dict.fromkeys(record.hold for record in records if record.role == "estimation"))
     if len(holds) > 1:
         yield (
-            f"The records differ in hold ({', '.join(holds)}): each is fitted with its own; models are written with that of the "
-            "first estimation record."
+            f"The estimation records differ in hold ({', '.join(holds)}): each is fitted with its own; models are written with "
+            f"that of the first, {holds[0]}."
         )
 
 
