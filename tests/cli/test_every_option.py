@@ -105,7 +105,7 @@ VALUES_OF = {
 NOT_PASSED_ON = ("--simulator", "--markdown", "--picture")
 """Used by the command itself: tests below and in `test_own_simulators`."""
 REFUSED = {
-    "identify": [["--seed", "3"]],
+    "identify": [["--seed", "3"], ["--method", "thesis", "--resolution", "0.5"]],
     "init": [
         ["--gear", "elbow=500"],
         ["--as-it-is"],

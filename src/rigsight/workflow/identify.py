@@ -135,11 +135,16 @@ def checked_options(method: str, resolution: float | None) -> EstimationOptions:
     Raises
     ------
     InputError
-        If the method is unknown or the resolution is no positive number.
+        If the method is unknown or has no resolution, or the resolution is no positive number.
     """
     check_option("The method", method, METHODS)
     if resolution is not None and not (math.isfinite(resolution) and resolution > 0.0):
         raise InputError(f"The resolution must be a positive number of rad/s, got {resolution!r}.")
+    if method == "thesis" and resolution is not None:
+        raise InputError(
+            "The method 'thesis' takes every line of a record, so --resolution would change nothing. Leave it out, or choose "
+            "another --method."
+        )
     return EstimationOptions(cast("Method", method), resolution)
 
 
@@ -177,6 +182,11 @@ def identify_campaign(
         raise InputError(
             f"Only the calibration of effects draws random numbers, so the seed {seed} would change nothing. Leave it out, or "
             "name an effect (--effect)."
+        )
+    if options.method == "thesis" and not campaign.rig.is_driven:
+        raise InputError(
+            f"The method 'thesis' fits rigs whose input moves a mass, and that of {campaign.rig.name} prescribes the motion. Use "
+            "--method local_rational."
         )
     tell(campaign.notes, listener)
     structure = structure_with_memory(campaign, effects) if effects else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from rigsight.errors import InputError
 from rigsight.identify.identification import Identification
 from rigsight.records import Record
 from rigsight.workflow.campaign.in_memory import make_campaign, make_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import checked_options, identify_campaign
 from rigsight.workflow.simulate import simulate_model
@@ -112,3 +114,14 @@ def test_the_parameters_of_rig_and_effect_are_found_together(case: Case) -> None
 def test_methods_of_linear_rigs_are_refused() -> None:
     with pytest.raises(InputError, match="without effects"):
         identify_campaign(recorded(CASES[0]), checked_options("h1", None))
+
+
+def test_a_campaign_that_starts_at_its_bounds(shared_data: Path) -> None:
+    folder = shared_data.parent / "cases" / "fit_started_at_a_bound"
+    if not folder.is_dir():
+        pytest.skip(f"the cases of users are not at {folder}")
+    found = identified(read_campaign(folder))
+    fit = found.joint.fit.fit
+    for name, value in {"m": 2.0, "d": 12.0, "k": 800.0, "T_c": 1.5}.items():
+        assert fit.values[name] == pytest.approx(value, rel=1e-3), name
+        assert abs(fit.values[name] - value) < 4.0 * fit.standard_errors[name], name
