@@ -64,6 +64,12 @@ def test_a_picture_is_a_figure_with_something_in_it(result: Any, arguments: dict
         ("diagnosis", {"picture": "record", "record": "scorre"}, "Did you mean 'score'"),
         ("diagnosis", {"picture": "record", "output": "y"}, "The output is 'y'.*Allowed: 'x'"),
         ("identification", {"picture": "bode", "record": "score"}, "Allowed: 'fit'"),
+        (
+            "diagnosis",
+            {"picture": "gap", "output": "x"},
+            "output can be chosen only for the picture 'record'",
+        ),
+        ("identification", {"picture": "responses", "record": "fit"}, "only for the picture 'bode'"),
         ("comparison", {"record": "scorre"}, "Did you mean 'score'"),
     ],
     indirect=["result"],

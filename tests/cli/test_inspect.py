@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigsight.records import ColumnMapping
 from rigsight.records.formats.known import FORMATS as KNOWN
+from rigsight.records.formats.read_csv import read_csv
 from rigsight.rigs import RIGS
 
 from ..records.formats import FORMATS, Write, write_matlab, write_tdms, write_text
@@ -51,6 +53,20 @@ def test_text_is_inspected_with_its_gaps(tmp_path: Path, run: Run) -> None:
         assert part in stdout
     told = json.loads(run("inspect", path, "--json")[1])
     assert [one["n_not_finite"] for one in told["channels"]] == [0, 0, 1]
+
+
+@pytest.mark.parametrize("header", ["t,u,x,x", "t,,u,", "t,control[0],control[1],pos [m]", "t,u,2,x"])
+def test_channels_are_listed_by_names_that_a_campaign_takes(tmp_path: Path, run: Run, header: str) -> None:
+    file = tmp_path / "run.csv"
+    rows = np.column_stack([T, np.sin(T), np.cos(T), T**2])
+    np.savetxt(file, rows, delimiter=",", header=header, comments="")
+    code, stdout, stderr = run("inspect", file, "--json")
+    assert code == 0, stderr
+    names = [channel["name"] for channel in json.loads(stdout)["channels"]]
+    for column, name in enumerate(names):
+        read = read_csv(file, {"x": ColumnMapping(name)})
+        np.testing.assert_allclose(read.values["x"], rows[:, column])
+    assert len(set(names)) == 4
 
 
 def test_times_that_are_no_numbers_are_left_out(tmp_path: Path, run: Run) -> None:

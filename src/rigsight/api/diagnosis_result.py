@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, get_args
 
-from rigsight.api.choice import named
+from rigsight.api.choice import check_unused, named
 from rigsight.api.tables import data_frame
 from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.location.trace import STAGES
@@ -95,6 +95,7 @@ class DiagnosisResult(Diagnosis):
             If there is no such picture, record or output, or no parameter was estimated by record.
         """
         check_option("The picture", picture, get_args(Picture))
+        check_unused("record", picture, record=record, output=output)
         if picture == "gap":
             return budget_drawing(self)
         if picture == "candidates":

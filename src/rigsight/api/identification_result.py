@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
-from rigsight.api.choice import named
+from rigsight.api.choice import check_unused, named
 from rigsight.api.tables import data_frame
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
@@ -66,6 +66,7 @@ class IdentificationResult(Identification):
             If there is no such picture or record, or the records do not show what is to be drawn.
         """
         check_option("The picture", picture, get_args(Picture))
+        check_unused("bode", picture, record=record)
         if picture == "amplitudes":
             drawing = amplitudes_figure(self)
         elif picture == "responses":

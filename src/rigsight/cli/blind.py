@@ -101,6 +101,13 @@ def blind(
 
         drawing = [f"--{name}" for name in ("trials", "design", "seed") if _is_given(context, name)]
         _check_together(campaigns, keys, merge or [], rescore, trial or [], drawing)
+        running_in = [f"--{name}" for name in ("jobs", "cluster") if _is_given(context, name)]
+        if merge and running_in:
+            raise InputError(f"--merge runs no trials. Leave out {' and '.join(running_in)}.")
+        if len(running_in) > 1:
+            raise InputError(
+                "The workers of a cluster determine how many trials run at once. Leave out --jobs."
+            )
         if markdown is not None:
             check_target(markdown)
         running: Mapping[str, Any] = {

@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Simulators
+from rigsight.cli.options import (
+    Campaign,
+    Debug,
+    Jobs,
+    Json,
+    OwnEffects,
+    OwnRigs,
+    Quiet,
+    ResultsFolder,
+    Simulators,
+)
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.run.progress_display import listening
 
@@ -35,6 +45,8 @@ def compare(
     step_seconds: Annotated[
         float, typer.Option(metavar="SECONDS", help="Time after a step over which it is compared.")
     ] = 4.0,
+    effects: OwnEffects = None,
+    rigs: OwnRigs = None,
     simulator: Simulators = None,
     jobs: Jobs = None,
     json: Json = False,
@@ -47,6 +59,8 @@ def compare(
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.compare import run_compare
+        from rigsight.workflow.own.own_effects import own_effects
+        from rigsight.workflow.own.own_rigs import own_rigs
         from rigsight.workflow.own.own_simulators import own_simulators
 
         own_simulators(simulator or [])
@@ -56,6 +70,8 @@ def compare(
             out,
             method=method,
             step_seconds=step_seconds,
+            own_effects=own_effects(effects or [], check=False),
+            own_rigs=list(own_rigs(rigs or []).values()),
             n_jobs=jobs,
             listener=listener,
             command=command_line(),

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Seed, Simulators
+from rigsight.cli.options import Campaign, Debug, Jobs, Json, OwnRigs, Quiet, ResultsFolder, Seed, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.workflow.run.progress_display import listening
 
@@ -30,6 +30,7 @@ def discover(
     one_by_one: Annotated[
         bool, typer.Option("--one-by-one", help="Also discover on each estimation record alone.")
     ] = False,
+    rigs: OwnRigs = None,
     simulator: Simulators = None,
     seed: Seed = 0,
     jobs: Jobs = None,
@@ -43,6 +44,7 @@ def discover(
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.discover import run_discover
+        from rigsight.workflow.own.own_rigs import own_rigs
         from rigsight.workflow.own.own_simulators import own_simulators
 
         own_simulators(simulator or [])
@@ -52,6 +54,7 @@ def discover(
             method=method,
             pointwise=pointwise,
             one_by_one=one_by_one,
+            own_rigs=own_rigs(rigs or []).values(),
             seed=seed,
             n_jobs=jobs,
             listener=listener,

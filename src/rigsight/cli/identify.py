@@ -14,6 +14,7 @@ from rigsight.cli.options import (
     Jobs,
     Json,
     OwnEffects,
+    OwnRigs,
     Quiet,
     ResultsFolder,
     Seed,
@@ -55,6 +56,7 @@ def identify(
         ),
     ] = None,
     effects: OwnEffects = None,
+    rigs: OwnRigs = None,
     simulator: Simulators = None,
     seed: Seed = 0,
     jobs: Jobs = None,
@@ -72,6 +74,7 @@ def identify(
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.identify import run_identify
         from rigsight.workflow.own.own_effects import named, own_effects
+        from rigsight.workflow.own.own_rigs import own_rigs
         from rigsight.workflow.own.own_simulators import own_simulators
 
         own_simulators(simulator or [])
@@ -84,6 +87,7 @@ def identify(
             resolution=resolution,
             effects=named(effect, own) if effect else (),
             own_effects=own,
+            own_rigs=own_rigs(rigs or []).values(),
             seed=seed,
             n_jobs=jobs,
             listener=listener,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -70,8 +71,16 @@ def init(
     overwritten. With --mjcf, the rig file of a robot model is written as well and checked against MuJoCo.
     """
     if mjcf is not None:
+        named = {"--model": model, "--rigs": rigs, "--simulator": simulator}
         _init_from_mjcf(
-            folder or Path(), mjcf, gear, model, rigs, as_it_is=as_it_is, json=json, quiet=quiet, debug=debug
+            folder or Path(),
+            mjcf,
+            gear,
+            [option for option, given in named.items() if given],
+            as_it_is=as_it_is,
+            json=json,
+            quiet=quiet,
+            debug=debug,
         )
         return
     with report_errors(debug):
@@ -122,8 +131,7 @@ def _init_from_mjcf(
     folder: Path,
     file: Path,
     gears: list[str] | None,
-    model: str | None,
-    rigs: list[Path] | None,
+    other_rigs: Sequence[str],
     *,
     as_it_is: bool,
     json: bool,
@@ -134,8 +142,8 @@ def _init_from_mjcf(
         from rigsight.errors import InputError
         from rigsight.workflow.init import run_init_from_mjcf
 
-        if model is not None or rigs:
-            raise InputError("--mjcf already defines the rig; leave out --model and --rigs.")
+        if other_rigs:
+            raise InputError(f"--mjcf already defines the rig; leave out {' and '.join(other_rigs)}.")
         written = run_init_from_mjcf(
             folder, file, gears=dict(map(_gear, gears or [])), as_it_is=as_it_is, listener=listener
         )

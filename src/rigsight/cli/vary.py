@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, Quiet, ResultsFolder, Simulators
+from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import show_json
 from rigsight.errors import InputError
 from rigsight.workflow.run.progress_display import listening
@@ -66,6 +66,8 @@ def vary(
             "--output", metavar="NAME", show_default="the first", help="Output whose response is shown."
         ),
     ] = None,
+    effects: OwnEffects = None,
+    rigs: OwnRigs = None,
     simulator: Simulators = None,
     out: ResultsFolder = Path("vary"),
     json: Json = False,
@@ -77,6 +79,8 @@ def vary(
     Writes vary.svg, vary.png (vary_NAME.svg, ... for several parameters) and vary.json into DIR; all files or none.
     """
     with report_errors(debug), listening(quiet) as listener:
+        from rigsight.workflow.own.own_effects import own_effects
+        from rigsight.workflow.own.own_rigs import own_rigs
         from rigsight.workflow.own.own_simulators import own_simulators
         from rigsight.workflow.vary import run_vary, table_text
 
@@ -95,6 +99,8 @@ def vary(
             band=band,
             source=source,
             response=response,
+            own_effects=own_effects(effects or [], check=False),
+            own_rigs=own_rigs(rigs or []).values(),
             listener=listener,
         )
     if json:

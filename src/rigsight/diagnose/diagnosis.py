@@ -195,7 +195,7 @@ def _assembled(
         traces=traces,
         units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
         given=dict(campaign.given),
-        model=Model.of(after.fit.structure, after.fit.values, campaign.records[0].hold).to_json(),
+        model=Model.of(after.fit.structure, after.fit.values, campaign.estimation[0].hold).to_json(),
         notes=tuple(notes),
         windows=found.windowing.length,
         window_cycles=found.windowing.cycles,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.discover.joints.joint_force import JointForce
+from rigsight.records import Record
 
 SCHEMA_VERSION = 1
 
@@ -163,6 +164,10 @@ class Discovery:
         Missing force per joint, with the joint of the equation first; empty for a rig with one joint.
     by_record
         Result for each record alone, or the reason why there is none; empty unless requested.
+    given
+        Parameter values of the given simulation, to compare with.
+    records
+        The records of the campaign.
     """
 
     title: str
@@ -187,6 +192,8 @@ class Discovery:
     warnings: tuple[str, ...]
     joints: tuple[JointForce, ...] = ()
     by_record: tuple[tuple[str, Discovery | str], ...] = ()
+    given: Mapping[str, float] = field(default_factory=dict)
+    records: tuple[Record, ...] = ()
 
     @property
     def kept(self) -> tuple[Term, ...]:
@@ -203,7 +210,10 @@ class Discovery:
             "form": self.form,
             "equations": list(self.equations),
             "latex": list(self.latex),
-            "rig_parameters": {name: c.to_json() for name, c in self.rig_parameters.items()},
+            "rig_parameters": {
+                name: {**c.to_json(), "given": self.given.get(name)}
+                for name, c in self.rig_parameters.items()
+            },
             "terms": [term.to_json() for term in self.terms],
             "alternatives": [alternative.to_json() for alternative in self.alternatives],
             "force_equation": dict(self.force_equation),
@@ -215,6 +225,10 @@ class Discovery:
                 "independent_samples": self.independent,
             },
             "warnings": list(self.warnings),
+            "records": [
+                {"record": r.name, "role": r.role, "kind": r.kind, "amplitude": r.amplitude}
+                for r in self.records
+            ],
             **({"joints": [joint.to_json() for joint in self.joints]} if self.joints else {}),
             "by_record": {
                 name: {"error": found} if isinstance(found, str) else found.to_json()

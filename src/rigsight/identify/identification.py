@@ -248,6 +248,8 @@ class Identification:
         Meaning of each parameter, by name; empty for these built-in rigs.
     hysteresis
         The rig with hysteresis effects; None if not requested. If there is one, it is the `model`.
+    given
+        Parameter values of the given simulation, to compare with.
     """
 
     title: str
@@ -264,3 +266,4 @@ class Identification:
     identifiability: Identifiability | None = None
     meanings: dict[str, str] = field(default_factory=dict)
     hysteresis: HysteresisIdentification | None = None
+    given: dict[str, float] = field(default_factory=dict)

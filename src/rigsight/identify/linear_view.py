@@ -139,7 +139,7 @@ def near_rest(structure: Structure, values: Mapping[str, float], records: Sequen
     Parameters
     ----------
     structure
-        The rig without effects.
+        The rig, with effects or without.
     values
         Value of every parameter.
     records
@@ -154,12 +154,12 @@ def near_rest(structure: Structure, values: Mapping[str, float], records: Sequen
         signal.name: _mean([record[signal.name] for record in records]) for signal in structure.rig.inputs
     }
     equations = equations_of(structure.rig)
-    found = [
-        linearize(
-            structure, values, inputs, near=rig_state(equations, record, values, resting=record.n_samples)
-        )
-        for record in records
-    ]
+    found = []
+    for record in records:
+        near = rig_state(equations, record, values, resting=record.n_samples)
+        # The states of effects follow those of the rig, and are zero where they are at rest.
+        near = np.pad(near, (0, len(structure.states) - near.size))
+        found.append(linearize(structure, values, inputs, near=near))
     return min(found, key=lambda linear: float(np.max(linear.poles.real, initial=-np.inf)))
 
 

@@ -202,9 +202,8 @@ def _dynamic_stiffness(record: Record, rig: Rig, options: EstimationOptions) -> 
     if record.kind == "step":
         return path
     try:
-        method: Method = "local_rational" if options.method == "thesis" else options.method
         seen = record_response(
-            record, path.source, path.response, "pt2", method, options.resolution, "band_limited"
+            record, path.source, path.response, "pt2", options.method, options.resolution, "band_limited"
         )
     except InputError as error:
         if options.resolution is not None and "too short for a resolution" in str(error):

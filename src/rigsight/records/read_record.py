@@ -204,6 +204,12 @@ def read_stretches(
             found += rest_notes(path, raw, table, recorded, must_move, kind == "step" and not moving_inputs)
     # A command stands at its extremes on purpose.
     found += clipping_notes(path, {name: v for name, v in raw.items() if name not in beside}, table)
+    found += [
+        f"{path.name}: {name} = {value:g} was taken as given, and the column '{name}' was not read. Leave it out of inputs to "
+        "read the column."
+        for name, value in constant_inputs.items()
+        if name in table.names
+    ]
     found += alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
     if absent:
         found.append(

@@ -341,10 +341,12 @@ def is_linear(structure: Structure, values: Mapping[str, float]) -> bool:
         return False
     parts = [*motion.forces, *(state.rate for state in tree.states)]
     shown = [sp.Add(*output.terms) for output in tree.outputs]
-    return not any(
-        TIME in part.free_symbols or any(sp.diff(part, s).free_symbols & moving for s in part.free_symbols)
-        for part in map(told, [*parts, *shown])
-    )
+
+    def is_affine(part: sp.Expr) -> bool:
+        own = part.free_symbols & moving
+        return not own or (bool(part.is_polynomial(*own)) and sp.total_degree(part, *own) <= 1)
+
+    return all(TIME not in part.free_symbols and is_affine(part) for part in map(told, [*parts, *shown]))
 
 
 @lru_cache(maxsize=128)

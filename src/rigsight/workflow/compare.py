@@ -15,11 +15,13 @@ from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_o
 from rigsight.compare.comparison_files import comparison_csv, comparison_json
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option, readable
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
 from rigsight.report import comparison_figures, render_comparison
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.drift import can_drift
 from rigsight.simulate.model import Model
@@ -43,6 +45,8 @@ def run_compare(
     *,
     method: str = "local_rational",
     step_seconds: float = 4.0,
+    own_effects: Sequence[Effect] = (),
+    own_rigs: Sequence[Rig] = (),
     n_jobs: int | None = None,
     listener: Listener = silent,
     command: str | None = None,
@@ -62,6 +66,8 @@ def run_compare(
         Estimator of all frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
     step_seconds
         Seconds from a step in which it is compared; the thesis takes four.
+    own_effects, own_rigs
+        Effects and rigs that campaign and models may name beside those of the catalogue and the built-in ones.
     n_jobs
         Records compared at the same time; None for one per processor.
     listener
@@ -79,8 +85,8 @@ def run_compare(
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out), COMPARISON_FILE, TABLE_FILE, PAGE_FILE)
-    read = read_campaign(campaign)
-    competitors = named_competitors(models, read)
+    read = read_campaign(campaign, own_effects, own_rigs)
+    competitors = named_competitors(models, read, own_effects, own_rigs)
     comparison = compare_campaign(read, competitors, method, step_seconds, jobs, listener)
     if out is not None:
         quoted = shlex.join(["rigsight", "compare", str(campaign), *map(str, models)])
@@ -187,7 +193,12 @@ def write_comparison(comparison: Comparison, out: Path, command: str) -> tuple[P
     )
 
 
-def named_competitors(models: Sequence[str | Path], campaign: Campaign) -> list[Competitor]:
+def named_competitors(
+    models: Sequence[str | Path],
+    campaign: Campaign,
+    own_effects: Sequence[Effect] = (),
+    own_rigs: Sequence[Rig] = (),
+) -> list[Competitor]:
     """Return models with names of their own.
 
     Parameters
@@ -196,6 +207,8 @@ def named_competitors(models: Sequence[str | Path], campaign: Campaign) -> list[
         As in `run_compare`.
     campaign
         The campaign on which they are to be compared.
+    own_effects, own_rigs
+        As in `run_compare`.
 
     Raises
     ------
@@ -208,7 +221,7 @@ def named_competitors(models: Sequence[str | Path], campaign: Campaign) -> list[
         model = (
             given_model(campaign)
             if source == GIVEN and not Path(source).exists()
-            else of_this_rig(text, named_model(source), campaign)
+            else of_this_rig(text, named_model(source, own_effects, own_rigs), campaign)
         )
         found.append(Competitor(_distinct(name, [c.name for c in found]), model, source))
     return found
@@ -231,7 +244,7 @@ def given_model(campaign: Campaign) -> Model:
             f"The given simulation of {campaign.called} has no value of {', '.join(missing)}, so it cannot be compared. Give it "
             "under [rig.parameters]."
         )
-    return Model(structure, {name: values[name] for name in structure.names}, campaign.records[0].hold)
+    return Model(structure, {name: values[name] for name in structure.names}, campaign.estimation[0].hold)
 
 
 def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
@@ -299,5 +312,11 @@ def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
             notes.append(
                 f"Model '{competitor.name}' has other constants than the campaign: {', '.join(other)}. It is compared with "
                 "its own constants."
+            )
+        held = {record.hold for record in campaign.records} - {competitor.model.hold}
+        if held:
+            notes.append(
+                f"Model '{competitor.name}' has hold {competitor.model.hold}, records have {', '.join(sorted(held))}: each "
+                "record is simulated with its own hold."
             )
     return notes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
@@ -21,7 +21,7 @@ from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record
-from rigsight.rigs import RIGS, is_built_in_motion
+from rigsight.rigs import RIGS, Rig, is_built_in_motion
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.run.kernels import checked_jobs
@@ -42,6 +42,7 @@ def run_discover(
     method: str = "discrepancy",
     pointwise: bool = False,
     one_by_one: bool = False,
+    own_rigs: Iterable[Rig] = (),
     seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
@@ -60,6 +61,8 @@ def run_discover(
         Regress sample by sample instead of in the weak form.
     one_by_one
         Also discover on each estimation record alone.
+    own_rigs
+        Rigs that the campaign may name beside the built-in ones.
     seed
         Seed of the ensembles.
     n_jobs
@@ -79,7 +82,7 @@ def run_discover(
     if out is not None:
         check_writable(Path(out))
     found = discover_campaign(
-        read_campaign(campaign),
+        read_campaign(campaign, own_rigs=own_rigs),
         method,
         pointwise=pointwise,
         one_by_one=one_by_one,
@@ -129,7 +132,12 @@ def discover_campaign(
         notes += tuple(closed_loop_notes(campaign.records, campaign.rig, "It is not used in a discovery."))
         factor = campaign.open_factor
         notes = notes if factor is None else (factor.sentence, *notes)
-        found = replace(found, warnings=(*found.warnings, *notes))
+        found = replace(
+            found,
+            warnings=(*found.warnings, *notes),
+            given=campaign.given,
+            records=campaign.records,
+        )
         if not one_by_one:
             return found
         alone = _one_by_one(campaign, data, chosen, pointwise, seed, n_jobs, stage.finished)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
@@ -21,6 +21,7 @@ from rigsight.identify.record_identification import EstimationOptions, identify_
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.report.identification_page import render_identification
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE
@@ -36,6 +37,7 @@ from rigsight.workflow.identification.warnings import (
     offsets_of_records,
     out_of_band,
 )
+from rigsight.workflow.own.effect_names import effects_on
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent, tell
 from rigsight.workflow.run.results import check_writable, json_text, write_together
@@ -54,12 +56,15 @@ def run_identify(
     resolution: float | None = None,
     effects: Sequence[Effect] = (),
     own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
     seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
     command: str | None = None,
 ) -> Identification:
-    """Identify the linear rig behind the estimation records of a campaign, and the rig with effects of memory if some are named.
+    """Identify the rig behind the estimation records of a campaign, with the effects that its simulation has.
+
+    The rig with effects of memory is calibrated as well if some are named.
 
     Parameters
     ----------
@@ -75,6 +80,8 @@ def run_identify(
         Effects with which the rig is calibrated as well, one of them with memory.
     own_effects
         Effects beside those of the catalogue that the simulation in question may have already.
+    own_rigs
+        Rigs that the campaign may name beside the built-in ones.
     seed
         Seed of the calibration.
     n_jobs
@@ -95,7 +102,7 @@ def run_identify(
     if out is not None:
         check_writable(Path(out), IDENTIFICATION_FILE, MODEL_FILE, PAGE_FILE)
     identification = identify_campaign(
-        read_campaign(campaign, own_effects), options, jobs, listener, effects=effects, seed=seed
+        read_campaign(campaign, own_effects, own_rigs), options, jobs, listener, effects=effects, seed=seed
     )
     if out is not None:
         asked = [word for effect in effects for word in ("--effect", effect.name)]
@@ -128,11 +135,16 @@ def checked_options(method: str, resolution: float | None) -> EstimationOptions:
     Raises
     ------
     InputError
-        If the method is unknown or the resolution is no positive number.
+        If the method is unknown or has no resolution, or the resolution is no positive number.
     """
     check_option("The method", method, METHODS)
     if resolution is not None and not (math.isfinite(resolution) and resolution > 0.0):
         raise InputError(f"The resolution must be a positive number of rad/s, got {resolution!r}.")
+    if method == "thesis" and resolution is not None:
+        raise InputError(
+            "The method 'thesis' takes every line of a record, so --resolution would change nothing. Leave it out, or choose "
+            "another --method."
+        )
     return EstimationOptions(cast("Method", method), resolution)
 
 
@@ -163,15 +175,31 @@ def identify_campaign(
     Raises
     ------
     InputError
-        If a record is too short for the resolution asked for, no record shows the motion, or the effects cannot be calibrated on
-        the rig.
+        If a record is too short for the resolution asked for, no record shows the motion, the effects cannot be calibrated on
+        the rig, or a seed is given without effects.
     """
+    if seed and not effects:
+        raise InputError(
+            f"Only the calibration of effects draws random numbers, so the seed {seed} would change nothing. Leave it out, or "
+            "name an effect (--effect)."
+        )
+    if options.method == "thesis" and not campaign.rig.is_driven:
+        raise InputError(
+            f"The method 'thesis' fits rigs whose input moves a mass, and that of {campaign.rig.name} prescribes the motion. Use "
+            "--method local_rational."
+        )
     tell(campaign.notes, listener)
     structure = structure_with_memory(campaign, effects) if effects else None
+    # The rig is identified without the effects that are calibrated, also where its simulation has one of them already.
+    asked = {effect.name for effect in effects_on(campaign.rig, effects, "--effect")}
+    campaign = replace(
+        campaign, modelled=tuple(effect for effect in campaign.modelled if effect.name not in asked)
+    )
     if has_transfer_forms(campaign):
         identification = _by_transfer_functions(campaign, options, n_jobs, listener)
     else:
         identification = identify_any_rig(campaign, options, n_jobs, listener)
+    identification = replace(identification, given=campaign.given)
     if structure is None:
         return identification
     return with_hysteresis(identification, campaign, structure, seed, n_jobs, listener)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError, check_in_range, check_option
 from rigsight.frequency import FrequencyResponse
 from rigsight.frequency.signal_pair import pair_unit
@@ -17,6 +18,7 @@ from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_
 from rigsight.parameters import Parameter
 from rigsight.plot.variation import Curve, picture_files, varied_responses
 from rigsight.records import Record
+from rigsight.rigs import Rig
 from rigsight.simulate import Structure, simulate
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.linearization import is_linear, linearize
@@ -86,6 +88,8 @@ def run_vary(
     band: tuple[float, float] | None = None,
     source: str | None = None,
     response: str | None = None,
+    own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
     listener: Listener = silent,
 ) -> tuple[Variation, ...]:
     """Return frequency responses with several values of each parameter, all others unchanged.
@@ -112,6 +116,8 @@ def run_vary(
         all of its natural frequencies.
     source, response
         Names of the swept input (the others are at rest) and of the output; default is the first of each.
+    own_effects, own_rigs
+        Effects and rigs that the model may name beside those of the catalogue and the built-in ones.
     listener
         Told of every finished sweep.
 
@@ -122,7 +128,7 @@ def run_vary(
     """
     if out is not None:
         check_writable(Path(out), VARY_FILE)
-    read = named_model(model)
+    read = named_model(model, own_effects, own_rigs)
     rig = read.structure.rig
     if not rig.is_driven or not rig.inputs:
         why = "prescribes the motion" if rig.inputs else "has no input"

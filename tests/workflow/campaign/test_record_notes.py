@@ -50,3 +50,10 @@ def test_a_fitted_record_that_is_to_validate_too_is_told(campaign: Callable[...,
     folder = campaign(HEAD + RECORDS.replace('"step.csv"', '"sweep.csv"'))
     (note,) = read_campaign(folder).notes
     assert "the validation record 'sweep_2' has exactly the samples of 'sweep', which is fitted" in note
+
+
+def test_fitted_records_that_differ_in_hold_are_told_of(campaign: Callable[..., Path]) -> None:
+    both = RECORDS.replace('role = "validation"\n', "")
+    alike, other = (read_campaign(campaign(HEAD + text)).notes for text in (both.replace("zoh", "foh"), both))
+    assert len(other) == len(alike) + 1
+    assert any("hold (foh, zoh)" in note for note in other)

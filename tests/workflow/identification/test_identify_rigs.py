@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep, step
+from rigsight.records import Record
 from rigsight.rigs import AXIS, ELEMENT
-from rigsight.workflow.identify import run_identify
+from rigsight.workflow.campaign.in_memory import make_campaign
+from rigsight.workflow.identify import checked_options, identify_campaign, run_identify
 
 from ..virtual_campaign import DT, Run, write_campaign
 
@@ -58,6 +61,13 @@ def test_an_element_shows_its_dynamic_stiffness(tmp_path: Path) -> None:
             assert record.estimates[name][0] == pytest.approx(value, rel=0.02)
     assert (tmp_path / "out" / "bode_one.svg").is_file()
     assert found.model["parameters"]["d"] == pytest.approx(3.0, rel=0.01)
+
+
+def test_a_method_that_an_element_does_not_have_is_refused() -> None:
+    x = np.sin(np.linspace(0.0, 60.0, 300) ** 1.5)
+    record = Record("one", DT, {"x": x, "force": 40.0 * x}, {"x": "m", "force": "N"})
+    with pytest.raises(InputError, match="'thesis' fits rigs whose input moves a mass"):
+        identify_campaign(make_campaign(ELEMENT, [record]), checked_options("thesis", None))
 
 
 @pytest.mark.slow

@@ -53,7 +53,9 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
             refused.append(Refused(name, "holds text"))
             continue
         unit = stated_unit(layout.units[i]) if i < len(layout.units) else None
-        channels.append(Channel(name, table.shape[0], _load(table, i), unit))
+        # Columns without a name of their own are told apart by their number, also in a campaign.
+        called = name if name and layout.names.count(name) == 1 else str(i + 1)
+        channels.append(Channel(called, table.shape[0], _load(table, i), unit))
     yield ChannelFile(with_distinct_names(channels), tuple(refused), "delimited text")
 
 

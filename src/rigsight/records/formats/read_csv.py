@@ -217,6 +217,8 @@ def _position(path: Path, signal: str, mapping: ColumnMapping, layout: Layout, o
             f"{path.name}: {count} columns are called '{mapping.name}'; "
             f"name the one for signal '{signal}' by its number, counted from 1."
         )
+    if mapping.name.isdecimal() and 1 <= int(mapping.name) <= len(layout.names):
+        return int(mapping.name) - 1
     if optional:
         return None
     if not layout.has_names:

@@ -143,6 +143,8 @@ def _parameter(
                 (key, name, end),
                 f"log = true searches its logarithm, so {end} must be above 0, got {bound:g}",
             )
+    if key == "alternatives" and own.default is not None:
+        declaration.refuse((key, name, "default"), "an alternative has none; give its parameter a default")
     lower = own.lower if own.lower is not None else (_LEAST if log else -_LARGEST)
     upper = own.upper if own.upper is not None else _LARGEST
     if lower >= upper:

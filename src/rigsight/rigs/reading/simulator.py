@@ -38,6 +38,10 @@ def check_simulator(declaration: Declaration) -> None:
     for key, wanted in {"rates": "fmu", "forces": "fmu", "without_armature": "mujoco"}.items():
         if others[key] and own.kind != wanted:
             declaration.refuse((_KEY, key), f"it belongs to {wanted}, but this is {own.kind}; remove it")
+    if own.digest and own.kind == "python":
+        declaration.refuse(
+            (_KEY, "digest"), "it is of a model's file, and a Python function has none; remove it"
+        )
     for key in ("coordinates", "rates", "forces"):
         for name in getattr(own, key):
             if name not in free:
@@ -108,5 +112,6 @@ def with_whole_path(content: dict[str, object], folder: Path) -> dict[str, objec
     with contextlib.suppress(ValueError):
         own = {**own, "file": (folder / str(own["file"])).resolve().as_posix()}
     with contextlib.suppress(InputError):
-        own = {**own, "digest": model_digest(str(own.get("kind")), Path(str(own["file"])))}
+        # A digest that stands there is kept: a model of another content is then refused.
+        own = {"digest": model_digest(str(own.get("kind")), Path(str(own["file"]))), **own}
     return {**content, _KEY: own}

@@ -33,6 +33,7 @@ def record_notes(called: str, rig: Rig, records: Sequence[Record]) -> tuple[str,
         *_other_units(rig, records),
         *(note for record in records for note in _other_amplitude(record, rig)),
         *_fitted_again(called, records),
+        *_other_holds(records),
     ]
     if all(record.role != "validation" for record in records):
         found.append(
@@ -55,6 +56,15 @@ def _holds_same_samples(record: Record, other: Record) -> bool:
     return record.signals.keys() == other.signals.keys() and all(
         np.array_equal(samples, other[name]) for name, samples in record.signals.items()
     )
+
+
+def _other_holds(records: Sequence[Record]) -> Iterator[str]:
+    holds = list(dict.fromkeys(record.hold for record in records if record.role == "estimation"))
+    if len(holds) > 1:
+        yield (
+            f"The estimation records differ in hold ({', '.join(holds)}): each is fitted with its own; models are written with "
+            f"that of the first, {holds[0]}."
+        )
 
 
 def _rates_apart(records: Sequence[Record]) -> Iterator[str]:

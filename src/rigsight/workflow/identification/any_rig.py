@@ -41,6 +41,7 @@ from rigsight.rigs import Rig, has_built_in_parameters, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
+from rigsight.workflow.identification.effect_starts import start_with_effects
 from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters
 from rigsight.workflow.identification.warnings import (
     any_rig_warnings,
@@ -63,12 +64,12 @@ def has_transfer_forms(campaign: Campaign) -> bool:
 
     A rig with the same equations from a file has other names, or knows a number that a transfer function would estimate. Records
     with different constants have no common transfer function, and records without excitation have none. Offsets that differ
-    between records are estimated only in the time domain.
+    between records, and the effects of the given simulation, are estimated only in the time domain.
     """
     rig = campaign.rig
-    if not has_built_in_parameters(rig) or any(
-        record.constants or record.free_offsets for record in campaign.records
-    ):
+    if campaign.modelled or not has_built_in_parameters(rig):
+        return False
+    if any(record.constants or record.free_offsets for record in campaign.records):
         return False
     return not any(is_constant(record[rig.inputs[0].name]) for record in campaign.estimation)
 
@@ -94,10 +95,10 @@ def identify_any_rig(
     InputError
         If the method is only for rigs that are identified record by record.
     """
-    rig, structure = campaign.rig, compose(campaign.rig)
+    rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
     check_option(
-        f"The method for the rig '{rig.name}' with these records (h1 and thesis are for built-in rigs of one motion, each record "
-        "driven and without constants or offsets of its own)",
+        f"The method for the rig '{rig.name}' with these records (h1 and thesis are for built-in rigs of one motion without "
+        "effects, each record driven and without constants or offsets of its own)",
         options.method,
         METHODS,
     )
@@ -112,13 +113,16 @@ def identify_any_rig(
             stage.finished(record.record.name)
         factor = campaign.open_factor
         held = _held(campaign, records, factor)
-        start, length = _begin(campaign, structure, records, held)
+        start, length = _begin(campaign, records, held)
+        if campaign.modelled:
+            windows = cut(records, length)
+            start = start_with_effects(campaign, windows, start, held, _sizes(rig, windows))
         swallowed = _swallowed(structure, cut(records, length), {**campaign.constants, **start}, held)
         held |= {name: start[name] for name in swallowed}
         joint = fit_any_rig_jointly(campaign, structure, found, start, held, length)
         stage.finished("one set for all records")
         known, joint = _with_errors(joint, structure, cut(records, length), factor)
-        found = [_with_own(record, joint, rig) for record in found]
+        found = [_with_own(record, joint) for record in found]
         stage.finished("identifiability")
         views = tuple(_views(structure, joint.fit.fit.values, records, options, known))
     units = {p.name: p.unit for p in structure.parameters}
@@ -148,7 +152,7 @@ def identify_any_rig(
         ),
         views=views,
         identifiability=told,
-        meanings={parameter.name: parameter.description for parameter in rig.parameters},
+        meanings={parameter.name: parameter.description for parameter in structure.parameters},
     )
     stage.finished("poles and responses")
     return identification
@@ -184,10 +188,10 @@ def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | No
 
 
 def _begin(
-    campaign: Campaign, structure: Structure, records: Sequence[Record], held: Mapping[str, float]
+    campaign: Campaign, records: Sequence[Record], held: Mapping[str, float]
 ) -> tuple[dict[str, float], float | None]:
-    """Return start values, and the length of windows [s] if the rig drifts or diverges."""
-    rig, constants = campaign.rig, campaign.constants
+    """Return start values of the rig without effects, and the length of windows [s] if it drifts or diverges."""
+    rig, constants, structure = campaign.rig, campaign.constants, compose(campaign.rig)
     starts = [linear_start(rig, records, constants, held)]
     given = rig.in_own_parameters(campaign.parameters, constants)
     if all(p.name in given for p in rig.parameters):
@@ -215,22 +219,22 @@ def _swallowed(
     """Return the parameters that cannot be distinguished from sensor offsets that are free in each record."""
     scales = characteristic_scales(structure.rig, windows, values)
     asked = [p.name for p in structure.rig.parameters if p.name not in held]
-    return swallowed_by_offsets(structure, windows, scales, _sizes(structure, windows), values, asked)
+    return swallowed_by_offsets(structure, windows, scales, _sizes(structure.rig, windows), values, asked)
 
 
 def _cost(structure: Structure, values: Mapping[str, float], records: Sequence[Record]) -> float:
     scales = characteristic_scales(structure.rig, records, values)
-    fit = GreyBoxFit(structure, records, scales, _sizes(structure, records))
+    fit = GreyBoxFit(structure, records, scales, _sizes(structure.rig, records))
     return fit.fit(values, (), finish=False).cost
 
 
-def _sizes(structure: Structure, records: Sequence[Record]) -> dict[str, float]:
+def _sizes(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
     """Return how much each output that was measured moves."""
     return {
         signal.name: max(
             float(np.std(np.concatenate([r[signal.name] for r in records if signal.name in r]))), 1e-300
         )
-        for signal in structure.rig.outputs
+        for signal in rig.outputs
         if any(signal.name in record for record in records)
     }
 
@@ -303,12 +307,12 @@ def _with_unknown(result: FitResult, name: str) -> FitResult:
     return replace(result, free=free, covariance=covariance, standard_errors={n: errors[n] for n in free})
 
 
-def _with_own(found: RecordIdentification, joint: JointIdentification, rig: Rig) -> RecordIdentification:
+def _with_own(found: RecordIdentification, joint: JointIdentification) -> RecordIdentification:
     """Give a record the parameters of its own fit."""
     own = next(kind.fit for kind in joint.fit.kinds if kind.kind == found.record.name)
     if not np.isfinite(own.cost):
         return found
-    positive = frozenset(p.name for p in rig.parameters if p.logarithmic)
+    positive = frozenset(p.name for p in own.structure.parameters if p.logarithmic)
     values = {name: own.values[name] for name in own.free}
     estimates = PhysicalEstimates(own.free, values, own.covariance, "fitted over time", positive)
     return replace(found, own=estimates)

@@ -50,6 +50,7 @@ def identification_json(identification: Identification, figures: Mapping[str, st
         "schema_version": SCHEMA_VERSION,
         "title": identification.title,
         "rig": identification.rig,
+        "effects": list(identification.model["effects"]),
         "method": identification.method,
         "level": LEVEL,
         "warnings": list(identification.warnings),
@@ -58,7 +59,7 @@ def identification_json(identification: Identification, figures: Mapping[str, st
             "changing": list(identification.changing),
             "table": [_row(record, units) for record in identification.records],
         },
-        "joint": _joint(identification.joint, units),
+        "joint": _joint(identification.joint, units, identification.given),
         "validation": [
             {"record": s.record, "amplitude": finite(s.amplitude), "nrmse": _all_finite(s.nrmse)}
             for s in identification.joint.scores
@@ -162,7 +163,9 @@ def _conicity(found: ConicityEstimate) -> dict[str, Any]:
     }
 
 
-def _joint(joint: JointIdentification, units: Mapping[str, str]) -> dict[str, Any]:
+def _joint(
+    joint: JointIdentification, units: Mapping[str, str], given: Mapping[str, float]
+) -> dict[str, Any]:
     fit = joint.fit
     return {
         "statement": joint.statement,
@@ -173,6 +176,7 @@ def _joint(joint: JointIdentification, units: Mapping[str, str]) -> dict[str, An
         "parameters": {
             name: {
                 "value": fit.fit.values[name],
+                "given": given.get(name),
                 "std": finite(fit.fit.standard_errors[name]),
                 "interval": [finite(end) for end in fit.interval(name)],
                 "unit": units.get(name, ""),

@@ -113,7 +113,7 @@ def any_rig_warnings(
     told += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
     told += closed_loop_notes(campaign.records, campaign.rig, _NOT_OF_ANY_RIG)
     for view in views:
-        told += _of_view(view)
+        told += _of_view(view, [effect.name for effect in campaign.modelled])
     if not joint.fit.fit.success:
         told.append(joint.statement)
     return list(dict.fromkeys(told))
@@ -160,7 +160,7 @@ def offsets_of_records(
     return told
 
 
-def _of_view(view: LinearView) -> list[str]:
+def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
     told = []
     where = (
         f" ({', '.join(f'{name} = {value:g}' for name, value in view.constants.items())})"
@@ -190,10 +190,15 @@ def _of_view(view: LinearView) -> list[str]:
         if off[source, response] > MISFIT
     ]
     if beside:
+        why = (
+            f"Linear equations leave out what is not linear in {' and '.join(effects)}; the fit in the time domain contains it."
+            if effects
+            else "Either the motion is too large for a linear model, or an effect is missing. The nonlinear fit in the time "
+            "domain shows which; 'rigsight diagnose' finds missing effects."
+        )
         told.append(
             f"The residual of the linearized equations is larger than the noise{where}, by these factors: {', '.join(beside)}. "
-            "Either the motion is too large for a linear model, or an effect is missing. The nonlinear fit in the time domain "
-            "shows which; 'rigsight diagnose' finds missing effects."
+            f"{why}"
         )
     return told
 

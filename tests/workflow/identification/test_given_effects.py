@@ -1,0 +1,127 @@
+"""Effects that the given simulation has belong to the rig that is identified, whatever its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from rigsight.campaign import Campaign
+from rigsight.errors import InputError
+from rigsight.identify.identification import Identification
+from rigsight.records import Record
+from rigsight.workflow.campaign.in_memory import make_campaign, make_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.identification.json import identification_json
+from rigsight.workflow.identify import checked_options, identify_campaign
+from rigsight.workflow.simulate import simulate_model
+
+DT = 5e-3
+BY_DEFAULT = checked_options("local_rational", None)
+
+
+class Case(NamedTuple):
+    """A rig with one effect: truth, given values (sizes of zero lie on a bound), amplitude of the input, noise of a sensor."""
+
+    rig: str
+    effect: str
+    truth: Mapping[str, float]
+    given: Mapping[str, float]
+    amplitude: float
+    noise: float
+
+
+AXIS = {"m": 2.0, "d": 12.0, "k": 800.0}
+CASES = (
+    Case("axis", "coulomb_friction", {**AXIS, "T_c": 1.5}, {**AXIS, "d": 0.0, "T_c": 0.0}, 10.0, 1e-5),
+    Case("axis", "input_delay", {**AXIS, "T_d": 0.012}, {"T_d": 0.0}, 10.0, 1e-5),
+    Case(
+        "element",
+        "coulomb_friction",
+        {"d": 3.0, "k": 40.0, "force_off": 0.2, "T_c": 0.1},
+        {"T_c": 0.0},
+        0.02,
+        1e-3,
+    ),
+    Case(
+        "running_gear",
+        "coulomb_friction",
+        {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25}
+        | {"c_y": 0.98, "T_c": 0.05},
+        {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "T_c": 0.0},
+        1.0,
+        1e-6,
+    ),
+    Case(
+        "drive_train",
+        "coulomb_friction@motor_bearing",
+        {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
+        | {"T_c": 5e-3},
+        {"k_t": 0.05, "T_c": 0.0},
+        1.0,
+        1e-4,
+    ),
+)
+
+
+def recorded(case: Case) -> Campaign:
+    """Return a campaign of one sweep of the true rig with its effect, which the given simulation has too."""
+    t = DT * np.arange(800)
+    model = make_model(case.rig, case.truth, [case.effect])
+    rig, rng = model.structure.rig, np.random.default_rng(0)
+    drive = case.amplitude * np.sin((3.0 + 4.0 * t) * t)
+    units = {signal.name: signal.unit for signal in rig.inputs}
+    inputs = Record("sweep", DT, dict.fromkeys(units, drive), units)
+    clean = simulate_model(model, inputs)
+    read = {s.name: clean[s.name] + rng.normal(scale=case.noise, size=t.size) for s in rig.outputs}
+    names = {constant.name for constant in rig.constants}
+    return make_campaign(
+        rig,
+        [clean.with_signals(**read)],
+        constants={name: value for name, value in case.given.items() if name in names},
+        parameters={name: value for name, value in case.given.items() if name not in names},
+        effects=[case.effect],
+    )
+
+
+def identified(campaign: Campaign) -> Identification:
+    return identify_campaign(campaign, BY_DEFAULT)
+
+
+# Start values of a rig with several motions take seconds.
+@pytest.mark.parametrize(
+    "case",
+    [*CASES[:-1], pytest.param(CASES[-1], marks=pytest.mark.slow)],
+    ids=lambda case: f"{case.rig}-{case.effect}",
+)
+def test_the_parameters_of_rig_and_effect_are_found_together(case: Case) -> None:
+    campaign = recorded(case)
+    found = identified(campaign)
+    fit = found.joint.fit.fit
+    own = [name for name in case.truth if name not in campaign.constants]
+    for name in own:
+        assert abs(fit.values[name] - case.truth[name]) < 4.0 * fit.standard_errors[name] < np.inf, name
+    content = identification_json(found, {})
+    assert content["effects"] == found.model["effects"] == [case.effect]
+    effect_parameters = found.model["effect_parameters"]
+    assert effect_parameters.keys() <= content["joint"]["parameters"].keys()
+    assert effect_parameters.keys() <= content["records"][0]["parameters"].keys()
+
+
+def test_methods_of_linear_rigs_are_refused() -> None:
+    with pytest.raises(InputError, match="without effects"):
+        identify_campaign(recorded(CASES[0]), checked_options("h1", None))
+
+
+def test_a_campaign_that_starts_at_its_bounds(shared_data: Path) -> None:
+    folder = shared_data.parent / "cases" / "fit_started_at_a_bound"
+    if not folder.is_dir():
+        pytest.skip(f"the cases of users are not at {folder}")
+    found = identified(read_campaign(folder))
+    fit = found.joint.fit.fit
+    for name, value in {"m": 2.0, "d": 12.0, "k": 800.0, "T_c": 1.5}.items():
+        assert fit.values[name] == pytest.approx(value, rel=1e-3), name
+        assert abs(fit.values[name] - value) < 4.0 * fit.standard_errors[name], name
