@@ -36,6 +36,8 @@ class Campaign:
         The toml file; None for a campaign that was made of records in memory.
     notes
         Notes on the campaign as a whole.
+    spring_released
+        True if the records show a spring that the given simulation lacks, so that fits estimate it.
     """
 
     title: str
@@ -46,6 +48,7 @@ class Campaign:
     modelled: tuple[Effect, ...] = ()
     path: Path | None = None
     notes: tuple[str, ...] = ()
+    spring_released: bool = False
 
     # The repr of the dataclass would contain every sample.
     def __repr__(self) -> str:
@@ -84,7 +87,12 @@ class Campaign:
 
     @property
     def absent_spring(self) -> str | None:
-        """Name of the stiffness parameter if the rig is one driven mass that is given without a spring."""
+        """Name of the stiffness parameter if fits hold it at zero, because one driven mass is given without a spring."""
+        return None if self.spring_released else self.given_without_spring
+
+    @property
+    def given_without_spring(self) -> str | None:
+        """Name of the stiffness parameter if the given simulation is one driven mass without a spring."""
         if not (self.rig.has_one_motion and self.rig.is_driven):
             return None
         stiffness = self.rig.motion.stiffness
@@ -95,5 +103,5 @@ class Campaign:
     def drifts(self) -> bool:
         """True if the rig has no restoring force, so that in free run force errors are integrated twice."""
         if self.rig.has_one_motion:
-            return self.absent_spring is not None
+            return self.given_without_spring is not None
         return can_drift(self.rig, {**self.constants, **self.given})

@@ -43,6 +43,7 @@ def said(function: Callable[..., Floats], size: float = 0.0, **values: float) ->
             sizes=sizes,
             lower=np.where(place < size, -np.inf, 0.0),
             upper=np.full(len(names), np.inf),
+            asked=place,
             root=np.linalg.qr(np.column_stack(columns), mode="r"),
             change=lambda moved: float(np.linalg.norm(function(*(moved[n] for n in names)) - base)) / NOISE,
         )

@@ -21,7 +21,7 @@ from rigsight.identify.transfer.record_response import Method, driven_band, reco
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.metrics import rms
 from rigsight.records import Record
-from rigsight.records.plausibility import is_constant
+from rigsight.records.plausibility import is_constant, moves_beyond_noise
 from rigsight.records.record import Hold
 from rigsight.rigs import Rig
 
@@ -182,7 +182,11 @@ def _measured(record: Record, path: SignalPath, method: Method) -> FrequencyResp
         if np.mean(is_clear) < 0.5:
             raise InputError(
                 f"{np.sum(is_clear)} of {is_clear.size} lines stand out of their noise by 10 dB, too few for a comparison. "
-                "Record for longer, or excite more."
+                + (
+                    f"'{path.response}' itself moves far more than its noise, so it is no linear response to '{path.source}'."
+                    if moves_beyond_noise(record[path.response])
+                    else "Record for longer, or excite more."
+                )
             )
     return found
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rigsight.campaign import Campaign
 from rigsight.diagnose.advise import advise
 from rigsight.diagnose.examination import Examination, examine
+from rigsight.diagnose.fitting.absent_spring import with_weighed_spring
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.fitting.preparation import Prepare
@@ -85,6 +86,7 @@ def diagnose(
     say = progress or (lambda _: None)
     if not campaign.estimation:
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
+    campaign = with_weighed_spring(campaign)
     effects = candidates_on(campaign.rig, effects, campaign.modelled)
     scored_on = "validation" if campaign.validation else "estimation"
     rng = np.random.default_rng(seed)

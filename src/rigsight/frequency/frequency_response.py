@@ -177,18 +177,6 @@ class FrequencyResponse:
         }
         return replace(self, **changed)
 
-    def rate(self) -> Self:
-        """Return the response of the rate of the responding signal."""
-        variance, shares = self.variance, self.noise_shares
-        return replace(
-            self,
-            values=1j * self.omega * self.values,
-            response=f"{self.response}'",
-            unit=f"{self.unit}/s",
-            variance=None if variance is None else self.omega**2 * variance,
-            noise_shares=None if shares is None else 1j * self.omega[:, None] * shares,
-        )
-
     def to_control(self) -> Any:
         """Return the values as a ``control.FrequencyResponseData`` with one input and one output."""
         import control

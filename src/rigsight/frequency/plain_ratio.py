@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,35 +29,25 @@ class PlainRatio(FrequencyResponse):
         Spectrum of the source with its hold, shape (n_frequencies,).
     dt, n_samples, hold
         Sample time [s] and length of the record, and the hold of the source.
-    integrators
-        Poles at zero in addition to those of a form: 1 if the form describes a velocity and the record its integral.
     """
 
     drive: NDArray[np.complex128]
     dt: float
     n_samples: int
     hold: Hold
-    integrators: int = 0
-
-    def rate(self) -> Self:
-        """Return the plain ratio of the rate of the responding signal, with the free motion of the signal itself."""
-        moved = super().rate()
-        return replace(moved, drive=self.drive / (1j * self.omega), integrators=self.integrators + 1)
 
     def free_motions(self, poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Return a basis of the free motions over the drive, shape (n_frequencies, n_poles + integrators).
+        """Return a basis of the free motions over the drive, shape (n_frequencies, n_poles).
 
         Parameters
         ----------
         poles
             Poles of the form [1/s], shape (n_poles,).
         """
-        poles = np.append(poles, np.zeros(self.integrators))
         return np.asarray(_free_motions(self.omega, self.dt, poles) / self.drive[:, None])
 
     def free_motion(self, weights: NDArray[np.float64], poles: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return the free motion with these weights of the basis over time, without its mean, shape (n_samples,)."""
-        poles = np.append(poles, np.zeros(self.integrators))
         omega = 2.0 * np.pi * np.fft.rfftfreq(self.n_samples, self.dt)[1:]
         lines = _free_motions(omega, self.dt, poles) @ weights
         return np.asarray(np.fft.irfft(np.append(0.0, lines), self.n_samples))

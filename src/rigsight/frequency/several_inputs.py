@@ -24,6 +24,7 @@ from rigsight.frequency.frequency_response import FrequencyResponse
 from rigsight.frequency.local_model import SPARE, LocalFit
 from rigsight.frequency.signal_pair import excited, hold_response, line_frequencies, pair_unit
 from rigsight.records.periods import mean_period
+from rigsight.records.plausibility import moves_beyond_noise
 from rigsight.records.record import Hold, Record
 
 _OWN_SHARE = 1e-4
@@ -147,9 +148,8 @@ def responses_of_inputs(
                 together[tuple(sorted((source, *rivals), key=list(sources).index))] = None
                 problems[source, response] = _inseparable(source, rivals)
             else:
-                problems[source, response] = local.tone(index, source) or (
-                    f"the response of '{response}' to '{source}' does not exceed its noise. Excite '{source}' more strongly, or "
-                    f"for longer."
+                problems[source, response] = local.tone(index, source) or _hidden(
+                    source, response, [s.record for s in own], len(sources) > 1
                 )
     return ResponsesOfInputs(found, problems, tuple(together))
 
@@ -160,6 +160,18 @@ def _unmoved(source: str, response: str, records: Sequence[Record]) -> str:
     if any(r.kind == "step" and response in r and _moves(r, source) for r in records):
         return f"'{source}' only has steps, which give no frequency response. Record a sweep or a multisine of it."
     return f"'{source}' does not change in any record with '{response}'. Record one in which it does."
+
+
+def _hidden(source: str, response: str, records: Sequence[Record], others_drive: bool) -> str:
+    if others_drive or not any(moves_beyond_noise(record[response]) for record in records):
+        return (
+            f"the response of '{response}' to '{source}' does not exceed its noise. Excite '{source}' more strongly, or "
+            f"for longer."
+        )
+    return (
+        f"'{response}' moves far more than its noise, but not as a linear response to '{source}': more excitation does not "
+        f"help. Check whether '{response}' wraps or is held, whether both signals are of one clock, and what else moves it."
+    )
 
 
 def _inseparable(source: str, rivals: Sequence[str]) -> str:

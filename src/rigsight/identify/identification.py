@@ -10,6 +10,7 @@ from rigsight.identify.hysteresis.calibration import Calibration
 from rigsight.identify.identifiability import Identifiability
 from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
+from rigsight.identify.reached_bounds import ReachedBound
 from rigsight.identify.transfer.conicity import ConicityEstimate
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
@@ -239,6 +240,8 @@ class Identification:
         Content of ``model.json``.
     warnings
         All warnings, each with the name of its record.
+    reached
+        Parameters of the joint fit that stand at a bound which the records ask them to pass.
     views
         The linearized rig, for each set of constants of the records; empty for the built-in rigs with one motion, whose transfer
         functions are fitted record by record.
@@ -262,6 +265,7 @@ class Identification:
     joint: JointIdentification
     model: dict[str, Any]
     warnings: tuple[str, ...]
+    reached: tuple[ReachedBound, ...] = ()
     views: tuple[LinearView, ...] = ()
     identifiability: Identifiability | None = None
     meanings: dict[str, str] = field(default_factory=dict)

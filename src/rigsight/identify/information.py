@@ -13,11 +13,15 @@ from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.fit_problem import Problem
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.identify.undetermined import POORLY_KNOWN, conditional_errors
 from rigsight.simulate import carries_tangents
 from rigsight.units import characteristic_value
 
 Floats = NDArray[np.float64]
 
+_OWN_SIZE = 0.5
+"""Value over its characteristic size from which a parameter of either sign is its own reference, as a stiffness that gives the
+records their size."""
 _FOLLOWED = 1e-10
 """Share of the largest influence of initial states below which a combination of them has none."""
 
@@ -33,9 +37,12 @@ class Information:
     values
         Their values, shape (n,).
     sizes
-        Reference of the relative changes, shape (n,): the value, or the size in the records for a parameter that may be zero.
+        Reference of the relative changes, shape (n,): the value, or the size in the records for a parameter that may be zero: one
+        of either sign, and one that cannot be distinguished from its bound zero.
     lower, upper
         Their bounds, shape (n,).
+    asked
+        The values after one step to the minimum without bounds, shape (n,); at a minimum inside the bounds `values`.
     root
         ``root.T @ root`` is the information matrix in units of the noise, shape (m, n).
     change
@@ -48,6 +55,7 @@ class Information:
     sizes: Floats
     lower: Floats
     upper: Floats
+    asked: Floats
     root: Floats
     change: Callable[[Mapping[str, float]], float]
 
@@ -65,12 +73,15 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
     parameters = [p for p in fit.structure.parameters if p.name in result.free]
     values = np.array([result.values[p.name] for p in parameters])
     scales = np.array([abs(characteristic_value(p.dimension, fit.scales)) for p in parameters])
-    # The relative error of a parameter that may have either sign (an offset) would depend on its value.
-    may_vanish = np.array([p.lower < 0.0 for p in parameters])
-    sizes = np.where((np.abs(values) < scales) & may_vanish | (values == 0.0), scales, values)
     names = tuple(p.name for p in parameters)
     model = _Model(fit, result, names)
     noise = np.sqrt(result.cost / max(result.n_samples - len(names), 1)) or 1.0
+    # The relative error of a parameter that may have either sign (an offset) would depend on its value.
+    either_sign = np.array([p.lower < 0.0 for p in parameters]) & (np.abs(values) < _OWN_SIZE * scales)
+    # So would that of a parameter at its bound of zero, as a damping that is none.
+    least = noise * conditional_errors(np.vstack(model.rows)) / POORLY_KNOWN
+    at_zero = np.array([p.lower == 0.0 and not p.logarithmic for p in parameters]) & (values < least)
+    sizes = np.where(either_sign | (at_zero & (values < scales)) | (values == 0.0), scales, values)
     root = np.vstack([_triangle(rows) for rows in model.rows]) * sizes / noise
     return Information(
         names=names,
@@ -79,6 +90,7 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
         sizes=sizes,
         lower=np.array([p.lower for p in parameters]),
         upper=np.array([p.upper for p in parameters]),
+        asked=model.minimum(),
         root=_triangle(root) / _coloring(root, result, names, sizes),
         change=lambda moved: model.change({**result.values, **moved}) / noise,
     )
@@ -108,6 +120,8 @@ class _Model:
         self._fit, self._result = fit, result
         problem, theta = place_of_fit(fit, result, result.values, names)
         n, slopes = len(names), problem.coordinates.jacobian(theta[: len(names)])
+        # The start of a search keeps a distance from bounds, so that this is not quite the end of the fit.
+        self._place = problem.coordinates.to_parameters(theta[:n])[problem.coordinates.index]
         self._residuals, self._followed, self.rows = [], [], []
         for residual, derivative in central_sensitivities(problem, theta):
             states = derivative[:, n:]
@@ -117,6 +131,13 @@ class _Model:
             self._residuals.append(residual)
             self._followed.append(basis)
             self.rows.append(own - basis @ (basis.T @ own))
+
+    def minimum(self) -> Floats:
+        """Return the parameters at the minimum of the linearized fit without bounds, in their units, shape (n,)."""
+        rows, left = np.vstack(self.rows), np.concatenate(self._residuals)
+        size = np.linalg.norm(rows, axis=0)
+        size[size == 0.0] = 1.0
+        return np.asarray(self._place - np.linalg.lstsq(rows / size, left, rcond=_FOLLOWED)[0] / size)
 
     def change(self, values: Mapping[str, float]) -> float:
         """Return the length of the change of all weighted outputs when parameters take other values."""

@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 _STEP = 1e-4
 """Relative change of a parameter for a difference: rounding and curvature both contribute an error of 1e-8."""
 _ROUNDING = 1e-9
+_GROWTHS = 3.0
+"""Longest free run of an unstable rig in time constants of its growth: errors of the initial state grow twentyfold."""
 _IMAGES = 50
 """Number of multiples of the sampling frequency: for a response that falls as 1/f, the rest is 1 % of their contribution."""
 _POLES = {"local_rational": 2, "local_polynomial": 0}
@@ -121,6 +123,21 @@ def measured_responses(
         resolution=resolution,
         smooth=sorted(_smooth(rig)),
     )
+
+
+def longest_free_run(poles: NDArray[np.complex128], records: Sequence[Record]) -> float | None:
+    """Return how long a rig can run free before errors of its initial state hide the motion [s]; None for whole records.
+
+    Parameters
+    ----------
+    poles
+        Of the rig near its rest [1/s].
+    records
+        The records.
+    """
+    growth = float(np.max(poles.real, initial=0.0))
+    longest = max(record.n_samples * record.dt for record in records)
+    return _GROWTHS / growth if growth * longest > _GROWTHS else None
 
 
 def by_constants(records: Sequence[Record]) -> list[list[Record]]:

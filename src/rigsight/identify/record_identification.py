@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.identification import PathIdentification, RecordIdentification
 from rigsight.identify.measured_amplitude import measured_amplitude
-from rigsight.identify.transfer.axis_parameters import axis_parameters, springless_parameters
+from rigsight.identify.transfer.axis_parameters import axis_parameters
 from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
 from rigsight.identify.transfer.driven_offsets import driven_offsets
 from rigsight.identify.transfer.record_response import MISFIT, Method, RecordResponse, record_response
@@ -62,7 +63,7 @@ class EstimationOptions:
 
 
 def identify_record(
-    record: Record, rig: Rig, constants: Mapping[str, float], has_stiffness: bool, options: EstimationOptions
+    record: Record, rig: Rig, constants: Mapping[str, float], options: EstimationOptions
 ) -> RecordIdentification:
     """Identify the rig from one record.
 
@@ -75,8 +76,6 @@ def identify_record(
         here.
     constants
         The rig's constants by name.
-    has_stiffness
-        False for an axis without a spring, which is identified from its velocity.
     options
         Settings.
 
@@ -90,7 +89,7 @@ def identify_record(
         return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, options),))
     forward = _driven_forward(record, constants.get("gain", 1.0))
     instrument = instrument_of(record, [signal.name for signal in (*rig.inputs, *rig.outputs)])
-    motion, seen = _motion(forward, rig, constants, has_stiffness, options, instrument)
+    motion, seen = _motion(forward, rig, constants, options, instrument)
     unused = "" if seen is None else seen.unused_instrument
     paths, warnings = [motion], _resolution_warning(motion, seen, record)
     warnings += [f"{motion.source} -> {motion.response}: read without the reference. {unused}"] * bool(unused)
@@ -101,9 +100,9 @@ def identify_record(
         record=record,
         amplitude=amplitude,
         paths=tuple(paths),
-        offsets=_offsets(forward, rig, paths) if has_stiffness else None,
+        offsets=_offsets(forward, rig, paths),
         conicity=_conicity(paths[1:], constants),
-        resonance=_resonance(motion) if has_stiffness else None,
+        resonance=_resonance(motion),
         warnings=tuple(warnings),
     )
 
@@ -117,7 +116,6 @@ def _motion(
     record: Record,
     rig: Rig,
     constants: Mapping[str, float],
-    has_stiffness: bool,
     options: EstimationOptions,
     instrument: str | None,
 ) -> tuple[PathIdentification, RecordResponse | None]:
@@ -126,29 +124,27 @@ def _motion(
     def physical(fit: TransferFit) -> PhysicalEstimates:
         if rig.downstream:
             return yaw_parameters(fit, constants)
-        gain = abs(evaluated(rig.motion.drive_gain, constants))
-        return axis_parameters(fit, gain) if has_stiffness else springless_parameters(fit, gain)
+        return axis_parameters(fit, abs(evaluated(rig.motion.drive_gain, constants)))
 
-    order: Order = "pt2" if has_stiffness else "pt1"
     path = PathIdentification(source, response)
     seen = None
     try:
         if record.kind == "step":
-            fit = _step_fit(record, source, response, order, has_stiffness)
+            fit = fit_step(record, source, response, "pt2")
         else:
             seen = record_response(
                 record,
                 source,
                 response,
-                order,
+                "pt2",
                 options.method,
                 options.resolution,
                 record.hold,
                 instrument=instrument,
-                moves_freely="as the form" if has_stiffness else "as its integral",
+                moves_freely=True,
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(seen, order, not has_stiffness, options)
+            fit = _fit(seen, "pt2", options)
         return _judged(path, fit, physical), seen
     except InputError as error:
         if options.resolution is not None and "too short for a resolution" in str(error):
@@ -188,10 +184,10 @@ def _lateral(
                 smooth,
                 band,
                 drive=rig.inputs[0].name,
-                moves_freely="as the form",
+                moves_freely=True,
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(seen, "pt1", False, options)
+            fit = _fit(seen, "pt1", options)
         return _judged(path, fit, lambda found: lateral_parameters(found, constants))
     except InputError as error:
         return replace(path, problem=str(error))
@@ -212,14 +208,11 @@ def _dynamic_stiffness(record: Record, rig: Rig, options: EstimationOptions) -> 
     return replace(path, measured=seen.response, coherence=seen.coherence)
 
 
-def _fit(seen: RecordResponse, order: Order, of_rate: bool, options: EstimationOptions) -> TransferFit:
+def _fit(seen: RecordResponse, order: Order, options: EstimationOptions) -> TransferFit:
     """Fit with standard errors that count independent values, not lines."""
     # The thesis fits magnitudes only (section 4.4), because its phases are rescaled.
     by_magnitude = options.method == "thesis"
-    response, plain = (
-        one.rate() if one is not None and of_rate else one for one in (seen.response, seen.plain)
-    )
-    assert response is not None
+    response, plain = seen.response, seen.plain
     fitted = plain or response
     fit = seen.fit or fit_frequency_response(fitted, order, magnitude_only=by_magnitude)
     factor = 1.0 if plain is not None or response.noise_shares is not None else seen.lines_per_value
@@ -250,20 +243,29 @@ def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> Tr
 
 
 def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float]:
-    """Return the values of a fit, with a negative gain if the phases show that the response is opposite to the source."""
-    slow = response.omega < _WELL_BELOW * fit.values["omega_b"]
-    fitted, measured = fit.at(response.omega[slow]), response.values[slow]
-    agreement = float(np.vdot(fitted, measured).real)
-    is_turned = agreement < _TURNED * float(np.linalg.norm(fitted) * np.linalg.norm(measured))
-    return {**fit.values, "gain": -fit.values["gain"]} if is_turned else fit.values
+    """Return the values of a fit, with a negative gain if the phases show that the response is opposite to the source.
 
+    Raises
+    ------
+    InputError
+        If it is opposite at low frequencies only: then the stiffness is negative.
+    """
+    break_frequency = fit.values["omega_b"]
 
-def _step_fit(record: Record, source: str, response: str, order: Order, has_stiffness: bool) -> TransferFit:
-    if has_stiffness:
-        return fit_step(record, source, response, order)
-    moved = record.with_signals(**{response: np.gradient(record[response], record.dt)})
-    moved = replace(moved, units={**moved.units, response: f"{moved.units.get(response, '1')}/s"})
-    return fit_step(moved, source, response, order)
+    def agreement(lines: NDArray[np.bool_]) -> float:
+        fitted, measured = fit.at(response.omega[lines]), response.values[lines]
+        size = float(np.linalg.norm(fitted) * np.linalg.norm(measured))
+        return float(np.vdot(fitted, measured).real) / size if size > 0.0 else 0.0
+
+    if agreement(response.omega < _WELL_BELOW * break_frequency) >= _TURNED:
+        return fit.values
+    if fit.form.order == "pt2" and agreement(response.omega > break_frequency / _WELL_BELOW) > -_TURNED:
+        raise InputError(
+            "the response is opposite to the input at low frequencies and not at high ones, so no signal has the wrong sign: the "
+            "stiffness is negative, and the rig is unstable without its control loop. Use a rig whose stiffness may be negative, "
+            "such as the axis or a rig file with a lower bound below 0: its records are fitted in short windows."
+        )
+    return {**fit.values, "gain": -fit.values["gain"]}
 
 
 def _from_rest(record: Record, motion: TransferFit | None) -> Record:
@@ -280,27 +282,33 @@ def _judged(
     path: PathIdentification, fit: TransferFit, physical: Callable[[TransferFit], PhysicalEstimates]
 ) -> PathIdentification:
     """Return the path with the fit if it can be used, otherwise with the reason why not."""
-    of_velocity = fit.response != path.response
-    if not fit.success and not of_velocity:
+    if not fit.success:
         return replace(path, problem=fit.message)
     gain = fit.values["gain"]
-    if not of_velocity and not fit.standard_errors["gain"] < POORLY_KNOWN * abs(gain):
+    if not fit.standard_errors["gain"] < POORLY_KNOWN * abs(gain):
         # A wrong sign would be attributed to a sensor.
-        return replace(path, problem=_undetermined(["the gain"]))
-    # The break frequency of a velocity is often below the band; mass and damping are then determined by the slope.
+        return replace(path, problem=_undetermined(["the gain"], fit.misfit))
     found = physical(fit)
     errors = found.standard_errors
     poor = [name for name in found.names if not errors[name] < POORLY_KNOWN * abs(found.values[name])]
     if len(poor) > 1 or (poor and fit.form.order == "pt1"):
         # A damping near zero is a valid result; the other parameters must be positive.
-        return replace(path, problem=_undetermined(poor))
+        return replace(path, problem=_undetermined(poor, fit.misfit))
     return replace(path, fit=fit, physical=found)
 
 
-def _undetermined(names: list[str]) -> str:
+def _undetermined(names: list[str], misfit: float) -> str:
+    lacking = f"the record does not determine {', '.join(names)}"
+    if misfit > MISFIT:
+        # More data reduce noise, but not what the equations lack.
+        return (
+            f"{lacking}: the response is not that of these equations, its residuals are {misfit:.3g} times the noise. "
+            f"A longer or stronger record does not help. Check the signals (wrapped, held, another unit or column); "
+            f"'rigsight diagnose' finds missing effects."
+        )
     return (
-        f"the record does not determine {', '.join(names)}: it is too short, or its input does not excite the frequencies around "
-        f"the break. Record for longer, over a wider band, or at a larger amplitude."
+        f"{lacking}: it is too short, or its input does not excite the frequencies around the break. Record for longer, over a "
+        f"wider band, or at a larger amplitude."
     )
 
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.records.periods import roughness
+
 # A cut leaves plateaus of at least this many samples, at least this often.
 SHORTEST_PLATEAU = 3
 FEWEST_PLATEAUS = 2
 # Of the root mean square step: slower approaches are the rounded top of a peak, not a cut.
 SLOWEST_ENTRY = 0.15
 LARGEST_SHARE_HELD = 0.1
+# Of the noise from sample to sample: the motion then has ten times its power.
+_CLEARLY_MOVES = 3.0
 # A signal that is nearly always at an extreme switches between two levels.
 SMALLEST_SHARE_MOVING = 0.1
 
@@ -18,6 +22,11 @@ SMALLEST_SHARE_MOVING = 0.1
 def is_constant(samples: NDArray[np.float64]) -> bool:
     """Return True if no sample of shape (n_samples,) differs from the first by more than rounding."""
     return bool(np.ptp(samples) <= 1e-12 * np.max(np.abs(samples)))
+
+
+def moves_beyond_noise(samples: NDArray[np.float64]) -> bool:
+    """Return True if a signal of shape (n_samples,) clearly moves: where a cause is not found in it, noise does not hide it."""
+    return float(np.std(samples)) > _CLEARLY_MOVES * roughness(samples)
 
 
 def clipping(samples: NDArray[np.float64]) -> tuple[tuple[float, int], ...]:

@@ -172,7 +172,7 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
         return _effect_sentence(diagnosis)
     if diagnosis.verdict == "parameters":
         return (
-            f"The gap is caused by wrong parameters: refitting the same equations {_shrinks(diagnosis, 'closes')}, "
+            f"The gap is caused by wrong parameters: refitting the same equations {_shrinks(before, after)}, "
             f"down to {times_floor(after)}."
         )
     if diagnosis.verdict == "none":
@@ -201,12 +201,15 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     places = listed(dict.fromkeys(map(place_label, named)))
     sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
     it = "them" if len(diagnosis.effects) > 1 else "it"
-    left = times_floor(error_over_noise(diagnosis, "after"))
+    refitted, after = error_over_noise(diagnosis, "reidentified"), error_over_noise(diagnosis, "after")
+    left = times_floor(after)
+    # What wrong numbers cause is closed by refitting them, and is no share of the effect.
+    of = " that refitting leaves" if is_given(diagnosis) else ""
     if _leaves_more(diagnosis):
         sure = "mainly caused, most likely," if diagnosis.ambiguous_with else "mainly caused"
     return (
         f"The gap is {sure} by {effects_label(diagnosis.effects)}{' ' if places else ''}{places}; "
-        f"adding {it} {_shrinks(diagnosis, 'closes')}, down to {left}."
+        f"adding {it} {_shrinks(refitted, after, of)}, down to {left}."
     )
 
 
@@ -223,13 +226,13 @@ def _unknown_sentence(diagnosis: Diagnosis) -> str:
     )
 
 
-def _shrinks(diagnosis: Diagnosis, closes: str) -> str:
-    before, after = error_over_noise(diagnosis, "before"), error_over_noise(diagnosis, "after")
+def _shrinks(before: float, after: float, of: str = "") -> str:
+    """Return by how much the error above the noise floor shrinks between two stages, told in floors."""
     if not before > 1.0:
-        return f"{closes} none of it, because there is hardly any gap"
+        return "closes none of it, because there is hardly any gap"
     share = (before - after) / (before - 1.0)
     # A set that stays below half a percent would read "closes 0 %".
-    return f"{closes} {percent(share)} of the gap" if share >= 0.005 else f"{closes} none of the gap"
+    return f"closes {percent(share)} of the gap{of}" if share >= 0.005 else f"closes none of the gap{of}"
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
 from rigsight.effects import Effect
-from rigsight.errors import InputError, check_option
+from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import Identification, JointIdentification, RecordIdentification
 from rigsight.identify.record_identification import EstimationOptions, identify_record
@@ -26,10 +26,15 @@ from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.identification.any_rig import IDENTIFYING, has_transfer_forms, identify_any_rig
+from rigsight.workflow.identification.any_rig import (
+    IDENTIFYING,
+    METHODS_OF_ANY_RIG,
+    has_transfer_forms,
+    identify_any_rig,
+)
 from rigsight.workflow.identification.figures import amplitudes_figure, identification_figures, view_figure
 from rigsight.workflow.identification.hysteresis import structure_with_memory, with_hysteresis
-from rigsight.workflow.identification.joint import identify_jointly
+from rigsight.workflow.identification.joint import UNSERVED, bounds_of, identify_jointly
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identification.warnings import (
     beyond_identified_amplitudes,
@@ -209,7 +214,6 @@ def _by_transfer_functions(
     campaign: Campaign, options: EstimationOptions, n_jobs: int, listener: Listener
 ) -> Identification:
     """Identify a rig with transfer functions of its own."""
-    has_stiffness = campaign.parameters.get("k") != 0.0
     prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)
     found = []
@@ -217,18 +221,23 @@ def _by_transfer_functions(
     with threadpool_limits(limits=1, user_api="blas"):
         parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
         for record in parallel(
-            delayed(identify_record)(record, campaign.rig, campaign.constants, has_stiffness, options)
+            delayed(identify_record)(record, campaign.rig, campaign.constants, options)
             for record in campaign.estimation
         ):
             found.append(record)
             stage.finished(record.record.name)
-        joint = identify_jointly(campaign, found, has_stiffness)
+        if all(record.motion.problem for record in found):
+            followed = _over_time_alone(campaign, found, options, n_jobs)
+            if followed is not None:
+                return followed
+        joint = identify_jointly(campaign, found)
     stage.finished("one set for all records")
     if not campaign.rig.is_driven:
         found = [_over_time(record, joint) for record in found]
     found = [out_of_band(record, campaign, joint) for record in found]
     units = _units(campaign)
     statement, changing = amplitude_dependence(found, units)
+    reached = bounds_of(joint.fit, [r.record for r in found if r.record.name not in joint.left_out])
     model = Model.of(joint.fit.fit.structure, joint.fit.fit.values, campaign.estimation[0].hold).to_json()
     identification = Identification(
         title=campaign.title,
@@ -240,14 +249,37 @@ def _by_transfer_functions(
         changing=changing,
         joint=joint,
         model=model,
+        reached=reached,
         warnings=(
-            *campaign_warnings(campaign, found, joint, has_stiffness),
+            *(bound.sentence for bound in reached),
+            *campaign_warnings(campaign, found, joint),
             *beyond_identified_amplitudes(campaign, joint),
-            *(offsets_of_records(campaign, joint, {}) if has_stiffness else []),
+            *offsets_of_records(campaign, joint, {}),
         ),
     )
     stage.finished("amplitudes")
     return identification
+
+
+def _over_time_alone(
+    campaign: Campaign, found: Sequence[RecordIdentification], options: EstimationOptions, n_jobs: int
+) -> Identification | None:
+    """Return the identification in the time domain, for records without a transfer function; None if it does not follow them.
+
+    A rig that hardly returns to rest has no break frequency in a record, but moves as its equations say.
+    """
+    if options.method not in METHODS_OF_ANY_RIG:
+        return None
+    try:
+        result = identify_any_rig(campaign, options, n_jobs, silent)
+    except RigsightError:
+        return None
+    scores = [score for score in result.joint.scores if score.role == "estimation"]
+    if any(not value < UNSERVED for score in scores for value in score.nrmse.values()):
+        return None
+    problems = [f"Record '{r.record.name}' gives no transfer function: {r.motion.problem}" for r in found]
+    note = "All records were fitted in the time domain instead."
+    return replace(result, warnings=(*problems, note, *result.warnings))
 
 
 def write_identification(

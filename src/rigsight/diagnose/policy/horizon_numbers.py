@@ -24,6 +24,14 @@ class HorizonNumbers:
         "assumption",
         "The same for the slowest observer: errors accumulate over ten periods.",
     )
+    observer_holds: float = number(
+        2.0,
+        "assumption",
+        (
+            "Bandwidth of the slowest observer of an unstable mass, in units of its fastest pole: from the pole itself on it is "
+            "stable, and from 1.4 times the pole on also with negative damping."
+        ),
+    )
     observer_step: float = number(
         2.0,
         "budget",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.fit_context import FitContext
@@ -15,19 +16,41 @@ from rigsight.diagnose.policy import HORIZON, VERDICT
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.errors import SimulationError
 from rigsight.identify import DEFAULT_ACCURACY, FitResult, IdleThreads
+from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.records.record import Record
 from rigsight.rigs import evaluated
-from rigsight.simulate import parameter_vector, simulate_outputs, structure_of_fit
+from rigsight.simulate import compose, parameter_vector, simulate_outputs, structure_of_fit
 
 
 def brings_back(campaign: Campaign) -> bool:
-    """Return True if the spring of one mass is stiffer than the slowest observer: else force errors accumulate."""
+    """Return True if records can be run free: else errors of forces or of initial states accumulate.
+
+    The spring of one mass must be stiffer than the slowest observer, and no rig may be unstable near its rest.
+    """
     if not (campaign.rig.has_one_motion and campaign.rig.is_driven):
-        return True
+        return longest_free_run(_poles(campaign), campaign.estimation) is None
     typical = 2.0 * np.pi / typical_period(campaign.rig, campaign.estimation)
-    motion, values = campaign.rig.motion, start_values_of(campaign)
-    numbers = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
-    return bool(np.min(np.abs(np.roots(numbers))) >= HORIZON.observer_loose * typical)
+    poles = _poles(campaign)
+    returns = bool(np.min(np.abs(poles)) >= HORIZON.observer_loose * typical)
+    return returns and longest_free_run(poles, campaign.estimation) is None
+
+
+def _poles(campaign: Campaign) -> NDArray[np.complex128]:
+    """Return the poles near rest of the rig before any fit [1/s]; none where its equations have no derivative there."""
+    rig = campaign.rig
+    if rig.has_one_motion:
+        if not rig.is_driven:
+            return np.zeros(0, dtype=np.complex128)
+        motion, values = rig.motion, start_values_of(campaign)
+        numbers = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
+        return np.roots(numbers).astype(np.complex128)
+    # The start values of several bodies take seconds; the given simulation is stable where the rig is, or cannot be run at all.
+    if not all(parameter.name in campaign.given for parameter in rig.parameters):
+        return np.zeros(0, dtype=np.complex128)
+    try:
+        return near_rest(compose(rig), {**campaign.constants, **campaign.given}, campaign.estimation).poles
+    except SimulationError:
+        return np.zeros(0, dtype=np.complex128)
 
 
 def windowing_of(
@@ -51,16 +74,22 @@ def windowing_of(
     Returns
     -------
     windowing
-        How they are compared.
+        How they are compared. The slowest observer still holds an unstable rig; several bodies that are unstable are compared in
+        windows.
     amplified
         Error of a true model due to the noise, by output, in units of the noise; at least 1.
     """
-    sensors = followed_sensors(campaign)
-    if not sensors:
-        return Windowing(window_length(campaign.rig, campaign.estimation)), dict.fromkeys(noise, 1.0)
+    sensors, poles = followed_sensors(campaign), _poles(campaign)
+    limit = longest_free_run(poles, campaign.estimation)
+    if not sensors or (limit is not None and not campaign.rig.has_one_motion):
+        longest = window_length(campaign.rig, campaign.estimation)
+        return Windowing(min(longest, limit or longest)), dict.fromkeys(noise, 1.0)
     typical = 2.0 * np.pi / typical_period(campaign.rig, campaign.estimation)
+    slowest = HORIZON.observer_loose * typical
+    if limit is not None:
+        slowest = max(slowest, HORIZON.observer_holds * float(np.max(np.abs(poles))))
     bandwidth = min(
-        HORIZON.observer_close * typical,
+        max(HORIZON.observer_close * typical, slowest),
         HORIZON.observer_sampling / max(record.dt for record in campaign.records),
     )
     start = start_values_of(campaign)
@@ -73,10 +102,10 @@ def windowing_of(
         shows = (
             reidentified.error_over_noise >= HORIZON.clear_gap and max(amplified.values()) <= VERDICT.at_floor
         )
-        if shows or bandwidth <= HORIZON.observer_loose * typical:
+        if shows or bandwidth <= slowest:
             return windowing, {name: max(1.0, factor) for name, factor in amplified.items()}
         values = reidentified.fit.values if reidentified.residuals else start
-        bandwidth = max(bandwidth / HORIZON.observer_step, HORIZON.observer_loose * typical)
+        bandwidth = max(bandwidth / HORIZON.observer_step, slowest)
 
 
 def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:

@@ -88,7 +88,15 @@ def _driven(
     motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
     gain = evaluated(motion.drive_gain, {**constants, **known})
     has_stiffness = known.get(str(motion.stiffness)) != 0.0
-    inertia, damping, stiffness = second_order(records, source, response, gain, has_stiffness)
+    inertia, damping, stiffness = second_order(
+        records,
+        source,
+        response,
+        gain,
+        has_stiffness,
+        any_damping=_may_be_negative(rig, motion.damping),
+        any_stiffness=_may_be_negative(rig, motion.stiffness),
+    )
     offset = _mean(records, response) - gain * _mean(records, source) / stiffness if has_stiffness else 0.0
     assert motion.inertia is not None
     numbers = ((motion.inertia, inertia), (motion.damping, damping), (motion.stiffness, stiffness))
@@ -96,6 +104,12 @@ def _driven(
     for expression, value in (*numbers, (motion.rest, offset), (motion.bias, 0.0)):
         found |= _solved(expression, value, {**constants, **found})
     return found
+
+
+def _may_be_negative(rig: Rig, expression: sp.Expr) -> bool:
+    """Return True if the bounds of its parameters leave a negative value to a stiffness or a damping: the rig may be unstable."""
+    own = {symbol.name for symbol in expression.free_symbols}
+    return any(p.lower < 0.0 for p in rig.parameters if p.name in own)
 
 
 def _followed(
@@ -193,9 +207,25 @@ def _check_moves(records: Sequence[Record], name: str) -> None:
 
 
 def second_order(
-    records: Sequence[Record], source: str, response: str, gain: float, has_stiffness: bool = True
+    records: Sequence[Record],
+    source: str,
+    response: str,
+    gain: float,
+    has_stiffness: bool = True,
+    *,
+    any_damping: bool = False,
+    any_stiffness: bool = False,
 ) -> tuple[float, float, float]:
     """Return the best-fitting inertia, damping and stiffness of ``m x'' + d x' + k x = gain u``.
+
+    Parameters
+    ----------
+    records, source, response, gain
+        The equation.
+    has_stiffness
+        False for ``k = 0``.
+    any_damping, any_stiffness
+        Whether each may be negative. An inertia is positive: if it comes out negative, a signal has the opposite sign.
 
     Raises
     ------
@@ -206,10 +236,13 @@ def second_order(
     solution = _equation_error(records, source, response, orders, gain)
     inertia, damping = solution[0], solution[1]
     stiffness = solution[2] if has_stiffness else 0.0
-    if inertia <= 0.0 or (has_stiffness and stiffness <= 0.0):
-        inertia, stiffness = abs(inertia) or 1.0, abs(stiffness) or 1.0
-    smallest = 1e-4 * np.sqrt(stiffness * inertia) if stiffness > 0.0 else 0.0
-    return float(inertia), float(max(damping, smallest)), float(stiffness)
+    turned = inertia <= 0.0
+    inertia = abs(inertia) or 1.0
+    if has_stiffness and (turned or (stiffness <= 0.0 and not any_stiffness)):
+        stiffness = abs(stiffness) or 1.0
+    if turned or not any_damping:
+        damping = max(damping, 1e-4 * np.sqrt(stiffness * inertia) if stiffness > 0.0 else 0.0)
+    return float(inertia), float(damping), float(stiffness)
 
 
 def first_order(records: Sequence[Record], source: str, response: str) -> tuple[float, float]:

@@ -29,7 +29,6 @@ from rigsight.records.record import Hold, Record
 
 _Response = TypeVar("_Response", bound=FrequencyResponse)
 Method = Literal["local_rational", "local_polynomial", "h1", "thesis"]
-FreeMotion = Literal["unknown", "as the form", "as its integral"]
 METHODS: tuple[Method, ...] = ("local_rational", "local_polynomial", "h1", "thesis")
 
 _BAND_LINES = {"local_rational": 15, "local_polynomial": 13}
@@ -101,7 +100,7 @@ def record_response(
     wanted: NDArray[np.float64] | None = None,
     instrument: str | None = None,
     drive: str | None = None,
-    moves_freely: FreeMotion = "unknown",
+    moves_freely: bool = False,
 ) -> RecordResponse:
     """Return the frequency response of one record.
 
@@ -136,9 +135,9 @@ def record_response(
     drive
         The input whose periods are averaged: the noise of a measured source hides its period. None for the source.
     moves_freely
-        Poles of the free motion that the ends of the record excite. With those of a form of this `order`, or of its integral, the
-        free motion is fitted to all lines together and removed where a local model cannot distinguish it from the response: where
-        a sweep begins or ends with the record.
+        True if the ends of the record excite a free motion with the poles of a form of this `order`. It is fitted to all lines
+        together and removed where a local model cannot distinguish it from the response: where a sweep begins or ends with the
+        record.
 
     Raises
     ------
@@ -157,7 +156,7 @@ def record_response(
     elif method == "h1":
         width = resolution or _SEGMENTS * _line(record)
         found, shared = averaged_response(record, source, response, width, hold=hold), _HANN_LINES
-        if moves_freely != "unknown" and _mean_period(record, drive)[0] is record:
+        if moves_freely and _mean_period(record, drive)[0] is record:
             local = local_rational_response(record, source, response, hold=hold)
             plain = _clear(
                 plain_ratio(record, local, hold), _BAND_LINES["local_rational"], _CLEAR, _LEAST_SHARE
@@ -205,31 +204,28 @@ class _Local:
         return lines, line * lines / _BAND_LINES[self.method], lines / _LOCAL_VALUES, note
 
     def response(
-        self, instrument: str | None, order: Order, moves_freely: FreeMotion
+        self, instrument: str | None, order: Order, moves_freely: bool
     ) -> tuple[FrequencyResponse, PlainRatio | None, TransferFit | None]:
         """Return the response, and the plain ratio and its fit if the free motion of the record has a known form."""
         periodic, _ = _mean_period(self.record, instrument or self.drive)
         found = self._estimated(periodic, periodic is self.record, instrument)
-        if moves_freely == "unknown" or periodic is not self.record or instrument is not None:
+        if not moves_freely or periodic is not self.record or instrument is not None:
             return found, None, None
         every = plain_ratio(self.record, found, self.hold)
         plain = _clear(every, _BAND_LINES[self.method], _CLEAR, _LEAST_SHARE)
         plain = plain if self.band is None else plain.band(*self.band)
-        own, scale = plain, np.ones_like(found.omega)
-        if moves_freely == "as its integral":
-            own, every, scale = own.rate(), every.rate(), found.omega**-2
         try:
-            fit = near = fit_frequency_response(own, order)
+            fit = near = fit_frequency_response(plain, order)
             if fit.misfit > MISFIT:
-                near, _ = fit_with_relative_error(own, order, magnitude_only=False)
+                near, _ = fit_with_relative_error(plain, order, magnitude_only=False)
         except InputError:
             return found, plain, None
         poles = near.form.poles(near.theta)
-        moved = self.record[self.name] - own.free_motion(near.free_motion, poles)
+        moved = self.record[self.name] - plain.free_motion(near.free_motion, poles)
         alone = self._estimated(self.record.with_signals(**{self.name: moved}), False, None)
         motions = every.free_motions(poles)
         spread = np.einsum("ki,ij,kj->k", motions.conj(), near.free_motion_covariance, motions).real
-        return _smaller_variance(found, alone, scale * np.maximum(spread, 0.0)), plain, fit
+        return _smaller_variance(found, alone, np.maximum(spread, 0.0)), plain, fit
 
     def _estimated(self, record: Record, transient: bool, instrument: str | None) -> FrequencyResponse:
         local = local_rational_response if self.method == "local_rational" else local_polynomial_response

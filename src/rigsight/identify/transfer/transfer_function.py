@@ -130,7 +130,7 @@ class _Problem:
     def fitted(self, theta: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return what the form shows at the lines, with the images of a held source around multiples of the sample rate."""
         ratio = self.measured
-        if not isinstance(ratio, PlainRatio) or ratio.hold == "band_limited" or ratio.integrators:
+        if not isinstance(ratio, PlainRatio) or ratio.hold == "band_limited":
             return self.form.response(self.omega, theta)
         lines = np.round(self.omega * ratio.n_samples * ratio.dt / (2.0 * np.pi)).astype(np.intp)
         sampled = self.form.sampled_response(ratio.n_samples, ratio.dt, ratio.hold, theta)[lines]

@@ -10,8 +10,9 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
+from rigsight.diagnose.fitting.absent_spring import with_weighed_spring
 from rigsight.diagnose.fitting.windows import cut, window_length
-from rigsight.errors import SimulationError, check_option
+from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.identify import (
     FitResult,
     GreyBoxFit,
@@ -30,14 +31,22 @@ from rigsight.identify.identification import (
     RecordIdentification,
 )
 from rigsight.identify.information import Information, information
-from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses, near_rest
+from rigsight.identify.linear_view import (
+    LinearView,
+    by_constants,
+    linear_view,
+    longest_free_run,
+    measured_responses,
+    near_rest,
+)
 from rigsight.identify.measured_amplitude import measured_amplitude
+from rigsight.identify.reached_bounds import reached_bounds
 from rigsight.identify.record_identification import EstimationOptions
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
-from rigsight.rigs import Rig, has_built_in_parameters, is_built_in_motion
+from rigsight.rigs import Rig, evaluated, has_built_in_parameters, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
@@ -52,11 +61,9 @@ from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage
 
 IDENTIFYING = "Identifying"
-METHODS = ("local_rational", "local_polynomial")
+METHODS_OF_ANY_RIG = ("local_rational", "local_polynomial")
 """Estimators for several inputs."""
 _STEPS_AFTER_RECORDS = 3
-_GROWTHS = 3.0
-"""Length of a window on an unstable rig, in time constants of its growth: initial errors grow twentyfold."""
 
 
 def has_transfer_forms(campaign: Campaign) -> bool:
@@ -64,14 +71,30 @@ def has_transfer_forms(campaign: Campaign) -> bool:
 
     A rig with the same equations from a file has other names, or knows a number that a transfer function would estimate. Records
     with different constants have no common transfer function, and records without excitation have none. Offsets that differ
-    between records, and the effects of the given simulation, are estimated only in the time domain.
+    between records, and the effects of the given simulation, are estimated only in the time domain. Without a spring, or with a
+    negative one, the forms do not hold.
     """
     rig = campaign.rig
     if campaign.modelled or not has_built_in_parameters(rig):
         return False
     if any(record.constants or record.free_offsets for record in campaign.records):
         return False
-    return not any(is_constant(record[rig.inputs[0].name]) for record in campaign.estimation)
+    if any(is_constant(record[rig.inputs[0].name]) for record in campaign.estimation):
+        return False
+    return campaign.given_without_spring is None and not _diverges(campaign)
+
+
+def _diverges(campaign: Campaign) -> bool:
+    """Return True if the equation of one driven mass that fits the records best is unstable within a record."""
+    rig, motion = campaign.rig, campaign.rig.motion
+    if motion.inertia is None:
+        return False
+    try:
+        values = {**campaign.constants, **linear_start(rig, campaign.estimation, campaign.constants, {})}
+    except InputError:
+        return False
+    equation = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
+    return longest_free_run(np.roots(equation).astype(np.complex128), campaign.estimation) is not None
 
 
 def identify_any_rig(
@@ -95,12 +118,13 @@ def identify_any_rig(
     InputError
         If the method is only for rigs that are identified record by record.
     """
+    campaign = with_weighed_spring(campaign)
     rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
     check_option(
-        f"The method for the rig '{rig.name}' with these records (h1 and thesis are for built-in rigs of one motion without "
-        "effects, each record driven and without constants or offsets of its own)",
+        f"The method for the rig '{rig.name}' with these records (h1 and thesis are for built-in rigs of one motion that returns "
+        "to rest, without effects, each record driven and without constants or offsets of its own)",
         options.method,
-        METHODS,
+        METHODS_OF_ANY_RIG,
     )
     records = campaign.estimation
     prepare_kernels([structure], n_jobs, listener)
@@ -121,6 +145,7 @@ def identify_any_rig(
         held |= {name: start[name] for name in swallowed}
         joint = fit_any_rig_jointly(campaign, structure, found, start, held, length)
         stage.finished("one set for all records")
+        errors = joint.fit.fit.standard_errors
         known, joint = _with_errors(joint, structure, cut(records, length), factor)
         found = [_with_own(record, joint) for record in found]
         stage.finished("identifiability")
@@ -134,6 +159,7 @@ def identify_any_rig(
         scales = characteristic_scales(rig, windows, fit.fit.values)
         remedies = helpful_sensors(structure, windows, scales, fit.noise, fit.fit)
         told = replace(identifiability(known), remedies=remedies)
+    reached = () if known is None else reached_bounds(known, errors)
     identification = Identification(
         title=campaign.title,
         rig=rig.name,
@@ -145,11 +171,13 @@ def identify_any_rig(
         joint=joint,
         model=Model.of(structure, joint.fit.fit.values, records[0].hold).to_json(),
         warnings=(
+            *(bound.sentence for bound in reached),
             *([] if factor is None else [factor.sentence]),
             *any_rig_warnings(campaign, views, joint),
             *offsets_of_records(campaign, joint, {name: start[name] for name in swallowed}, length),
             *(beyond_identified_amplitudes(campaign, joint) if len(rig.inputs) <= 1 else ()),
         ),
+        reached=reached,
         views=views,
         identifiability=told,
         meanings={parameter.name: parameter.description for parameter in structure.parameters},
@@ -182,8 +210,7 @@ def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | No
     rig = campaign.rig
     held = {}
     if is_built_in_motion(rig):
-        has_stiffness = not (rig.is_driven and campaign.parameters.get(str(rig.motion.stiffness)) == 0.0)
-        held = held_parameters(campaign, records, has_stiffness)
+        held = held_parameters(campaign, records)
     return held if factor is None else {**held, factor.held: factor.value}
 
 
@@ -247,9 +274,9 @@ def _window_length(
         linear = near_rest(structure, values, records)
     except SimulationError:
         return None
-    if linear.stability == "unstable":
-        growth = float(np.max(linear.poles.real))
-        return min(window_length(structure.rig, records), _GROWTHS / growth)
+    limit = longest_free_run(linear.poles, records)
+    if limit is not None:
+        return min(window_length(structure.rig, records), limit)
     return window_length(structure.rig, records) if _drifts_in_sight(linear, records) else None
 
 

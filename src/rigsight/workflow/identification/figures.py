@@ -214,10 +214,6 @@ def fitted_curve(path: PathIdentification) -> FittedCurve | None:
         return FittedCurve(omega, values, std, "k + j\u03c9 d")
     values, std = fit.at(omega), fit.standard_error_at(omega)
     label = f"{_FORMS[fit.form.order]} fit, 95 % band"
-    if fit.response != path.response:
-        # Fitted to the velocity.
-        values, std = values / (1j * omega), std / omega
-        label = f"{label}, of the velocity"
     return FittedCurve(omega, values, std, label)
 
 

@@ -10,33 +10,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import cut, window_length
+from rigsight.diagnose.fitting.windows import cut
 from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
+from rigsight.identify.information import information
 from rigsight.identify.joint import JointFit
 from rigsight.identify.measured_amplitude import measured_amplitude
+from rigsight.identify.reached_bounds import ReachedBound, reached_bounds
+from rigsight.identify.record_identification import MISFIT
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.periods import roughness
-from rigsight.records.plausibility import is_constant
 from rigsight.report.quantities import gap_percent
+from rigsight.report.wording import sentence_case
 from rigsight.simulate import Structure, compose
 
 _DIFFERENT = 0.01
 """Probability of equally large differences by chance, below which the records do not have a common parameter set."""
 _SMALL_LOSS = 0.01
-_UNSERVED = 0.9
+UNSERVED = 0.9
 """NRMSE from which a fit does not follow a motion at all."""
 _LATERAL = ("l_0", "c_y")
 _ORIGIN = attrgetter("origin")
 _BELOW = 1e-6
 
 
-def identify_jointly(
-    campaign: Campaign, found: Sequence[RecordIdentification], has_stiffness: bool
-) -> JointIdentification:
+def identify_jointly(campaign: Campaign, found: Sequence[RecordIdentification]) -> JointIdentification:
     """Fit one set to all estimation records that show the motion, and one to each alone; score every record.
 
     Parameters
@@ -45,8 +46,6 @@ def identify_jointly(
         The campaign.
     found
         What each estimation record shows by itself. A record whose motion could not be identified is left out.
-    has_stiffness
-        False for an axis without a spring: records are cut into windows, since it drifts in free run.
 
     Raises
     ------
@@ -60,17 +59,15 @@ def identify_jointly(
             f"No estimation record shows the motion of the rig, so nothing can be identified.\n{reasons}"
         )
     structure = compose(campaign.rig)
-    length = None if has_stiffness else window_length(campaign.rig, records)
-    windows = [w for w in cut(records, length) if not is_constant(w[campaign.rig.inputs[0].name])]
-    known = held_parameters(campaign, records, has_stiffness)
+    known = held_parameters(campaign, records)
     fit = fit_jointly(
-        structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=_ORIGIN
+        structure, records, campaign.constants, known=known, start=_start(found, known), group_of=_ORIGIN
     )
     pooled = _pooled(found) if fit.probability < _DIFFERENT and not known.keys() & _LATERAL else None
     if pooled is not None:
         fit = fit_jointly(
             structure,
-            windows,
+            records,
             campaign.constants,
             known={**known, **pooled.values},
             start=fit.fit.values,
@@ -79,8 +76,8 @@ def identify_jointly(
         )
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
-        *_estimation_scores(fit, windows, amplitudes),
-        *(_validation_score(fit, record, campaign, length) for record in campaign.validation),
+        *_estimation_scores(fit, records, amplitudes),
+        *(_validation_score(fit, record, campaign, None) for record in campaign.validation),
     )
     errors = {**fit.fit.standard_errors, **(pooled.standard_errors if pooled else {})}
     conicity = None
@@ -144,6 +141,16 @@ def fit_any_rig_jointly(
     )
 
 
+def bounds_of(joint: JointFit, records: Sequence[Record]) -> tuple[ReachedBound, ...]:
+    """Return the parameters of a fit of whole records that stand at a bound which the records ask them to pass."""
+    fit = joint.fit
+    if not (math.isfinite(fit.cost) and fit.residuals):
+        return ()
+    scales = characteristic_scales(fit.structure.rig, records, fit.values)
+    known = information(GreyBoxFit(fit.structure, records, scales, joint.noise), fit)
+    return reached_bounds(known, fit.standard_errors)
+
+
 def _pooled(found: Sequence[RecordIdentification]) -> PhysicalEstimates | None:
     """Return the mean of the records' own lateral parameters, weighted by inverse variances; None where there are none."""
     own = [path.physical for r in found for path in r.paths[1:] if path.physical is not None]
@@ -172,7 +179,7 @@ def _start(found: Sequence[RecordIdentification], known: Mapping[str, float]) ->
     }
 
 
-def held_parameters(campaign: Campaign, records: Sequence[Record], has_stiffness: bool) -> dict[str, float]:
+def held_parameters(campaign: Campaign, records: Sequence[Record]) -> dict[str, float]:
     """Return values for parameters that these records do not determine: no spring, outputs that were not measured.
 
     Parameters
@@ -181,14 +188,12 @@ def held_parameters(campaign: Campaign, records: Sequence[Record], has_stiffness
         Of a built-in rig of one motion.
     records
         Those that are fitted.
-    has_stiffness
-        False for an axis without a spring.
     """
     rig = campaign.rig
     known: dict[str, float] = {}
     names = {parameter.name for parameter in rig.parameters}
-    if not has_stiffness:
-        known |= {"k": 0.0, "x_off": 0.0}
+    if campaign.absent_spring is not None:
+        known |= {campaign.absent_spring: 0.0} | {str(s): 0.0 for s in rig.motion.rest.free_symbols}
     elif rig.is_driven and "force_off" in names:
         # With a linear spring, a constant force and a shifted rest position cannot be distinguished.
         known["force_off"] = 0.0
@@ -251,7 +256,12 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
 
 def _moves(samples: NDArray[np.float64]) -> bool:
     """Return True if a fit that leaves no more than the noise of an output would follow it: at rest there is only noise."""
-    return roughness(samples) < _UNSERVED * float(np.std(samples))
+    return roughness(samples) < UNSERVED * float(np.std(samples))
+
+
+def _leaves_motion(relative: float, samples: NDArray[np.float64]) -> bool:
+    """Return True if an error, relative to the motion, is above the noise of the samples and not small."""
+    return relative > _SMALL_LOSS and relative * float(np.std(samples)) > MISFIT * roughness(samples)
 
 
 def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Record]) -> str:
@@ -270,7 +280,7 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
         for score in scores
         if score.role == "estimation"
         for name in score.nrmse
-        if not score.nrmse[name] < _UNSERVED and _moves(by_name[score.record][name])
+        if not score.nrmse[name] < UNSERVED and _moves(by_name[score.record][name])
     ]
     if fit.probability >= _DIFFERENT and unserved:
         return (
@@ -278,9 +288,20 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
             f"{', '.join(unserved[:3])}. Its parameter values are not reliable; check signals for wrong sign, unit or column."
         )
     if fit.probability >= _DIFFERENT:
+        agree = f"equally large differences arise by chance with probability {fit.probability:.2g}"
+        left = [
+            f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
+            for score in scores
+            if score.role == "estimation"
+            for name in score.nrmse
+            if _leaves_motion(score.nrmse[name], by_name[score.record][name])
+        ]
+        if not left:
+            return f"One parameter set fits all {len(fitted)} estimation records: {agree}."
         return (
-            f"One parameter set fits all {len(fitted)} estimation records: equally large differences arise by chance with "
-            f"probability {fit.probability:.2g}."
+            f"The {len(fitted)} estimation records agree on one parameter set, but it does not fit them: it leaves "
+            f"{', '.join(left[:3])}, more than noise. ({sentence_case(agree)}; a poor fit hides differences.) "
+            "'rigsight diagnose' finds missing effects."
         )
     chance = f"below {_BELOW:g}" if fit.probability < _BELOW else f"{fit.probability:.1g}"
     text = (

@@ -59,7 +59,7 @@ def identification_json(identification: Identification, figures: Mapping[str, st
             "changing": list(identification.changing),
             "table": [_row(record, units) for record in identification.records],
         },
-        "joint": _joint(identification.joint, units, identification.given),
+        "joint": _joint(identification, units),
         "validation": [
             {"record": s.record, "amplitude": finite(s.amplitude), "nrmse": _all_finite(s.nrmse)}
             for s in identification.joint.scores
@@ -163,10 +163,9 @@ def _conicity(found: ConicityEstimate) -> dict[str, Any]:
     }
 
 
-def _joint(
-    joint: JointIdentification, units: Mapping[str, str], given: Mapping[str, float]
-) -> dict[str, Any]:
-    fit = joint.fit
+def _joint(identification: Identification, units: Mapping[str, str]) -> dict[str, Any]:
+    joint, fit = identification.joint, identification.joint.fit
+    reached = {bound.name: bound for bound in identification.reached}
     return {
         "statement": joint.statement,
         "probability": finite(fit.probability),
@@ -176,10 +175,11 @@ def _joint(
         "parameters": {
             name: {
                 "value": fit.fit.values[name],
-                "given": given.get(name),
+                "given": identification.given.get(name),
                 "std": finite(fit.fit.standard_errors[name]),
                 "interval": [finite(end) for end in fit.interval(name)],
                 "unit": units.get(name, ""),
+                **({"at_bound": reached[name].side, "asked": reached[name].asked} if name in reached else {}),
             }
             for name in joint.names
         },

@@ -67,7 +67,6 @@ def campaign_warnings(
     campaign: Campaign,
     found: Sequence[RecordIdentification],
     joint: JointIdentification,
-    has_stiffness: bool,
 ) -> list[str]:
     """Return the notes of the records, of their identifications and of the joint fit, a sentence each."""
     told = list(campaign.notes)
@@ -76,11 +75,6 @@ def campaign_warnings(
     told += [f"Record '{r.record.name}': {text}" for r in found for text in r.warnings]
     told += _not_the_whole(found)
     told += [f"Record '{name}' was left out of the joint fit." for name in joint.left_out]
-    if not has_stiffness:
-        told.append(
-            "The campaign sets k = 0: the axis has no spring and no resonance, so m and d are fitted to the velocity, and "
-            "the axis is simulated in windows with their own initial states."
-        )
     if joint.pooled is None and campaign.rig.downstream and "c_y" not in joint.names:
         missing = ", ".join(symbol.name for symbol in campaign.rig.downstream)
         names = ", ".join(
@@ -179,6 +173,8 @@ def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
         )
     if view.measured is None:
         return told
+    # The transient of a rig that does not return to rest does not decay within a record: its responses are no evidence.
+    returns = near_rest.stability == "stable"
     told += [
         f"{source} -> {response}{where}: {problem}"
         for (source, response), problem in view.measured.problems.items()
@@ -187,7 +183,7 @@ def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
     beside = [
         f"{source} -> {response} ({off[source, response]:.2g})"
         for source, response in off
-        if off[source, response] > MISFIT
+        if returns and off[source, response] > MISFIT
     ]
     if beside:
         why = (
