@@ -113,3 +113,16 @@ def test_lines_that_are_wanted_are_those_of_the_whole(second_order, method) -> N
     assert np.array_equal(found.variance, whole.variance[10:400:7])
     with pytest.raises(InputError, match="any of the requested frequencies"):
         method(record, "u", "psi", wanted=some + 1e3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-5])
+def test_the_variance_of_a_polynomial_holds_its_bias(second_order, noise: float) -> None:
+    truth, turn = second_order(D=0.03), 2.0 * np.pi / 5e-3
+    record = truth.record(noise=noise, rng=np.random.default_rng(1), rest=10.0)
+    found = local_polynomial_response(record, "u", "psi", hold="foh", band=(2.0, 55.0))
+    # A held source shows around multiples of the sampling frequency too.
+    around = [found.omega + multiple * turn for multiple in range(-30, 31)]
+    sampled = sum(truth.response(omega) * (found.omega / omega) ** 2 for omega in around)
+    assert found.bias is not None
+    assert np.max(np.abs(found.values - sampled) / np.sqrt(found.variance)) < 4.0
+    assert np.max(np.abs(found.values - sampled) / np.sqrt(found.variance - found.bias**2)) > 5.0

@@ -189,3 +189,12 @@ def test_steps_give_no_response() -> None:
 def test_without_inputs_there_is_nothing_to_respond_to() -> None:
     with pytest.raises(InputError, match="no input"):
         responses_of_inputs([], (), OUTPUTS)
+
+
+@pytest.mark.parametrize("omega", [2.0 * np.pi, 7.0])
+def test_a_single_tone_has_no_response_and_is_named(omega: float) -> None:
+    rng = np.random.default_rng(3)
+    found = responses_of_inputs([recorded(np.sin(omega * T), 0.0 * T, rng)], INPUTS, OUTPUTS)
+    assert not found.found
+    assert f"single frequency, {omega:.1f}"[:20] in found.problems["left", "x"]
+    assert "Record a sweep or a multisine" in found.problems["left", "z"]

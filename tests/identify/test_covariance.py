@@ -163,3 +163,22 @@ def test_an_undetermined_coordinate_spoils_only_the_parameters_that_depend_on_it
     np.testing.assert_allclose(propagated[:2, :2], [[16.0, 10.0], [10.0, 15.0]])
     assert propagated[2, 2] == np.inf
     assert not np.any(np.isnan(propagated))
+
+
+def test_an_interval_of_a_mean_covers_as_often_as_it_says() -> None:
+    rng, ones, inside = np.random.default_rng(7), np.ones((400, 1)), {False: 0, True: 0}
+    for _ in range(1000):
+        noise = rng.standard_normal(400)
+        for widened in inside:
+            variance = colored_covariance([(noise - np.mean(noise), ones)], 1, for_intervals=widened)[0, 0]
+            inside[widened] += abs(np.mean(noise)) < 1.96 * np.sqrt(variance)
+    # 1000 draws: a standard deviation of 0.7 %.
+    assert inside[False] < 930
+    assert inside[True] == pytest.approx(950, abs=21)
+
+
+def test_an_interval_that_many_lines_determine_stays() -> None:
+    residual, derivative = np.random.default_rng(8).standard_normal(4000), np.zeros((4000, 1))
+    derivative[:, 0] = np.random.default_rng(9).standard_normal(4000)
+    plain, widened = (colored_covariance([(residual, derivative)], 1, for_intervals=w) for w in (False, True))
+    np.testing.assert_allclose(widened, plain, rtol=5e-3)

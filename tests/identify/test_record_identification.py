@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigsight.effects import effect_named
-from rigsight.excitation import log_sweep, step
+from rigsight.excitation import linear_sweep, log_sweep, step
 from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.record_identification import EstimationOptions, identify_record
 from rigsight.records import Record
@@ -63,7 +63,7 @@ def test_a_command_that_is_constant_from_the_first_sample_is_a_step_with_which_t
 
 
 def test_a_record_that_is_too_short_is_told_what_would_help() -> None:
-    record = measured(log_sweep(DT * np.arange(600), 3e-3, 0.6, 60.0), "sweep")
+    record = measured(log_sweep(DT * np.arange(600), 1e-4, 0.6, 60.0), "sweep")
     motion = identify_record(record, RUNNING_GEAR, CONSTANTS, True, EstimationOptions()).paths[0]
     assert motion.fit is None
     assert motion.problem is not None
@@ -86,3 +86,49 @@ def test_a_signal_of_the_wrong_sign_is_told_also_where_friction_spoils_the_phase
         driven.with_signals(psi=-psi), RUNNING_GEAR, CONSTANTS, True, EstimationOptions()
     )
     assert "Change the sign" in turned.paths[0].problem
+
+
+SOFT = {"J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "psi_off": 1.6e-3, "y_off": 1.9e-4}
+STIFF = {"J_z": 0.46, "k_c": 810.0, "k_d": 11.6, "psi_off": -1.4e-3, "y_off": 2e-2}
+
+
+def swept_at_once(shape: str, own: dict[str, float], first: int = 0) -> Record:
+    """A sweep of the thesis's rate that begins with the record, from rest or, cut, in motion."""
+    dt, rng = 0.01, np.random.default_rng(5)
+    t = dt * np.arange(4000)
+    u = linear_sweep(t, 1.0, 1e-3, 170.0) if shape == "linear" else log_sweep(t, 1.0, 0.05, 170.0)
+    driven = Record(
+        "own", dt, {"u": u}, {"u": "A", "psi": "rad", "y": "m"}, kind="sweep", hold="foh", amplitude=1.0
+    )
+    clean = simulate(compose(RUNNING_GEAR), {**VALUES, **own}, driven)
+    noisy = {name: clean[name] + rng.normal(0.0, 2e-5, t.size) for name in ("psi", "y")}
+    return clean.with_signals(**noisy).slice(first, t.size)
+
+
+@pytest.mark.parametrize("method", ["local_rational", "local_polynomial", "h1"])
+@pytest.mark.parametrize("own", [SOFT, STIFF], ids=["soft", "stiff"])
+@pytest.mark.parametrize(("shape", "first"), [("linear", 0), ("log", 0), ("linear", 250)])
+def test_a_sweep_that_begins_with_the_record_gives_its_numbers(
+    shape: str, first: int, own: dict[str, float], method: str
+) -> None:
+    if method != "local_rational" and (own is STIFF or first):
+        pytest.skip("one rig shows that every method has the same fit")
+    found = identify_record(
+        swept_at_once(shape, own, first), RUNNING_GEAR, CONSTANTS, True, EstimationOptions(method)
+    )
+    assert not found.warnings
+    for name, (value, error) in found.estimates.items():
+        assert abs(value - {**VALUES, **own}[name]) < 4.0 * error, name
+    # Of soft and stiff rig, the motion is 500 and 50 times as large as its noise.
+    assert found.estimates["k_d"][1] < (2e-3 if own is SOFT else 2e-2) * own["k_d"]
+    measured_response = found.motion.measured
+    assert measured_response is not None
+    if method == "h1":
+        return
+    assert measured_response.omega[0] < 1.0
+    gain = CONSTANTS["b"] * CONSTANTS["k_tau"] / CONSTANTS["r_0"]
+    s = 1j * measured_response.omega
+    truth = gain / (own["J_z"] * s**2 + own["k_d"] * s + own["k_c"])
+    assert measured_response.variance is not None
+    pulls = np.abs(measured_response.values - truth) / np.sqrt(measured_response.variance)
+    assert np.sqrt(np.mean(pulls**2)) < 1.5

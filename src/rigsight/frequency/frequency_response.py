@@ -45,6 +45,9 @@ class FrequencyResponse:
     line_noise
         Variance of the noise in the spectrum of the responding signal, as of a plain Fourier transform, shape (n_frequencies,),
         None if it was not estimated.
+    bias
+        Size of the systematic error of each value, part of `variance` and alike at neighboring values, shape (n_frequencies,),
+        None if it was not estimated.
     noise_freedom
         Complex degrees of freedom from which each variance was estimated, infinite if it is known in another way.
     shared_width
@@ -70,6 +73,7 @@ class FrequencyResponse:
     noise_shares: NDArray[np.complex128] | None = None
     noise_lines: NDArray[np.intp] | None = None
     line_noise: NDArray[np.float64] | None = None
+    bias: NDArray[np.float64] | None = None
     noise_freedom: float = float("inf")
     shared_width: float = 0.0
 

@@ -15,10 +15,11 @@ model", 16th IFAC Symposium on System Identification (2012).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from rigsight.errors import InputError
 from rigsight.frequency.frequency_response import FrequencyResponse
@@ -87,7 +88,8 @@ def local_polynomial_response(
     -------
     FrequencyResponse
         At every line of the record's spectrum in the band. Neighbors share data, so their errors are correlated over
-        `bandwidth` (see `FrequencyResponse.noise_shares`).
+        `bandwidth` (see `FrequencyResponse.noise_shares`). The variance includes the bias, which is the difference from a local
+        rational model beyond the noise of both.
 
     Raises
     ------
@@ -244,10 +246,12 @@ def _local_response(
     R = U if instrument is None else np.fft.rfft(record[instrument])[1 : omega.size + 1]
     smoothed = np.convolve(np.abs(R) ** 2, np.ones(width) / width, mode="same")
     lines = np.flatnonzero(excited(omega, smoothed, band, f"{what}: the {driven_by} '{drive}'"))
-    if wanted is not None:
-        lines = lines[among(omega[lines], wanted)]
-        if not lines.size:
-            raise InputError(f"{what} does not excite any of the requested frequencies.")
+    kept = np.ones(lines.size, dtype=np.bool_) if wanted is None else among(omega[lines], wanted)
+    if not kept.any():
+        raise InputError(f"{what} does not excite any of the requested frequencies.")
+    if poles:
+        # The bias of a polynomial is smoothed over its neighbors, so it needs all lines.
+        lines, kept = lines[kept], kept[kept]
     chunks = [lines[start : start + _CHUNK] for start in range(0, lines.size, _CHUNK)]
     if instrument is None:
         parts = [_solve(U, Y, chunk, model) for chunk in chunks]
@@ -264,20 +268,31 @@ def _local_response(
     values, shares, near, noise = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     held = hold_response(omega[lines], record.dt, hold)
     shares = np.asarray(shares / held[:, None])
+    variance = np.sum(np.abs(shares) ** 2, axis=1)
+    bias = None
+    rational = replace(model, half=half + order, poles=max(order, 1))
+    if not poles and instrument is None and rational.width <= U.size:
+        parts = [_solve(U, Y, chunk, rational) for chunk in chunks]
+        near_values, near_shares = (np.concatenate(arrays) for arrays in list(zip(*parts, strict=True))[:2])
+        noisy = variance + np.sum(np.abs(near_shares / held[:, None]) ** 2, axis=1)
+        # One difference may exceed its noise by chance; the mean over a band of them hardly does.
+        excess = np.abs((near_values - values) / held) ** 2 - noisy
+        bias = np.sqrt(np.maximum(uniform_filter1d(excess, width, mode="nearest"), 0.0))
     return FrequencyResponse(
         omega=omega[lines],
         values=values / held,
         source=source,
         response=response,
         unit=pair_unit(record, source, response),
-        variance=np.sum(np.abs(shares) ** 2, axis=1),
+        variance=variance if bias is None else variance + bias**2,
         records=(record.name,),
         method=f"{method}, order {order}, {width} lines",
         noise_shares=shares,
         noise_lines=near,
         line_noise=noise,
+        bias=bias,
         noise_freedom=float(width - unknowns),
-    )
+    ).at(kept)
 
 
 class LocalFit:

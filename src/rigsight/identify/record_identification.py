@@ -315,6 +315,9 @@ def _undetermined(names: list[str], misfit: float) -> str:
 def _resolution_warning(motion: PathIdentification, seen: RecordResponse | None, record: Record) -> list[str]:
     if motion.fit is None or seen is None or "zeta" not in motion.fit.values:
         return []
+    if seen.plain is not None and motion.fit.misfit <= MISFIT:
+        # Fitted to all lines together, without local bands.
+        return []
     omega_0, zeta = motion.fit.values["omega_b"], motion.fit.values["zeta"]
     width = 2.0 * zeta * omega_0
     if zeta >= 0.5 or width >= seen.narrowest:

@@ -224,7 +224,12 @@ class _Problem:
         first = int(lines.min())
         gathered = np.zeros((int(lines.max()) - first + 1, theta.size), dtype=np.complex128)
         np.add.at(gathered, lines - first, scores)
-        return np.asarray(0.5 * np.real(gathered.conj().T @ gathered))
+        filling = np.asarray(0.5 * np.real(gathered.conj().T @ gathered))
+        if self.measured.bias is not None:
+            # Unlike noise, a bias may point the same way at all lines.
+            most = np.abs(slopes).T @ (self.weights**2 * self.measured.bias)
+            filling += np.outer(most, most)
+        return filling
 
     def fit(self, start: NDArray[np.float64]) -> Any:
         """Return the result of the optimizer from a start."""
