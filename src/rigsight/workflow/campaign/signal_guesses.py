@@ -14,6 +14,7 @@ from rigsight.rigs import Rig
 
 _FITTING_UNIT = 0.5
 _CLEAR = 2.0
+_REGRESSION = ("x", "y")
 
 
 @dataclass(frozen=True)
@@ -181,6 +182,13 @@ def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGues
     return FileGuess(rig, time, tuple(found[signal.name] for signal in signals), score / len(signals))
 
 
+def _are_of_regression(channels: Sequence[Channel]) -> bool:
+    """Return True if a file has X and y and nothing that is called an input: X may be the input, y the output."""
+    called = {channel.name for channel in channels}
+    has_input = any(closeness(name, "u") >= _CLEAR for name in called)
+    return "X" in called and bool(called & {"y", "Y"}) and not has_input
+
+
 def _guess(
     signal: str, si: str, channels: Sequence[Channel], taken: Sequence[Channel], is_text: bool
 ) -> tuple[Guess, float]:
@@ -197,6 +205,10 @@ def _guess(
         return Guess(signal, si), 0.0
     best = max(score for score, _ in scores)
     closest = [channel for score, channel in scores if score == best]
+    if signal in _REGRESSION and _are_of_regression(channels):
+        return Guess(
+            signal, si, candidates=tuple(c.name for c in channels if c.name.lower() in _REGRESSION)
+        ), 0.0
     # With several groups, the time channel is the one in the group of the signals.
     if len(closest) > 1 and not (signal == TIME and len({channel.short_name for channel in closest}) == 1):
         return Guess(signal, si, candidates=tuple(channel.name for channel in closest)), 0.0
