@@ -207,6 +207,25 @@ def test_structs_are_looked_into(tmp_path: Path, packed: bool) -> None:
         read(tmp_path / "run.mat", columns={"u": ColumnMapping("log/info")})
 
 
+def test_objects_and_sparse_matrices_of_a_7_3_file_are_no_signals(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    write_matlab_hdf5(tmp_path / "run.mat", rows(), {})
+    with h5py.File(tmp_path / "run.mat", "r+") as file:
+        for name, kind in (
+            ("logsout", "Simulink.SimulationData.Dataset"),
+            ("sparse", "double"),
+            ("log", "struct"),
+        ):
+            file.create_group(name).attrs["MATLAB_class"] = np.bytes_(kind)
+            file[name].create_dataset("data", data=rows()["u"][None, :]).attrs["MATLAB_class"] = np.bytes_(
+                "double"
+            )
+        file["stream"] = np.zeros((1, 120), dtype=np.uint8)
+    with open_channels(tmp_path / "run.mat") as opened:
+        assert {channel.name for channel in opened.channels} == {*rows(), "log/data"}
+        assert {one.name for one in opened.refused} == {"logsout", "sparse", "stream"}
+
+
 def test_structures_with_time_as_simulink_logs_them(tmp_path: Path) -> None:
     from scipy.io import savemat
 

@@ -155,7 +155,7 @@ def between_readings(
     notes = tuple(
         f"Warning: {path.name}, column '{table.labels[signal]}': {signal} changes every {slow.rows} rows only ({slow.fresh.size} "
         f"readings in {table.values[signal].size} rows): its device is slower than the record. It was interpolated between the "
-        "rows at which it changes; motion and noise faster than its readings are not seen, and a delay of the device would remain."
+        "rows at which it changes; motion and noise faster than its readings are not seen, a delay of the device remains."
         for signal, slow in found.items()
     )
     mended = replace(table, values=values)

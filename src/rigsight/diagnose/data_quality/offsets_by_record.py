@@ -24,7 +24,7 @@ from rigsight.simulate.drift import can_drift
 _TOLERANCE = 1e-5
 _PER_DRIVE = 4.0
 """Levels of a sensor, in units of its motion, up to which those of an input in units of its own explain them: runs forward
-and backward. A rig moves less fast than slowly, so that its levels differ by more than its motion shows; by how much is an assumption."""
+and backward. A rig moves less fast than slowly, so its levels differ by more than its motion shows; by how much is assumed."""
 _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in every command.'
 
 

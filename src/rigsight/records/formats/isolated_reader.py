@@ -53,7 +53,7 @@ def open_isolated(kind: str, path: Path) -> Iterator[ChannelFile]:
                 process.load("channel", i),
                 unit,
                 None if axis is None else axes[axis],
-                Stored(**{key: tuple(v) if isinstance(v, list) else v for key, v in stored.items()}),
+                Stored.of_json(stored),
             )
             for i, (name, n_samples, unit, axis, stored) in enumerate(contents["channels"])
         )

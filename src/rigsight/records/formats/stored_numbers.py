@@ -47,6 +47,11 @@ class Stored:
     unsigned: bool = False
     unclear: tuple[str, ...] = ()
 
+    @classmethod
+    def of_json(cls, content: Mapping[str, Any]) -> Stored:
+        """Return what `dataclasses.asdict` and JSON made of one: tuples are lists there."""
+        return cls(**{key: tuple(own) if isinstance(own, list) else own for key, own in content.items()})
+
     def quantity(self, stored: NDArray[Any]) -> NDArray[Any]:
         """Return the quantity, shape (n_samples,), NaN where the file says that a reading is missing or invalid."""
         if self == Stored(unclear=self.unclear):

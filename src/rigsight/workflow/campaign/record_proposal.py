@@ -90,8 +90,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     InputError
         If a channel cannot be read.
     """
-    is_text = file.format == "delimited text"
-    guess = guess_file(file.channels, is_text, rigs)
+    guess = guess_file(file.channels, rigs)
     no_time = ""
     if guess.time.channel is not None and not _rises(guess.time.channel):
         no_time = f"{quoted(guess.time.channel.name)} does not increase"
