@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rigsight.records import ColumnMapping
+from rigsight.records.formats.channel import Channel, ChannelFile
 from rigsight.records.formats.known import FORMATS as KNOWN
 from rigsight.records.formats.read_csv import read_csv
 from rigsight.rigs import RIGS
@@ -75,6 +76,36 @@ def test_times_that_are_no_numbers_are_left_out(tmp_path: Path, run: Run) -> Non
     assert code == 0
     (u, _) = json.loads(stdout)["channels"]
     assert (u["dt"], u["t0"], u["t1"], u["n_gaps"]) == (None, None, None, None)
+
+
+def test_one_channel_that_cannot_be_read_does_not_spoil_the_others(
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def opened(_: Path) -> Iterator[ChannelFile]:
+        good = [Channel(name, 300, lambda own=own: own) for name, own in ROWS.items()]
+        yield ChannelFile((*good, Channel("oil", 300, lambda: np.zeros(7))))
+
+    write_tdms(tmp_path / "run.tdms", ROWS, {})
+    monkeypatch.setattr("rigsight.records.formats.read_tdms.open_tdms", opened)
+    code, stdout, _ = run("inspect", tmp_path / "run.tdms", "--json")
+    told = json.loads(stdout)
+    assert (code, [one["name"] for one in told["channels"]]) == (0, list(ROWS))
+    (refused,) = told["refused"]
+    assert (refused["name"], "7 of 300" in refused["reason"]) == ("oil", True)
+
+
+def test_what_a_channel_does_not_show_is_told(tmp_path: Path, run: Run) -> None:
+    held = ROWS["x"][np.arange(300) // 5 * 5]
+    coded, angle = ROWS["x"].copy(), np.mod(40.0 * ROWS["x"] * 50.0, 360.0)
+    coded[7] = -9999.0
+    write_text(tmp_path / "run.csv", {**ROWS, "held": held, "coded": coded, "angle": angle}, {})
+    told = {
+        one["name"]: one["remarks"]
+        for one in json.loads(run("inspect", tmp_path / "run.csv", "--json")[1])["channels"]
+    }
+    assert [name for name, remarks in told.items() if remarks] == ["held", "coded", "angle"]
+    for name, part in (("held", "every 5 rows"), ("coded", "-9999"), ("angle", "360")):
+        assert part in told[name][0]
 
 
 def test_what_is_no_signal_is_told(tmp_path: Path, run: Run) -> None:

@@ -20,6 +20,10 @@ from rigsight.records.channel_names import closeness, split_unit
         ("x_a", "x_a", None),
         ("run 2", "run 2", None),
         ("[]", "[]", None),
+        ("control[0]", "control[0]", None),
+        ("data(:,1)", "data(:,1)", None),
+        ("x [-]", "x [-]", None),
+        ("speed [1/min]", "speed", "1/min"),
     ],
 )
 def test_units_in_names(name: str, bare: str, unit: str | None) -> None:

@@ -111,14 +111,37 @@ def test_a_unit_of_the_campaign_wins_over_that_of_the_file(tmp_path: Path) -> No
     np.testing.assert_allclose(record["u"], 1e-3 * rows()["u"], rtol=1e-14)
 
 
-def test_a_unit_converts_text_too_but_a_row_of_units_does_not(tmp_path: Path) -> None:
+@pytest.mark.parametrize("stated", ["s,mA,deg,mm", "[s],[mA],[deg],[mm]", "s;mA;deg;mm"])
+def test_a_row_of_units_below_the_names_is_converted_and_told(tmp_path: Path, stated: str) -> None:
     path = tmp_path / "run.csv"
     write_text(path, rows(), {})
-    path.write_text(path.read_text().replace("t,u,psi,y\n", "t,u,psi,y\ns,mA,deg,mm\n"))
-    plain = read(path)
-    np.testing.assert_array_equal(plain["u"], rows()["u"])
-    record = read(path, columns={"u": ColumnMapping("u", unit="mA")})
+    text = path.read_text().replace("t,u,psi,y\n", f"t,u,psi,y\n{stated.replace(';', ',')}\n")
+    path.write_text(text.replace(",", ";") if ";" in stated else text)
+    record = read(path)
+    for signal, scale in (("u", 1e-3), ("psi", np.pi / 180.0), ("y", 1e-3)):
+        np.testing.assert_allclose(record[signal], scale * rows()[signal], rtol=1e-14)
+        assert any(f"column '{signal}': converted" in note for note in record.notes)
+    asked = read(path, columns={"u": ColumnMapping("u", scale=1.0), "y": ColumnMapping("y", unit="m")})
+    np.testing.assert_array_equal(asked["u"], rows()["u"])
+    np.testing.assert_array_equal(asked["y"], rows()["y"])
+
+
+def test_a_row_of_units_counts_for_time(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    write_text(path, {**rows(), "t": 1e3 * rows()["t"]}, {})
+    path.write_text(path.read_text().replace("t,u,psi,y\n", "t,u,psi,y\nms,A,rad,m\n"))
+    assert read(path).dt == pytest.approx(0.01, rel=1e-12)
+
+
+def test_a_unit_in_brackets_behind_the_name_is_converted_and_told(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    write_text(path, rows(), {})
+    path.write_text(path.read_text().replace("t,u,psi,y\n", "t,u [mA],psi (deg),y_mm\n"))
+    record = read(path, columns={"u": "u [mA]", "psi": "psi (deg)", "y": "y_mm"})
     np.testing.assert_allclose(record["u"], 1e-3 * rows()["u"], rtol=1e-14)
+    np.testing.assert_allclose(record["psi"], np.radians(rows()["psi"]), rtol=1e-14)
+    # A last word may be something else than a unit: asked about, not applied.
+    np.testing.assert_array_equal(record["y"], rows()["y"])
 
 
 def test_a_unit_that_does_not_fit_is_told_with_the_mend(tmp_path: Path) -> None:
@@ -129,11 +152,17 @@ def test_a_unit_that_does_not_fit_is_told_with_the_mend(tmp_path: Path) -> None:
         assert part in str(caught.value)
 
 
-def test_an_input_without_a_unit_of_its_own_is_taken_as_it_stands_and_told(tmp_path: Path) -> None:
+def test_an_input_without_a_unit_of_its_own_is_converted_to_that_of_a_drive_and_told(tmp_path: Path) -> None:
     write_parquet(tmp_path / "run", rows(), {"u": "kN"})
     record = read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS)
+    np.testing.assert_allclose(record["u"], 1e3 * rows()["u"], rtol=1e-14)
+    assert "from kN" in record.notes[0]
+    with pytest.raises(InputError, match="gain counts per N"):
+        read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS, gain="gain")
+    write_parquet(tmp_path / "turns", rows(), {"u": "rpm"})
+    record = read_record(tmp_path / "turns", (Named("u", "input"),), OUTPUTS)
     np.testing.assert_array_equal(record["u"], rows()["u"])
-    assert "in kN" in record.notes[0]
+    assert "in rpm" in record.notes[0]
     columns = {"u": ColumnMapping("u", unit="kN")}
     asked = read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS, columns=columns)
     np.testing.assert_allclose(asked["u"], 1e3 * rows()["u"], rtol=1e-14)
@@ -176,6 +205,25 @@ def test_structs_are_looked_into(tmp_path: Path, packed: bool) -> None:
     np.testing.assert_array_equal(deep["psi"], rows()["u"])
     with pytest.raises(InputError, match="'log/info', which signal 'u' is mapped to, is text"):
         read(tmp_path / "run.mat", columns={"u": ColumnMapping("log/info")})
+
+
+def test_objects_and_sparse_matrices_of_a_7_3_file_are_no_signals(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    write_matlab_hdf5(tmp_path / "run.mat", rows(), {})
+    with h5py.File(tmp_path / "run.mat", "r+") as file:
+        for name, kind in (
+            ("logsout", "Simulink.SimulationData.Dataset"),
+            ("sparse", "double"),
+            ("log", "struct"),
+        ):
+            file.create_group(name).attrs["MATLAB_class"] = np.bytes_(kind)
+            file[name].create_dataset("data", data=rows()["u"][None, :]).attrs["MATLAB_class"] = np.bytes_(
+                "double"
+            )
+        file["stream"] = np.zeros((1, 120), dtype=np.uint8)
+    with open_channels(tmp_path / "run.mat") as opened:
+        assert {channel.name for channel in opened.channels} == {*rows(), "log/data"}
+        assert {one.name for one in opened.refused} == {"logsout", "sparse", "stream"}
 
 
 def test_structures_with_time_as_simulink_logs_them(tmp_path: Path) -> None:

@@ -168,3 +168,35 @@ def test_too_large_a_file_is_refused_before_it_is_read(
 def test_scale_without_meaning_is_refused(scale: float) -> None:
     with pytest.raises(InputError, match="scale must be a finite number other than 0"):
         ColumnMapping("u", scale=scale)
+
+
+@pytest.mark.parametrize("sign", [",", "."])
+def test_a_sign_between_thousands_is_not_taken_for_the_decimal_sign(tmp_path: Path, sign: str) -> None:
+    x = np.round(40000.0 * np.sin(0.1 * np.arange(80))).astype(int)
+    cells = [f"{value:,d}".replace(",", sign) for value in x]
+    rows = "\n".join(f"{i};0;{cell}" for i, cell in enumerate(cells))
+    first = next(i for i, cell in enumerate(cells) if sign in cell)
+    with pytest.raises(InputError, match=rf"line {first + 2}, column 'x': '{cells[first]}' .*thousands"):
+        read(tmp_path, f"t;u;x\n{rows}\n")
+
+
+@pytest.mark.parametrize("form", ["{:.3f}", "{:g}", "{:.1f}"])
+def test_decimals_are_not_taken_for_thousands(tmp_path: Path, form: str) -> None:
+    x = np.round(40.0 * np.sin(0.1 * np.arange(80)), 3)
+    rows = "\n".join(f"{i};0;{form.format(value).replace('.', ',')}" for i, value in enumerate(x))
+    read_x = read(tmp_path, f"t;u;x\n{rows}\n")[:, 2]
+    np.testing.assert_allclose(read_x, [float(form.format(value)) for value in x], rtol=1e-14)
+
+
+@pytest.mark.parametrize("remark", ["", "\t"])
+def test_a_labview_measurement_is_read_with_and_without_cells_for_remarks(
+    tmp_path: Path, remark: str
+) -> None:
+    head = (
+        "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tOne\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+        "Samples\t4\t4\t\nX_Dimension\tTime\tTime\t\nDelta_X\t0.1\t0.1\t\n***End_of_Header***\t\t\t\n"
+    )
+    rows = "".join("\t".join(f"{value:.6f}" for value in row) + remark + "\n" for row in ROWS)
+    columns = {"t": ColumnMapping("X_Value"), "u": ColumnMapping("Drive"), "x": ColumnMapping("Place")}
+    content = f"{head}X_Value\tDrive\tPlace\tComment\n{rows}"
+    np.testing.assert_allclose(read(tmp_path, content, columns), ROWS)

@@ -309,3 +309,53 @@ def test_what_a_rig_calls_so_itself_is_no_reference_beside_it(tmp_path: Path) ->
     write_text(tmp_path / "run.csv", {"t": T, "goal": SWEEP, "angle": ANSWER}, {})
     assert run_init(tmp_path).model == "servo"
     assert "reference" not in (tmp_path / "campaign.toml").read_text(encoding="utf-8")
+
+
+def test_files_of_labview_are_found_and_their_time_is_known(tmp_path: Path) -> None:
+    rows = "\n".join(f"{t:.3f}\t{u:.6f}\t{x:.6f}" for t, u, x in zip(T, SWEEP, ANSWER, strict=True))
+    (tmp_path / "a.lvm").write_text(f"X_Value\tu\tx\tComment\n{rows}\n")
+    assert run_init(tmp_path).n_blanks == 0
+    assert read_campaign(tmp_path).records[0].dt == 0.01
+
+
+def test_every_candidate_is_listed(tmp_path: Path) -> None:
+    extra = {f"Weg {i}": (i + 1) * ANSWER for i in range(30)}
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, **extra}, {})
+    text = run_init(tmp_path, model="axis").path.read_text(encoding="utf-8")
+    assert all(f'"{name}"' in text for name in extra)
+
+
+def test_x_and_y_of_a_regression_are_asked_about(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "X": SWEEP, "y": ANSWER}, {})
+    entry = tomllib.loads(run_init(tmp_path, model="axis").path.read_text(encoding="utf-8"))["records"][0]
+    assert entry["columns"] == {"u": "FILL IN", "x": "FILL IN"}
+
+
+def test_a_time_that_does_not_increase_is_not_proposed(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": np.floor(10.0 * T), "u": SWEEP, "x": ANSWER}, {})
+    entry = tomllib.loads(run_init(tmp_path).path.read_text(encoding="utf-8"))["records"][0]
+    assert entry["dt"] == "FILL IN"
+
+
+def test_a_row_of_units_needs_no_mapping(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": 1e3 * T, "u": SWEEP, "x": 1e3 * ANSWER}, {})
+    path = tmp_path / "a.csv"
+    path.write_text(path.read_text().replace("t,u,x\n", "t,u,x\nms,N,mm\n"))
+    run_init(tmp_path)
+    record = read_campaign(tmp_path).records[0]
+    assert record.dt == pytest.approx(0.01)
+    np.testing.assert_allclose(record["x"], ANSWER, rtol=1e-12, atol=1e-15)
+
+
+def test_the_gain_of_an_input_in_another_unit_is_asked_about(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "x": ANSWER}, {})
+    path = tmp_path / "a.csv"
+    path.write_text(path.read_text().replace("t,u,x\n", "t,u,x\ns,kN,m\n"))
+    (tmp_path / "campaign.toml").write_text(
+        '[rig]\nmodel = "axis"\n[rig.constants]\ngain = 2.0\n[[records]]\nfile = "a.csv"\n'
+    )
+    with pytest.raises(InputError, match="'u': is in kN.*gain counts per N"):
+        read_campaign(tmp_path)
+    with (tmp_path / "campaign.toml").open("a") as file:
+        file.write('columns = { u = { name = "u", unit = "kN", unwrap = false } }\n')
+    np.testing.assert_allclose(read_campaign(tmp_path).records[0]["u"], 1e3 * SWEEP, rtol=1e-12)

@@ -42,6 +42,9 @@ def inspect(
         for name, (step, gaps) in found.times.items():
             told_gaps = "does not increase" if step is None else f"step {step:.6g}, {gaps} gaps"
             typer.echo(f"Time '{name}': {told_gaps}")
+        for channel in found.channels:
+            for remark in channel.remarks:
+                typer.echo(f"'{channel.name}' {remark}.")
         for refused in found.refused:
             typer.echo(f"No signal: '{refused.name}' {refused.reason}")
         typer.echo(f'\nFor a campaign with model = "{found.model}":\n\n{found.proposal}', nl=False)

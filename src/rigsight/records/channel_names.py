@@ -6,7 +6,7 @@ import re
 
 # In English and German, as rigs are labeled; the shorter and plainer the earlier.
 NAMES_OF: dict[str, tuple[str, ...]] = {
-    "t": ("t", "time", "zeit", "times", "timestamp", "time stamp", "elapsed time", "tout"),
+    "t": ("t", "time", "zeit", "times", "timestamp", "time stamp", "elapsed time", "tout", "x value"),
     "u": (
         "u", "input", "current", "strom", "motor current", "motorstrom", "i", "voltage", "spannung", "drive", "command",
         "control", "excitation", "anregung", "stellgröße", "drive force", "antriebskraft",
@@ -24,7 +24,9 @@ _UNITS_BEHIND = frozenset({
     "s", "ms", "us", "µs", "A", "mA", "V", "mV", "N", "kN", "mN", "Nm", "kNm",
     "m", "mm", "cm", "um", "µm", "rad", "mrad", "deg", "°",
 })  # fmt: skip
-_IN_BRACKETS = re.compile(r"^(?P<bare>.*?)\s*[\[(<]\s*(?P<unit>[^\[\]()<>]*?)\s*[\])>]\s*$")
+_IN_BRACKETS = re.compile(
+    r"^(?P<bare>.*?)\s*[\[(<]\s*(?P<unit>[^\[\]()<>]*?[^\W\d_][^\[\]()<>]*?|[%°])\s*[\])>]\s*$"
+)
 _BEHIND = re.compile(r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_|,\s*)(?P<unit>[A-Za-zµμ°]+)$")
 
 

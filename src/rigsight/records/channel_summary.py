@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.records.formats.channel import Channel, as_floats, as_stamps
+from rigsight.records.plausibility import clipping
+from rigsight.records.sensor_signs import FULL_TURNS, codes, held, is_wrapped, wrapping_counter
 
 # Of the median step: a longer one is a gap.
 _GAP = 1.5
@@ -33,6 +36,8 @@ class ChannelSummary:
         Places where its own time jumps; None where it has none.
     n_stands
         Number of steps without a change of the value.
+    remarks
+        What the numbers are beside the quantity itself: converted, codes, wrapped, held.
     """
 
     name: str
@@ -46,6 +51,7 @@ class ChannelSummary:
     n_not_finite: int
     n_gaps: int | None
     n_stands: int
+    remarks: tuple[str, ...] = ()
 
 
 def summarize(channel: Channel) -> ChannelSummary:
@@ -76,7 +82,32 @@ def summarize(channel: Channel) -> ChannelSummary:
         samples.size - finite.size,
         n_gaps,
         int(np.count_nonzero(np.diff(samples) == 0.0)),
+        tuple(_remarks(channel, samples)) if finite.size == samples.size > 1 else (),
     )
+
+
+def _remarks(channel: Channel, samples: NDArray[np.float64]) -> Iterator[str]:
+    if channel.stored.note:
+        yield f"values are {channel.stored.note}"
+    if channel.stored.unclear:
+        yield f"has {', '.join(channel.stored.unclear)}, which may be a conversion and is not applied"
+    found = codes(samples)
+    for code in found:
+        yield (
+            f"{code.value:.6g} stands for a missing or invalid reading ({code.samples.size}, first in row {code.samples[0] + 1})"
+        )
+    if found:
+        return
+    period = next((turn for turn in FULL_TURNS if is_wrapped(samples, turn)), None) or wrapping_counter(
+        samples
+    )
+    if period is not None:
+        yield f"begins again at the end of {period:.6g}: an angle or a counter; it is unwrapped if the signal is one"
+    slow = held(samples)
+    if slow is not None:
+        yield f"changes every {slow.rows} rows only: a slower device, or a command that is held"
+    for level, count in clipping(samples):
+        yield f"looks clipped: {count} samples are exactly at its extreme {level:g}"
 
 
 def step_and_gaps(stamps: NDArray[np.float64]) -> tuple[float | None, int | None]:

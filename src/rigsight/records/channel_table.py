@@ -60,7 +60,8 @@ def read_channels(
             and (channel := _find(path, file, signal, mapping, signal in optional)) is not None
         }
         values = {
-            signal: _finite(path, channel, as_floats(channel.load())) for signal, channel in found.items()
+            signal: _finite(path, channel, _quantity(path, channel, columns[signal]))
+            for signal, channel in found.items()
         }
         axes, label = _axes(path, file, found, columns[time], time, time_is_mapped, dt)
         labels = {signal: channel.name for signal, channel in found.items()} | {time: label[0]}
@@ -77,7 +78,7 @@ def read_channels(
         values,
         labels,
         np.arange(1, n_rows + 1, dtype=np.int64),
-        () if dt is None else unread_time(path, dt, unread),
+        (*_notes(path, found), *(() if dt is None else unread_time(path, dt, unread))),
         units={signal: unit for signal, unit in units.items() if unit is not None},
         axes={} if shared is not None else axes,
         row="sample",
@@ -138,6 +139,32 @@ def _find(
     raise InputError(
         f"{path.name} has no channel '{mapping.name}' for signal '{signal}'.{hint} Its channels: {_listed(file)}. "
         f'Map it under columns: {signal} = "..." (on a command line --column {signal}=...). See rigsight inspect for details.'
+    )
+
+
+def _quantity(path: Path, channel: Channel, mapping: ColumnMapping) -> NDArray[np.float64]:
+    """Return the samples; whole numbers beside what may be their conversion are taken only as the campaign says."""
+    samples = channel.load()
+    if samples.dtype.kind in "iu" and channel.stored.unclear and mapping.scale is None:
+        raise InputError(
+            f"{path.name}, channel '{channel.name}': whole numbers are stored, beside {', '.join(channel.stored.unclear)}, which "
+            "may convert them; files differ in how. Give the conversion under columns, value = scale * stored number + offset; "
+            "scale = 1.0 takes the numbers as they are."
+        )
+    return as_floats(samples)
+
+
+def _notes(path: Path, found: Mapping[str, Channel]) -> tuple[str, ...]:
+    return tuple(
+        f"{path.name}, channel '{channel.name}': {note}."
+        for channel in found.values()
+        for note in (
+            channel.stored.note and f"values are {channel.stored.note}",
+            channel.stored.unclear
+            and f"has {', '.join(channel.stored.unclear)}, which was not applied; give scale and offset under columns if it is a "
+            "conversion that is still to be done",
+        )
+        if note
     )
 
 

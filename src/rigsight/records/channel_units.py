@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -146,7 +147,7 @@ def is_unit(text: str) -> bool:
 
 
 def si_mapping(
-    file: str, signal: str, si: str, mapping: ColumnMapping, label: str, stated: str | None
+    file: str, signal: str, si: str, mapping: ColumnMapping, label: str, stated: str | None, gain: str = ""
 ) -> tuple[ColumnMapping, tuple[str, ...]]:
     """Return a mapping with the scale from a column to SI, and notes on the conversion.
 
@@ -161,19 +162,25 @@ def si_mapping(
         to what the unit gives.
     stated
         Unit stated in the file, None if there is none.
+    gain
+        Constant of the rig that counts per unit of an input without a fixed unit, where the campaign gives its value.
 
     Raises
     ------
     InputError
         Naming file, column and unit, and what to write instead: it is unknown, or measures something else.
     """
-    unit = mapping.unit if mapping.unit is not None else stated
     where = f"{file}, column '{label}'"
     if mapping.scale is not None:
         return mapping, ()
+    named = split_unit(label)[1]
+    taken = si if has_si(si) else _drive_of(named)
+    by_whom = "stated in the file"
+    # Brackets are written around a unit; behind a blank or a stroke it may be something else.
+    if stated is None and named and taken and label.rstrip().endswith(tuple("])>")) and is_a(named, taken):
+        stated, by_whom = named, "in its name"
+    unit = mapping.unit if mapping.unit is not None else stated
     if unit is None:
-        named = split_unit(label)[1]
-        taken = si if has_si(si) else _drive_of(named)
         if named is None or taken is None or named == taken or not is_a(named, taken):
             return mapping, ()
         if mapping.offset is None:
@@ -193,14 +200,26 @@ def si_mapping(
                     f'{where}: unit = "{unit}" cannot be converted: {signal} has no fixed unit on this rig, and this is '
                     f"not a unit of a drive ({', '.join(DRIVES)}). Give scale and offset instead."
                 )
-            return ColumnMapping(mapping.name, scale=found[0]), ()
-        return mapping, (
-            f"{where}: {signal} has no fixed unit on this rig; values were taken without conversion, in {unit}.",
+            return replace(mapping, unit=None, scale=found[0]), ()
+        drive = in_drive_unit(unit)
+        if drive is None or drive[0] == 1.0:
+            return mapping, (
+                f"{where}: {signal} has no fixed unit on this rig; values were taken without conversion, in {unit}.",
+            )
+        if gain:
+            own = f'{signal} = {{ name = "{label}", unit = "{unit}" }}'
+            raise InputError(
+                f"{where}: is in {unit}, {by_whom}, and {gain} is given, which counts per unit of {signal}. If {gain} counts per "
+                f"{drive[1]}, write {own}; if it counts per {unit}, write scale = 1.0 instead of the unit."
+            )
+        return replace(mapping, scale=drive[0]), (
+            f"{where}: converted from {unit}, the unit {by_whom}, to {drive[1]}; gains of the rig refer to that. To take the "
+            "values without conversion write scale = 1.0.",
         )
     try:
         scale, offset = conversion(unit, si)
     except UnknownUnitError as error:
-        by = "" if mapping.unit is not None else ", stated in the file,"
+        by = "" if mapping.unit is not None else f", {by_whom},"
         # An offset cannot stand beside a unit.
         right = (
             ""
@@ -211,7 +230,7 @@ def si_mapping(
             f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write {right}scale = 1.0 to take the values without "
             "conversion."
         ) from None
-    converted = ColumnMapping(mapping.name, scale=scale, offset=offset + (mapping.offset or 0.0))
+    converted = replace(mapping, unit=None, scale=scale, offset=offset + (mapping.offset or 0.0))
     absolute = ""
     if offset:
         absolute = (
@@ -219,16 +238,18 @@ def si_mapping(
             f"scale = {scale:.6g} instead of a unit."
         )
     if mapping.unit is not None:
-        said = split_unit(label)[1] if stated is None else stated
+        said = named if stated is None else stated
         if said is None or not is_a(said, si) or conversion(said, si) == (scale, offset):
             return converted, (f"{where}: taken in {unit}.{absolute}",) if absolute else ()
-        by = "its name ends with" if stated is None else "the file states"
+        by = (
+            "the file states"
+            if stated is not None and by_whom == "stated in the file"
+            else "its name ends with"
+        )
         return converted, (
             f"{where}: taken in {unit}, as stated in the campaign, although {by} {said}.{absolute}",
         )
     if (scale, offset) == (1.0, 0.0):
         return converted, ()
     added = "" if mapping.offset is None else f"; the offset {mapping.offset:g} {si} was added"
-    return converted, (
-        f"{where}: converted from {unit}, the unit stated in the file, to {si}{added}.{absolute}",
-    )
+    return converted, (f"{where}: converted from {unit}, the unit {by_whom}, to {si}{added}.{absolute}",)

@@ -26,17 +26,21 @@ class ColumnMapping:
         Value added after scaling or conversion of the file's unit, in the SI unit.
     unit
         Unit of the column, instead of scale and offset: ``"deg"``.
+    unwrap
+        True for an angle that begins again after a full turn, or the period of a counter in the numbers of the column; False for
+        neither, None to find out.
 
     Raises
     ------
     InputError
-        If the scale is zero, scale or offset is not finite, or a unit stands beside them.
+        If the scale is zero, scale or offset is not finite, a unit stands beside them, or a period is not positive.
     """
 
     name: str | int
     scale: float | None = None
     offset: float | None = None
     unit: str | None = None
+    unwrap: bool | float | None = None
 
     def __post_init__(self) -> None:
         if self.scale is not None and (not math.isfinite(self.scale) or self.scale == 0.0):
@@ -49,6 +53,12 @@ class ColumnMapping:
             raise InputError(
                 f"Column '{self.name}': unit = \"{self.unit}\" is combined with scale or offset, which also convert; give one of "
                 "the two."
+            )
+
+        if not (self.unwrap is None or isinstance(self.unwrap, bool) or 0.0 < self.unwrap < math.inf):
+            raise InputError(
+                f"Column '{self.name}': unwrap must be true, false, or the numbers after which the column begins again, got "
+                f"{self.unwrap}."
             )
 
     @property

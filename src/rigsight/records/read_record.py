@@ -16,6 +16,7 @@ from rigsight.records.column_mapping import ColumnMapping, Columns, checked_colu
 from rigsight.records.conditioning import TimeBase, check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
 from rigsight.records.formats.read_csv import read_csv
+from rigsight.records.readings import between_readings, refuse_codes, unwrapped
 from rigsight.records.record import Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, in_seconds, refuse_different_axes, resampled
 from rigsight.records.sound_signals import (
@@ -54,6 +55,7 @@ class ReadingOptions(TypedDict, total=False):
     header: bool | int | None
     comment: str | None
     constants: Mapping[str, float] | None
+    gain: str
     beside: Sequence[str]
 
 
@@ -101,6 +103,7 @@ def read_stretches(
     header: bool | int | None = None,
     comment: str | None = None,
     constants: Mapping[str, float] | None = None,
+    gain: str = "",
     beside: Sequence[str] = (),
     at_pauses: Literal["split", "refuse"] = "split",
 ) -> tuple[Record, ...]:
@@ -136,6 +139,8 @@ def read_stretches(
         See `read_csv`; only delimited text has them.
     constants
         See `Record`.
+    gain
+        See `si_mapping`.
     beside
         Names of signals that do not belong to the rig; they are read if the file has them, in any unit.
     at_pauses
@@ -190,15 +195,20 @@ def read_stretches(
             mapping,
             label,
             None if signal in beside else table.units.get(signal),
+            gain,
         )
         unit_notes += notes
     raw = {name: table.values[name] for name in names if name in table.values}
     # A few samples at rest are too few before they are a rest.
     check_long_enough(path.name, max(values.size for values in table.values.values()))
+    refuse_codes(path, table)
     refuse_implausible(path, raw, table)
-    found: list[str] = []
+    table, found_notes = unwrapped(path, table, {signal: to_si[signal] for signal in raw}, units)
+    raw = {name: table.values[name] for name in raw}
+    found: list[str] = list(found_notes)
     if require_outputs:
-        raw, found = moving(path, raw, table, needed, outputs)
+        raw, still = moving(path, raw, table, needed, outputs)
+        found += still
         if role == "estimation":
             must_move = moving_inputs if may_rest else [signal.name for signal in recorded]
             found += rest_notes(path, raw, table, recorded, must_move, kind == "step" and not moving_inputs)
@@ -224,7 +234,9 @@ def read_stretches(
     holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
     called, before = name or readable(path.stem), (*table.notes, *unit_notes, *cut.notes)
     records = []
-    for number, part in enumerate(parts, 1):
+    sensors = {signal.name for signal in outputs}.union(moving_inputs)
+    for number, stretch in enumerate(parts, 1):
+        part, slow = between_readings(path, TIME, stretch, sensors.intersection(kept))
         on_axis = _on_one_axis(path, part, kept, to_si[TIME], resample, holds)
         samples = {signal: to_si[signal].to_si(own) for signal, own in on_axis.samples.items()}
         n_samples = next(iter(samples.values())).size
@@ -241,7 +253,7 @@ def read_stretches(
                 amplitude=amplitude,
                 hold=hold,
                 source=path,
-                notes=(*before, *on_axis.notes, *found) if number == 1 else on_axis.notes,
+                notes=(*before, *slow, *on_axis.notes, *found) if number == 1 else (*slow, *on_axis.notes),
                 constants=constants or {},
             )
         )

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
 from rigsight.records.channel_names import closeness
 from rigsight.records.channel_summary import ChannelSummary, summarize, time_summary
-from rigsight.records.formats.channel import Refused
+from rigsight.records.formats.channel import Channel, ChannelFile, Refused
 from rigsight.records.formats.csv_channels import open_measurement
 from rigsight.records.read_record import TIME
 from rigsight.rigs import RIGS, Rig
@@ -81,7 +81,7 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
     """
     path = Path(path)
     with open_measurement(path) as file:
-        channels = tuple(summarize(channel) for channel in file.channels)
+        file, channels = _readable(path, file)
         times = {
             channel.name: time_summary(channel)
             for channel in file.channels
@@ -101,3 +101,29 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
         proposal.toml("estimation", '"validation" for records that are only scored'),
         proposal.n_blanks,
     )
+
+
+def _readable(path: Path, file: ChannelFile) -> tuple[ChannelFile, tuple[ChannelSummary, ...]]:
+    """Return a file without the channels that cannot be read, and the summaries of the others.
+
+    Raises
+    ------
+    InputError
+        If none can be read: then the file is damaged, not a channel.
+    """
+    read: list[tuple[Channel, ChannelSummary]] = []
+    refused = list(file.refused)
+    errors: list[InputError] = []
+    for channel in file.channels:
+        try:
+            read.append((channel, summarize(channel)))
+        except InputError as error:
+            errors.append(error)
+            reason = (
+                str(error).removeprefix(path.name).lstrip(":, ").removeprefix(f"channel '{channel.name}': ")
+            )
+            refused.append(Refused(channel.name, reason.rstrip(".")))
+    if errors and not read:
+        raise errors[0]
+    channels = tuple(channel for channel, _ in read)
+    return replace(file, channels=channels, refused=tuple(refused)), tuple(own for _, own in read)

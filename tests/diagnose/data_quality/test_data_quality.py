@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model
 from rigsight.diagnose.data_quality.finding import DataQuality, Finding
 from rigsight.diagnose.data_quality.sensor_faults import sensor_faults
@@ -301,6 +302,24 @@ def test_a_constant_start_is_not_stuck():
     still = np.flatnonzero(np.diff(counted["x"]))[0]
     assert still > 500
     assert not [f for f in sensor_faults(AXIS, counted) if f.kind == "stuck"]
+
+
+def test_an_encoder_that_toggles_by_one_count_does_not_jump():
+    record = sweeps()[0]
+    count = np.ptp(record["x"]) / 300
+    resting = count * np.round(record["x"] / count)
+    resting[2000:3000] = resting[2000]
+    resting[2400:2600:40] += count
+    assert not [f for f in sensor_faults(AXIS, record.with_signals(x=resting)) if f.kind == "jump"]
+    resting[2500] += 90 * count
+    assert [f for f in sensor_faults(AXIS, record.with_signals(x=resting)) if f.kind == "jump"]
+
+
+def test_steps_of_several_heights_are_not_said_to_be_one_amplitude():
+    record = replace(sweeps()[0], kind="step")
+    steps = [replace(record.with_signals(u=h * record["u"]), name=f"s{h}") for h in (1.0, 2.0, 3.0)]
+    (told,) = amplitude_dependences(AXIS, steps)
+    assert (told.answer, "3 heights" in told.sentence) == ("cannot tell", True)
 
 
 def test_one_amplitude_cannot_tell():

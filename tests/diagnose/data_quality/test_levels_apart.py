@@ -48,3 +48,8 @@ def test_what_another_push_or_payload_moves_is_no_offset(two_masses: Rig) -> Non
 
 def test_a_rig_that_can_rest_anywhere_may_lie_anywhere(two_masses: Rig) -> None:
     assert told(two_masses, runs(5.0), {**NUMBERS, "k": 0.0}) == []
+
+
+def test_runs_forward_and_backward_are_no_other_zero(two_masses: Rig) -> None:
+    assert told(two_masses, runs(1.5, push=0.9)) == []
+    assert len(told(two_masses, runs(1.5))) == 1

@@ -59,15 +59,23 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
     path = f"{source} -> {response}"
     records = [record for record in records if response in record and not is_constant(record[source])]
     if not records:
-        what = "Nothing drives the rig" if len(rig.inputs) == 1 else f"'{source}' does not move"
         return AmplitudeDependence(
             "cannot tell",
-            f"{what} in the usable records, so there is no frequency response {path}.",
+            f"'{source}' changes in no record in which '{response}' can be used, so there is no frequency response {path}.",
             path=path,
         )
     alone = len(rig.inputs) == 1
     pair = _extremes(records, source, alone)
     if pair is None:
+        heights = {f"{_amplitude(r, source, alone):.2g}" for r in records if r.kind == "step"}
+        if len(heights) > 1:
+            return AmplitudeDependence(
+                "cannot tell",
+                f"There are steps of {len(heights)} heights, but no frequency response is found from steps, and the other usable "
+                f"records do not have two amplitudes{'' if alone else f' of {source}'}. Only frequency responses {path} are "
+                f"compared here; record a sweep or a multisine at two amplitudes for that.",
+                path=path,
+            )
         return AmplitudeDependence(
             "cannot tell",
             f"The usable records have only one amplitude{'' if alone else f' of {source}'}, so they cannot tell whether the "

@@ -22,6 +22,9 @@ from rigsight.rigs import Rig
 from rigsight.simulate.drift import can_drift
 
 _TOLERANCE = 1e-5
+_PER_DRIVE = 4.0
+"""Levels of a sensor, in units of its motion, up to which those of an input in units of its own explain them: runs forward
+and backward. A rig moves less fast than slowly, so its levels differ by more than its motion shows; by how much is assumed."""
 _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in every command.'
 
 
@@ -90,7 +93,9 @@ def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding
     for signal in rig.outputs:
         holding = [r for r in records if signal.name in r and signal.name not in r.free_offsets]
         moves, lowest, highest = _apart(holding, signal.name)
-        if moves > 1.0:
+        pair = [record for record in holding if record.name in (lowest, highest)]
+        driven = max((_apart(pair, one.name)[0] for one in rig.inputs), default=0.0)
+        if moves > max(1.0, _PER_DRIVE * driven):
             found.append(
                 Finding(
                     "offset",

@@ -142,6 +142,13 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
     ]
     # A third difference reaches over four samples; the jump lies at the largest step among them.
     steps = [np.abs(np.diff(samples[place : place + 4])) for place in places]
+    # An encoder at rest on an edge toggles by one count.
+    changes = np.abs(np.diff(samples))
+    count = float(np.min(changes[changes > NOTES.rounding * np.ptp(samples)], initial=np.inf))
+    kept = [i for i, step in enumerate(steps) if np.max(step) > NOTES.one_step * count]
+    if not kept:
+        return []
+    places, steps = [places[i] for i in kept], [steps[i] for i in kept]
     told = ", ".join(
         f"{written_stamp(float(record.t[place + 1 + np.argmax(step)]), record.dt)} s"
         for place, step in zip(places[: NOTES.first_told], steps, strict=False)

@@ -119,6 +119,11 @@ class NoteNumbers:
         "convention",
         "Number of smallest increments of a channel up to which a change counts as quantization.",
     )
+    rounding: float = number(
+        1e-9,
+        "convention",
+        "Part of a channel's range below which a change between samples is rounding of its conversion, not an increment.",
+    )
     fewest_levels: int = number(
         200,
         "convention",

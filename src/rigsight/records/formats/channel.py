@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.records.formats.stored_numbers import AS_STORED, Stored
 
 MOST_SAMPLES = 50_000_000
 """Of one channel: 400 MB once read."""
@@ -71,11 +72,13 @@ class Channel:
     n_samples
         Number of samples.
     load
-        Reads the samples.
+        Reads the samples: of a reader as they are stored, of an opened file as quantities.
     unit
         What the file states, None where it states none.
     axis
         Its own time; None where time is a channel like any other.
+    stored
+        How stored numbers become quantities.
     """
 
     name: str
@@ -83,6 +86,7 @@ class Channel:
     load: Load
     unit: str | None = None
     axis: TimeAxis | None = None
+    stored: Stored = AS_STORED
 
     @property
     def short_name(self) -> str:
@@ -196,6 +200,7 @@ def columns_of(
     shape: tuple[int, ...],
     read: Load,
     unit: str | None = None,
+    stored: Stored = AS_STORED,
 ) -> list[Channel] | Refused:
     """Return the channels of a stored array: one of a vector, one per column of a table.
 
@@ -207,14 +212,14 @@ def columns_of(
         As stored; the longer side of a table is time.
     read
         Reads the whole array.
-    unit
+    unit, stored
         Of all its columns.
     """
     long = [length for length in shape if length != 1]
     if not long or 0 in long:
         return Refused(name, "holds a single number" if not long else "is empty")
     if len(long) == 1:
-        return [Channel(name, long[0], lambda: read().reshape(-1), unit)]
+        return [Channel(name, long[0], lambda: read().reshape(-1), unit, stored=stored)]
     if len(long) > 2 or min(long) > MOST_COLUMNS:
         return Refused(name, f"is an array of shape {shape}, neither a vector nor a table of columns")
 
@@ -227,7 +232,9 @@ def columns_of(
     def column(index: int) -> Load:
         return lambda: _upright(read())[:, index]
 
-    return [Channel(f"{name}(:,{i + 1})", max(long), column(i), unit) for i in range(min(long))]
+    return [
+        Channel(f"{name}(:,{i + 1})", max(long), column(i), unit, stored=stored) for i in range(min(long))
+    ]
 
 
 def kept_last(kept: dict[str, NDArray[Any]], name: str, read: Load) -> Load:

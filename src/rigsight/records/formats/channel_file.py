@@ -26,6 +26,7 @@ from rigsight.records.formats.channel import (
 from rigsight.records.formats.isolated_reader import ReadingError, open_isolated
 from rigsight.records.formats.known import BY_SUFFIX, HEAD, PACKAGES, Format, reader_of, recognized
 from rigsight.records.formats.ordinary_file import file_size
+from rigsight.records.formats.stored_numbers import AS_STORED, Stored
 
 LARGEST_FILE = 2_000_000_000
 MEND = "Export it again, or as CSV."
@@ -100,7 +101,7 @@ def _reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
 def _guarded(path: Path, name: str, channel: Channel) -> Channel:
     """Return the channel with its reading checked: before for size, after for what came."""
 
-    def guarded(load: Load, n_samples: int, what: str) -> Load:
+    def guarded(load: Load, n_samples: int, what: str, stored: Stored = AS_STORED) -> Load:
         def checked() -> np.ndarray:
             check_size(path.name, channel.name, n_samples)
             with _told(path, name):
@@ -112,14 +113,15 @@ def _guarded(path: Path, name: str, channel: Channel) -> Channel:
                     f"{path.name}, channel '{channel.name}': {samples.size} of {n_samples} samples are present; the file is "
                     f"truncated or damaged. {MEND}"
                 )
-            return samples
+            return stored.quantity(samples)
 
         return checked
 
     axis = channel.axis
     if axis is not None and axis.load is not None:
         axis = replace(axis, load=guarded(axis.load, axis.n_samples, "time"))
-    return replace(channel, load=guarded(channel.load, channel.n_samples, "data"), axis=axis)
+    load = guarded(channel.load, channel.n_samples, "data", channel.stored)
+    return replace(channel, load=load, axis=axis)
 
 
 @contextlib.contextmanager

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.formats.channel import Channel, ChannelFile, Refused, stated_unit, with_distinct_names
+from rigsight.records.formats.channel import Channel, ChannelFile, Refused, with_distinct_names
 from rigsight.records.formats.channel_file import file_format, open_channels
-from rigsight.records.formats.read_csv import Layout, find_layout, kept_lines
+from rigsight.records.formats.read_csv import Layout, find_layout, kept_lines, refuse_thousands
 from rigsight.records.formats.text_file import read_text
 
 
@@ -46,16 +46,18 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
             "Correct the file, or cut the record there."
         )
     table = _numbers(rows, layout)
+    for i in range(len(layout.names)):
+        if np.isfinite(table[:, i]).any():
+            refuse_thousands(path, layout, i, lines, kept[layout.n_above :], table[:, i])
     channels: list[Channel] = []
     refused: list[Refused] = []
     for i, name in enumerate(layout.names):
         if np.isnan(table[:, i]).all():
             refused.append(Refused(name, "holds text"))
             continue
-        unit = stated_unit(layout.units[i]) if i < len(layout.units) else None
         # Columns without a name of their own are told apart by their number, also in a campaign.
         called = name if name and layout.names.count(name) == 1 else str(i + 1)
-        channels.append(Channel(called, table.shape[0], _load(table, i), unit))
+        channels.append(Channel(called, table.shape[0], _load(table, i), layout.unit(i)))
     yield ChannelFile(with_distinct_names(channels), tuple(refused), "delimited text")
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.records.formats.channel import Channel, ChannelFile, Load, Refused, TimeAxis
 from rigsight.records.formats.known import PACKAGES
+from rigsight.records.formats.stored_numbers import Stored
 
 LEAST_MEMORY, MEMORY_PER_BYTE, LARGEST_MEMORY = 1_000_000_000, 100, 8_000_000_000
 """What reading may take beside the libraries [bytes]: so much, and so much for every byte of the file, since files are packed."""
@@ -46,8 +47,15 @@ def open_isolated(kind: str, path: Path) -> Iterator[ChannelFile]:
             for i, (n_samples, unit) in enumerate(contents["axes"])
         ]
         channels = tuple(
-            Channel(name, n_samples, process.load("channel", i), unit, None if axis is None else axes[axis])
-            for i, (name, n_samples, unit, axis) in enumerate(contents["channels"])
+            Channel(
+                name,
+                n_samples,
+                process.load("channel", i),
+                unit,
+                None if axis is None else axes[axis],
+                Stored.of_json(stored),
+            )
+            for i, (name, n_samples, unit, axis, stored) in enumerate(contents["channels"])
         )
         yield ChannelFile(channels, tuple(Refused(*one) for one in contents["refused"]))
 

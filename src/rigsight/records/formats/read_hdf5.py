@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import contextlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,13 @@ from rigsight.records.formats.channel import (
     kept_last,
     stated_unit,
 )
+from rigsight.records.formats.stored_numbers import stored_by
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 
 
 def open_hdf5(path: Path) -> Iterator[ChannelFile]:
-    """Yield the channels of an HDF5 file: every real dataset, named by its path; units from its attribute ``unit``.
+    """Yield the channels of an HDF5 file: every real dataset, named by its path, converted by its attributes.
 
     Time is a dataset like any other. Links into other files are not followed and references not resolved: a file that was
     sent to someone must not read what is none of its business.
@@ -41,7 +43,8 @@ def open_hdf5(path: Path) -> Iterator[ChannelFile]:
             if not isinstance(item, h5py.Dataset):
                 return
             read = kept_last(kept, name, lambda: item[()])
-            found = columns_of(name, item.shape or (), read, _unit(item))
+            attributes = _attributes(item)
+            found = columns_of(name, item.shape or (), read, _unit(attributes), stored_by(attributes))
             reason = _refusal(item)
             if reason is not None:
                 refused.append(Refused(name, reason))
@@ -67,8 +70,17 @@ def _refusal(dataset: Any) -> str | None:
     return None
 
 
-def _unit(dataset: Any) -> str | None:
+def _attributes(dataset: Any) -> dict[str, Any]:
+    """Return the attributes that can be read; of some types, such as references of others, none can."""
+    found = {}
+    for name in dataset.attrs:
+        with contextlib.suppress(OSError, TypeError, ValueError):
+            found[str(name)] = dataset.attrs[name]
+    return found
+
+
+def _unit(attributes: Mapping[str, Any]) -> str | None:
     for name in UNIT_ATTRIBUTES:
-        if name in dataset.attrs:
-            return stated_unit(dataset.attrs[name])
+        if name in attributes:
+            return stated_unit(attributes[name])
     return None

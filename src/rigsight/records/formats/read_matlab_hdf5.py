@@ -45,6 +45,11 @@ def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
                 item = group[name]
                 if not isinstance(item, h5py.Group):
                     take(above + name, item)
+                elif (kind := _class(item)) not in (None, "struct"):
+                    # What is inside are the bytes of an object, or the parts of a sparse matrix.
+                    refused.append(
+                        Refused(above + name, why_no_signal("sparse" if kind in NUMERIC else str(kind)))
+                    )
                 elif depth == DEEPEST:
                     # A damaged file may hold a group inside itself.
                     check_count(path.name, len(channels) + len(refused))
@@ -56,9 +61,17 @@ def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
         yield ChannelFile(tuple(channels), tuple(refused))
 
 
+def _class(item: Any) -> str | None:
+    kind = item.attrs.get("MATLAB_class")
+    return kind.decode("ascii", errors="replace") if isinstance(kind, bytes) else kind and str(kind)
+
+
 def _channels(name: str, dataset: Any, kept: dict[str, NDArray[Any]]) -> list[Channel] | Refused:
-    kind = dataset.attrs.get("MATLAB_class", b"double")
-    kind = kind.decode("ascii", errors="replace") if isinstance(kind, bytes) else str(kind)
+    kind = _class(dataset)
+    if kind is None and dataset.dtype.itemsize == 1:
+        # MATLAB marks every array of its own; Simulink keeps objects beside them.
+        return Refused(name, "holds bytes of no MATLAB class")
+    kind = kind or "double"
     if "MATLAB_empty" in dataset.attrs:
         return Refused(name, "is empty")
     if kind not in NUMERIC or dataset.dtype.kind not in "iuf":

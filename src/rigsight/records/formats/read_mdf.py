@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
@@ -71,8 +72,11 @@ def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int
 
 def _load(file: Any, number: int, index: int) -> Load:
     def samples() -> NDArray[Any]:
-        read: NDArray[Any] = file.get(group=number, index=index, samples_only=True)[0]
-        return read
+        # Left to itself, the library drops the invalid samples, and the others would move to other times.
+        read, invalid = file.get(group=number, index=index, samples_only=True, ignore_invalidation_bits=True)
+        if invalid is None or not np.any(invalid):
+            return np.asarray(read)
+        return np.where(np.asarray(invalid, dtype=bool), np.nan, read)
 
     return samples
 

@@ -17,6 +17,7 @@ from rigsight.records.formats.channel import (
     check_count,
     stated_unit,
 )
+from rigsight.records.formats.stored_numbers import stored_by
 from rigsight.records.formats.time_stamps import seconds_since_first
 
 UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
@@ -44,7 +45,8 @@ def open_parquet(path: Path) -> Iterator[ChannelFile]:
                 refused.append(Refused(column.name, "holds a single number" if n_rows else "is empty"))
             else:
                 unit = "s" if _is_time(column.type) else _unit(column.metadata)
-                channels.append(Channel(column.name, n_rows, _load(file, column.name), unit))
+                stored = stored_by(_texts(column.metadata))
+                channels.append(Channel(column.name, n_rows, _load(file, column.name), unit, stored=stored))
         yield ChannelFile(tuple(channels), tuple(refused))
 
 
@@ -69,6 +71,10 @@ def _is_time(kind: Any) -> bool:
     from pyarrow import types
 
     return bool(types.is_timestamp(kind) or types.is_duration(kind))
+
+
+def _texts(metadata: Any) -> dict[str, Any]:
+    return {name.decode("utf-8", errors="replace"): value for name, value in (metadata or {}).items()}
 
 
 def _unit(metadata: Any) -> str | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,23 @@ from rigsight.records.formats.channel import (
     TimeAxis,
     stated_unit,
 )
+from rigsight.records.formats.stored_numbers import stored_by
 from rigsight.records.formats.time_stamps import seconds_since_first
 
+SCALES = (
+    "Polynomial",
+    "Linear",
+    "RTD",
+    "Strain",
+    "Table",
+    "Thermistor",
+    "Thermocouple",
+    "Add",
+    "Subtract",
+    "AdvancedAPI",
+)
+"""Types of scales that nptdms 1.10 applies; it passes over others with a line in its log."""
+_SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription", "unit", "Unit")
 
 
@@ -45,10 +61,38 @@ def open_tdms(path: Path) -> Iterator[ChannelFile]:
                     )
                 elif len(channel) < 2:
                     refused.append(Refused(name, "holds a single number" if len(channel) else "is empty"))
+                elif unknown := _unknown_scales(channel.properties, group.properties, file.properties):
+                    refused.append(
+                        Refused(
+                            name,
+                            f"has a scale of type {', '.join(unknown)}, which is not read; export scaled values",
+                        )
+                    )
                 else:
                     unit = "s" if kind == "M" else _unit(channel.properties)
-                    channels.append(Channel(name, len(channel), _load(channel, kind), unit, _axis(channel)))
+                    stored = stored_by(_of_users(channel.properties))
+                    channels.append(
+                        Channel(name, len(channel), _load(channel, kind), unit, _axis(channel), stored)
+                    )
         yield ChannelFile(tuple(channels), tuple(refused))
+
+
+def _unknown_scales(*owners: Mapping[str, Any]) -> list[str]:
+    """Return the types of scales in force that the library leaves out, so that it would give the numbers unscaled.
+
+    The scales of the first that has any are in force: of the channel, its group, or the file.
+    """
+    for properties in owners:
+        if not properties.get("NI_Number_Of_Scales") or properties.get("NI_Scaling_Status") == "scaled":
+            continue
+        types = {str(value) for name, value in properties.items() if _SCALE_TYPE.fullmatch(name)}
+        return sorted(types.difference(SCALES))
+    return []
+
+
+def _of_users(properties: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the properties that a person wrote; those of waveforms and of scales are known."""
+    return {name: value for name, value in properties.items() if not name.startswith(("NI_", "wf_"))}
 
 
 def _load(channel: Any, kind: str) -> Load:

@@ -14,6 +14,8 @@ import logging
 import os
 import sys
 import warnings
+from collections.abc import Iterator
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
@@ -51,11 +53,13 @@ def main(kind: str, path: Path) -> None:
             for line in sys.stdin:
                 what, index = line.split()
                 load = file.channels[int(index)].load if what == "channel" else axes[int(index)].stamps
-                samples = np.ascontiguousarray(load())
-                answer = {"type": samples.dtype.str, "n_bytes": samples.nbytes}
-                _answer(answers, answer, samples.tobytes())
+                # One channel that cannot be read says nothing of the others.
+                with _told(answers):
+                    samples = np.ascontiguousarray(load())
+                    data = samples.tobytes()
+                    _answer(answers, {"type": samples.dtype.str, "n_bytes": len(data)}, data)
     except Exception as error:
-        _answer(answers, {"error": type(error).__name__, "reason": str(error)})
+        _answer_error(answers, error)
     # Clearing up after a failure may fail as well.
     answers.flush()
     os._exit(0)
@@ -71,6 +75,18 @@ def limit_memory(more: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
+@contextlib.contextmanager
+def _told(answers: IO[bytes]) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:
+        _answer_error(answers, error)
+
+
+def _answer_error(answers: IO[bytes], error: Exception) -> None:
+    _answer(answers, {"error": type(error).__name__, "reason": str(error)})
+
+
 def _answer(answers: IO[bytes], content: dict[str, Any], data: bytes = b"") -> None:
     answers.write(json.dumps(content).encode() + b"\n" + data)
     answers.flush()
@@ -79,7 +95,13 @@ def _answer(answers: IO[bytes], content: dict[str, Any], data: bytes = b"") -> N
 def _contents(file: ChannelFile, axes: list[TimeAxis]) -> dict[str, Any]:
     return {
         "channels": [
-            [one.name, one.n_samples, one.unit, None if one.axis is None else axes.index(one.axis)]
+            [
+                one.name,
+                one.n_samples,
+                one.unit,
+                None if one.axis is None else axes.index(one.axis),
+                asdict(one.stored),
+            ]
             for one in file.channels
         ],
         "axes": [[axis.n_samples, axis.unit] for axis in axes],

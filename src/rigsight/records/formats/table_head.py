@@ -23,6 +23,7 @@ _NAMES_BELOW = 20
 _CLEAR = 2.0
 """Closeness from which a cell names time."""
 _TIME = "t"
+_REMARKS = "Comment"
 
 
 @dataclass(frozen=True)
@@ -167,6 +168,11 @@ def find_head(
     return Head(names, names + 1 if names + 1 < first else None, first)
 
 
+def without_comment(names: Sequence[str], width: int) -> Sequence[str]:
+    """Return the names of columns without one for remarks at their end: LabVIEW writes no cell of it where there is no remark."""
+    return names[:-1] if len(names) == width + 1 and names[-1] == _REMARKS else names
+
+
 def _told(dialect: Dialect, lines: Sequence[str], header: int, number_of: Callable[[int], int]) -> Head:
     numbers = [number_of(i) for i in range(min(len(lines), MOST_HEAD))]
     if header not in numbers:
@@ -193,7 +199,8 @@ def _without_words(
     if first == 0 or number_of(first) > number_of(first - 1) + 1:
         return Head(None, None, first)
     above = shape.dialect.cells(lines[first - 1])
-    if len(above) == len(shape.dialect.cells(lines[first])) and looks_like_names(shape.dialect, above):
+    width = len(shape.dialect.cells(lines[first]))
+    if len(without_comment(above, width)) == width and looks_like_names(shape.dialect, above):
         # They fit the first rows; that others have another width is told by the line where that begins.
         return Head(first - 1, None, first)
     count = len(above)

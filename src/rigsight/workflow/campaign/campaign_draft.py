@@ -21,7 +21,7 @@ from rigsight.workflow.campaign.record_proposal import (
     quoted,
 )
 
-MEASURED_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", *BY_SUFFIX)
+MEASURED_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", *BY_SUFFIX)
 _SCORED = re.compile(r"valid|verif|test|check|pruef|prüf|score", re.IGNORECASE)
 
 

@@ -33,12 +33,16 @@ Checked = TypeVar("Checked", bound=FileTable)
 
 
 class ColumnTable(FileTable):
-    """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset; or ``unit = "mA"`` instead."""
+    """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset; or ``unit = "mA"`` instead.
+
+    ``unwrap = true`` for an angle that begins again after a full turn, or the period of a counter.
+    """
 
     name: str | int
     scale: Number | None = None
     offset: Number | None = None
     unit: Annotated[str, Field(min_length=1)] | None = None
+    unwrap: bool | Annotated[float, Field(allow_inf_nan=False, gt=0.0)] | None = None
 
 
 class RigTable(FileTable):
@@ -201,6 +205,8 @@ def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: d
         )
     if location[-1] == "separator":
         return f"{key}: must be one character, got {shown(got)}; a blank means any white space."
+    if location[-1] == "unwrap":
+        return f"{key}: must be true or false for an angle, or the numbers after which the column begins again, got {shown(got)}."
     if "columns" in location[:-1]:
         return (
             f"{key}: got {shown(got)}. Write the name of the column, its number counted from 1, "
@@ -218,7 +224,7 @@ def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]
     for i, part in enumerate(location):
         if "columns" in kept and i >= kept.index("columns") + 2 and part in ("str", "int", "ColumnTable"):
             continue
-        if kept and kept[-1] == "header":
+        if kept and kept[-1] in ("header", "unwrap"):
             continue
         kept.append(part)
         try:

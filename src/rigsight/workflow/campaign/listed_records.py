@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from rigsight.records import ColumnMapping, Record
 from rigsight.records.read_record import TIME, read_stretches
 from rigsight.records.reference import signals_beside
 from rigsight.rigs import Rig
+from rigsight.units import INPUT_UNIT
 from rigsight.workflow.campaign.campaign_file import RecordTable
 from rigsight.workflow.campaign.given_simulation import checked_numbers
 from rigsight.workflow.campaign.where import Location, Where
@@ -78,7 +80,13 @@ def file_inside(path: Path, number: int, record: RecordTable, where: Where | Non
 
 
 def read_listed_record(
-    path: Path, rig: Rig, number: int, record: RecordTable, file: Path, where: Where | None = None
+    path: Path,
+    rig: Rig,
+    number: int,
+    record: RecordTable,
+    file: Path,
+    where: Where | None = None,
+    given: Collection[str] = (),
 ) -> tuple[Record, ...]:
     """Read a record as described in the file that lists it; it is split where its clock pauses.
 
@@ -94,6 +102,8 @@ def read_listed_record(
         What is listed.
     file, where
         See `file_inside`.
+    given
+        Names of the constants that hold for all records.
 
     Raises
     ------
@@ -127,6 +137,9 @@ def read_listed_record(
             header=record.header,
             comment=record.comment,
             constants=constants,
+            gain=next(
+                (c.name for c in rig.constants if INPUT_UNIT in c.unit and c.name in {*given, *constants}), ""
+            ),
             beside=signals_beside(_own(rig)),
         )
     except InputError as error:
@@ -151,7 +164,9 @@ def _columns(where: Where, own: Location, rig: Rig, record: RecordTable) -> dict
             if isinstance(column, str | int):
                 columns[signal] = ColumnMapping(column)
             else:
-                columns[signal] = ColumnMapping(column.name, column.scale, column.offset, column.unit)
+                columns[signal] = ColumnMapping(
+                    column.name, column.scale, column.offset, column.unit, column.unwrap
+                )
         except InputError as error:
             raise InputError(f"{here}: {error}") from None
     return columns

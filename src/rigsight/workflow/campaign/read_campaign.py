@@ -69,7 +69,7 @@ def read_campaign(
     read = [
         (record, stretch)
         for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
-        for stretch in read_listed_record(path, rig, number, record, file, where)
+        for stretch in read_listed_record(path, rig, number, record, file, where, table.rig.constants)
     ]
     if table.offsets == "per_record":
         outputs = [signal.name for signal in rig.outputs]

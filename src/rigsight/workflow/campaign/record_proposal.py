@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +16,14 @@ from rigsight.records import Kind, Role
 from rigsight.records.channel_summary import step_and_gaps
 from rigsight.records.channel_units import has_si, in_drive_unit, is_a
 from rigsight.records.excitation_kind import guess_amplitude, guess_kind
-from rigsight.records.formats.channel import Channel, ChannelFile, as_floats
+from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
 from rigsight.records.read_record import TIME
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, guess_file, telling
 
 BLANK = '"FILL IN"'
 """Written where nothing could be guessed; a diagnosis refuses it and names the key."""
-_LISTED = 12
+_LISTED = 200
 _COARSE = 0.5
 """Sample time [s] from which a comment asks about the unit of time."""
 
@@ -90,8 +90,11 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     InputError
         If a channel cannot be read.
     """
-    is_text = file.format == "delimited text"
-    guess = guess_file(file.channels, is_text, rigs)
+    guess = guess_file(file.channels, rigs)
+    no_time = ""
+    if guess.time.channel is not None and not _rises(guess.time.channel):
+        no_time = f"{quoted(guess.time.channel.name)} does not increase"
+        guess = replace(guess, time=replace(guess.time, channel=None))
     # With several inputs, the kind cannot be guessed from one of them.
     driven = guess.signals[0] if len(guess.rig.inputs) == 1 else None
     kind: Kind = "operation"
@@ -106,7 +109,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     if driven is not None and amplitude:
         unit = f" [{driven.si}]" if has_si(driven.si) else ""
         lines.append(f"amplitude = {amplitude:g}  # of {driven.signal}{unit}, guessed; check")
-    timing, timing_blanks = _timing(guess)
+    timing, timing_blanks = _timing(guess, no_time)
     columns, column_blanks = _columns(guess, file.channels)
     lines += timing
     if columns:
@@ -132,13 +135,21 @@ def _in_si(samples: NDArray[np.float64], guess: Guess) -> NDArray[np.float64]:
     return samples
 
 
-def _timing(guess: FileGuess) -> tuple[list[str], int]:
+def _rises(time: Channel) -> bool:
+    try:
+        return step_and_gaps(as_stamps(time.load()))[0] is not None
+    except InputError:
+        return False
+
+
+def _timing(guess: FileGuess, no_time: str) -> tuple[list[str], int]:
     """Return the keys of timing other than the time column, and the number of blanks."""
     found = [one.channel for one in guess.signals if one.channel is not None]
     if guess.time.is_clear or guess.time.candidates:
         return [], 0
     if not found or any(channel.axis is None for channel in found):
-        return [f"dt = {BLANK}  # sample time [s]: no channel of time was found"], 1
+        why = no_time or "no channel of time was found"
+        return [f"dt = {BLANK}  # sample time [s]: {why}"], 1
     steps = []
     for channel in found:
         with suppress(InputError):
@@ -167,8 +178,7 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
         elif one.channel is not None:
             lines += _column(one)
         elif one.candidates:
-            listed = ", ".join(quoted(name) for name in one.candidates[:_LISTED])
-            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {listed}")
+            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {_listed(one.candidates)}")
             blanks += 1
         elif one.signal in guess.rig.absent_inputs and not left:
             lines.append(f"# {one.signal} =    # {_unit_of(one)}not recorded: taken as 0 (no excitation)")
@@ -206,8 +216,13 @@ def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
     """Return the channels that belong to no signal yet; empty if there are none."""
     known = (guess.time, guess.reference, *guess.signals)
     taken = {one.channel.name for one in known if one.channel is not None}
-    free = [quoted(channel.name) for channel in channels if channel.name not in taken]
-    return f"one of: {', '.join(free[:_LISTED])}" if free else ""
+    free = [channel.name for channel in channels if channel.name not in taken]
+    return f"one of: {_listed(free)}" if free else ""
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _LISTED} more, see rigsight inspect" if len(names) > _LISTED else ""
+    return ", ".join(quoted(name) for name in names[:_LISTED]) + more
 
 
 def _coarse_step(time: Channel) -> float | None:

@@ -14,6 +14,7 @@ from rigsight.rigs import Rig
 
 _FITTING_UNIT = 0.5
 _CLEAR = 2.0
+_REGRESSION = ("x", "y")
 
 
 @dataclass(frozen=True)
@@ -72,22 +73,20 @@ def telling(rig: Rig) -> tuple[str, ...]:
     return (*(signal.name for signal in rig.inputs), *outputs)
 
 
-def guess_file(channels: Sequence[Channel], is_text: bool, rigs: Iterable[Rig]) -> FileGuess:
+def guess_file(channels: Sequence[Channel], rigs: Iterable[Rig]) -> FileGuess:
     """Return the rig that matches the channels best, with the channel of each signal.
 
     Parameters
     ----------
     channels
         Of an open file; none is read.
-    is_text
-        True for delimited text, whose row of units is not applied when the file is read.
     rigs
         Those that come into question.
     """
-    guesses = [_guess_rig(rig, channels, is_text) for rig in rigs]
+    guesses = [_guess_rig(rig, channels) for rig in rigs]
     found = min(guesses, key=_unlikely)
     found = replace(found, reference=_guess_reference(found, channels))
-    return replace(found, signals=_completed_by_unit(found, channels, is_text))
+    return replace(found, signals=_completed_by_unit(found, channels))
 
 
 def _guess_reference(found: FileGuess, channels: Sequence[Channel]) -> Guess:
@@ -126,7 +125,7 @@ def _is_spoken_of(guess: FileGuess) -> bool:
     )
 
 
-def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: bool) -> tuple[Guess, ...]:
+def _completed_by_unit(found: FileGuess, channels: Sequence[Channel]) -> tuple[Guess, ...]:
     """Return the guesses; a signal without a match takes the only remaining channel with its unit, whatever its name.
 
     The only output without a channel also takes the only remaining channel without a unit; an input may have no channel.
@@ -141,7 +140,7 @@ def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: b
         fitting = [c for c in channels if c not in taken and any(is_a(_unit_of(c) or "", u) for u in units)]
         rivals = [own for own in guesses if not own.is_clear and own.si == guess.si]
         if len(fitting) == len(rivals) == 1:
-            guesses[i] = _of_channel(guess, fitting[0], is_text)
+            guesses[i] = _of_channel(guess, fitting[0])
     needed = (*(signal.name for signal in found.rig.inputs), *found.rig.required_outputs)
     lacking = [i for i, own in enumerate(guesses) if own.signal in needed and own.channel is None]
     taken = [found.time.channel, found.reference.channel, *(own.channel for own in guesses)]
@@ -150,22 +149,20 @@ def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: b
         own, alone = guesses[lacking[0]], left[0]
         unit = _unit_of(alone)
         if not own.candidates and (unit is None or not has_si(own.si) or is_a(unit, own.si)):
-            guesses[lacking[0]] = replace(_of_channel(own, alone, is_text), is_alone=True)
+            guesses[lacking[0]] = replace(_of_channel(own, alone), is_alone=True)
     return tuple(guesses)
 
 
-def _of_channel(guess: Guess, channel: Channel, is_text: bool) -> Guess:
-    # A row of units in delimited text is not applied when the file is read, so it does not count as stated.
-    is_stated = channel.unit is not None and not is_text
-    return Guess(guess.signal, guess.si, channel, _unit_of(channel), is_stated)
+def _of_channel(guess: Guess, channel: Channel) -> Guess:
+    return Guess(guess.signal, guess.si, channel, _unit_of(channel), channel.unit is not None)
 
 
 def _unit_of(channel: Channel) -> str | None:
     return channel.unit or split_unit(channel.name)[1]
 
 
-def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGuess:
-    time, _ = _guess(TIME, "s", channels, (), is_text)
+def _guess_rig(rig: Rig, channels: Sequence[Channel]) -> FileGuess:
+    time, _ = _guess(TIME, "s", channels, ())
     taken = [time.channel] if time.channel is not None else []
     signals = (*rig.inputs, *rig.outputs)
     found, score = {}, 0.0
@@ -173,7 +170,7 @@ def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGues
     for signal in sorted(
         signals, key=lambda s: -max((closeness(c.name, s.name) for c in channels), default=0.0)
     ):
-        guess, closest = _guess(signal.name, signal.unit, channels, taken, is_text)
+        guess, closest = _guess(signal.name, signal.unit, channels, taken)
         if guess.channel is not None:
             taken.append(guess.channel)
             score += closest
@@ -181,8 +178,15 @@ def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGues
     return FileGuess(rig, time, tuple(found[signal.name] for signal in signals), score / len(signals))
 
 
+def _are_of_regression(channels: Sequence[Channel]) -> bool:
+    """Return True if a file has X and y and nothing that is called an input: X may be the input, y the output."""
+    called = {channel.name for channel in channels}
+    has_input = any(closeness(name, "u") >= _CLEAR for name in called)
+    return "X" in called and bool(called & {"y", "Y"}) and not has_input
+
+
 def _guess(
-    signal: str, si: str, channels: Sequence[Channel], taken: Sequence[Channel], is_text: bool
+    signal: str, si: str, channels: Sequence[Channel], taken: Sequence[Channel]
 ) -> tuple[Guess, float]:
     """Return the possible channels of a signal, and how well they match."""
     scores: list[tuple[float, Channel]] = []
@@ -197,10 +201,14 @@ def _guess(
         return Guess(signal, si), 0.0
     best = max(score for score, _ in scores)
     closest = [channel for score, channel in scores if score == best]
+    if signal in _REGRESSION and _are_of_regression(channels):
+        return Guess(
+            signal, si, candidates=tuple(c.name for c in channels if c.name.lower() in _REGRESSION)
+        ), 0.0
     # With several groups, the time channel is the one in the group of the signals.
     if len(closest) > 1 and not (signal == TIME and len({channel.short_name for channel in closest}) == 1):
         return Guess(signal, si, candidates=tuple(channel.name for channel in closest)), 0.0
     channel = closest[0]
     if best < _CLEAR - _FITTING_UNIT:
         return Guess(signal, si, candidates=(channel.name,)), 0.0
-    return _of_channel(Guess(signal, si), channel, is_text), best
+    return _of_channel(Guess(signal, si), channel), best
