@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.search.starts import start_values
-from rigsight.identify import FitResult, characteristic_scales
+from rigsight.identify import GreyBoxFit, characteristic_scales, off_bounds
 from rigsight.records import Record
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import compose
 
 
 def start_with_effects(
@@ -20,10 +17,7 @@ def start_with_effects(
     held: Mapping[str, float],
     sizes: Mapping[str, float],
 ) -> dict[str, float]:
-    """Return the parameters of the better of two fits: from the given values, and from sizes that the records suggest.
-
-    A given size of zero lies on a bound, from where a fit may not find its way: the second fit begins with the rig alone and
-    adds the effects one after another, each at that of its typical sizes from which the error is smallest.
+    """Return the parameters of the best of several fits: from the given values, and from inside of bounds at which they lie.
 
     Parameters
     ----------
@@ -32,36 +26,19 @@ def start_with_effects(
     windows
         The estimation records, cut as they are fitted.
     start
-        Start values of the rig's own parameters.
+        Start values of the rig's own parameters, without the effects.
     held
         Parameters that keep their value.
     sizes
         How much each output moves.
     """
-    rig, modelled = campaign.rig, campaign.modelled
+    structure = compose(campaign.rig, campaign.modelled)
     begin = {**campaign.constants, **start, **held}
-    scales = characteristic_scales(rig, windows, begin)
-    cut = tuple(windows)
-    context = FitContext(
-        rig=rig, estimation=cut, scoring=cut, look=cut, scales=scales, noise=sizes, held=frozenset(held)
-    )
-
-    def fitted(structure: Structure, values: Mapping[str, float]) -> FitResult:
-        fixed = {*held, *campaign.constants}
-        free = [p.name for p in structure.parameters if p.fitted and p.name not in fixed]
-        return context.problem(structure, windows).fit(values, free)
-
-    def error_at(structure: Structure, values: Mapping[str, float]) -> float:
-        return context.problem(structure, windows).fit(values, (), finish=False).cost
-
-    from_given = fitted(compose(rig, modelled), {**begin, **campaign.given, **held})
-    grown = fitted(compose(rig), begin)
-    for count, effect in enumerate(modelled, 1):
-        structure = compose(rig, modelled[:count])
-        starts = list(start_values(context, structure, effect, grown, {}))
-        if not starts:
-            return from_given.values
-        best = min(starts, key=lambda values: error_at(structure, values)) if len(starts) > 1 else starts[0]
-        grown = fitted(structure, best)
-    found = min((from_given, grown), key=lambda fit: fit.cost if math.isfinite(fit.cost) else math.inf)
-    return found.values
+    scales = characteristic_scales(campaign.rig, windows, begin)
+    fixed = {*held, *campaign.constants}
+    free = [p.name for p in structure.parameters if p.fitted and p.name not in fixed]
+    problem = GreyBoxFit(structure, windows, scales, sizes)
+    given = {**begin, **campaign.given, **held}
+    starts = [given, {**given, **begin}]
+    starts += [inside for own in starts if (inside := off_bounds(structure, own, free, scales)) is not None]
+    return min((problem.fit(own, free) for own in starts), key=lambda fit: fit.cost).values
