@@ -48,7 +48,7 @@ class PlainRatio(FrequencyResponse):
 
     def free_motion(self, weights: NDArray[np.float64], poles: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return the free motion with these weights of the basis over time, without its mean, shape (n_samples,)."""
-        omega = 2.0 * np.pi * np.fft.rfftfreq(self.n_samples, self.dt)[1:]
+        omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(self.n_samples, self.dt)[1:], dtype=np.float64)
         lines = _free_motions(omega, self.dt, poles) @ weights
         return np.asarray(np.fft.irfft(np.append(0.0, lines), self.n_samples))
 

@@ -140,7 +140,7 @@ class Linearization:
         omega
             Angular frequencies [rad/s], shape (n_frequencies,); none may be a pole.
         """
-        s = 1j * np.asarray(omega, dtype=np.float64)[:, None, None]
+        s = np.asarray(1j * np.asarray(omega, dtype=np.float64)[:, None, None], dtype=np.complex128)
         inner = self._states_by(s, self.input_matrix)
 
         def direct(parts: Floats) -> NDArray[np.complex128]:
@@ -151,9 +151,9 @@ class Linearization:
             return np.asarray(found)
         late = self.late
         change = np.exp(-s * late.delays) - 1.0
-        signals = np.linalg.solve(
-            np.eye(late.delays.size) - self._loop(s), late.from_states @ inner + direct(late.from_inputs)
-        )
+        unlooped: NDArray[np.complex128] = np.eye(late.delays.size) - self._loop(s)
+        shown: NDArray[np.complex128] = late.from_states @ inner + direct(late.from_inputs)
+        signals = np.linalg.solve(unlooped, shown)
         onto = self.output_matrix @ self._states_by(s, late.on_states) + late.on_outputs
         return np.asarray(found + onto @ (np.swapaxes(change, 1, 2) * signals))
 
@@ -184,7 +184,9 @@ class Linearization:
         omega = np.union1d(
             omega, np.linspace(0.0, _MOST_TURNS * 0.1 / float(np.max(late.delays)), _MOST_TURNS)[1:]
         )
-        turned = np.linalg.det(np.eye(late.delays.size) - self._loop(1j * omega[:, None, None]))
+        turned = np.linalg.det(
+            np.eye(late.delays.size) - self._loop(np.asarray(1j * omega[:, None, None], dtype=np.complex128))
+        )
         return bool(abs(np.unwrap(np.angle(turned))[-1] - np.angle(turned[0])) > np.pi / 2.0)
 
     def transfer_function(self, source: str, response: str) -> TransferFunction:

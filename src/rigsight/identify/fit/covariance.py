@@ -81,13 +81,13 @@ def colored_covariance(
     if for_intervals and n_common:
         inverse = sandwich_covariance(bread, bread, derivative_error)[:, :n_common]
         inverse = np.where(np.isfinite(inverse), inverse, 0.0)
-        columns = [
+        places = [
             np.concatenate([np.arange(n_common), np.arange(size) + n_common + sum(own_sizes[:index])])
             for index, size in enumerate(own_sizes)
         ]
         reads = [
             (residual, derivative @ inverse[place.astype(np.intp)], count)
-            for (residual, derivative), place, count in zip(sensitivities, columns, stacked, strict=True)
+            for (residual, derivative), place, count in zip(sensitivities, places, stacked, strict=True)
         ]
         widened = np.sqrt(_interval_factors(reads))
         covariance = covariance * np.outer(widened, widened)

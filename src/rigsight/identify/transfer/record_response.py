@@ -212,6 +212,10 @@ class _Local:
         if not moves_freely or periodic is not self.record or instrument is not None:
             return found, None, None
         every = plain_ratio(self.record, found, self.hold)
+        assert every.variance is not None
+        if np.mean(np.abs(every.values) ** 2 > _CLEAR * every.variance) < _LEAST_SHARE:
+            # Below the noise for which a local model can be trusted, its noise is too small, and so are errors by it.
+            return found, None, None
         plain = _clear(every, _BAND_LINES[self.method], _CLEAR, _LEAST_SHARE)
         plain = plain if self.band is None else plain.band(*self.band)
         try:

@@ -280,7 +280,7 @@ class _Problem:
         for omega_b, zeta in itertools.product(np.geomspace(low, high, _GRID_FREQUENCIES), dampings):
             theta = self.form.vector(float(omega_b), float(zeta), 0.0)
             shape = weights * self.form.response(omega, theta)
-            told = weights * goal
+            told = (weights * goal).astype(np.complex128)
             if self.magnitude_only:
                 shape = np.abs(shape).astype(np.complex128)
             else:
