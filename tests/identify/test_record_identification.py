@@ -40,7 +40,7 @@ def test_the_amplitude_is_that_of_the_sweep_also_if_it_begins_slowly() -> None:
 
 def test_offsets_of_a_sweep_are_known_far_better_than_its_motion_is_large() -> None:
     record = measured(log_sweep(DT * np.arange(8000), 0.5, 0.5, 60.0), "sweep")
-    found = identify_record(record, RUNNING_GEAR, CONSTANTS, True, EstimationOptions()).offsets
+    found = identify_record(record, RUNNING_GEAR, CONSTANTS, EstimationOptions()).offsets
     assert found is not None
     for name in ("psi_off", "y_off"):
         assert abs(found.values[name] - VALUES[name]) < 4.0 * found.standard_errors[name]
@@ -53,7 +53,7 @@ def test_a_command_that_is_constant_from_the_first_sample_is_a_step_with_which_t
     record = whole.slice(200, t.size)
     assert np.ptp(record["u"]) == 0.0
     assert measured_amplitude(record, RUNNING_GEAR)[0] == pytest.approx(0.6)
-    found = identify_record(record, RUNNING_GEAR, CONSTANTS, True, EstimationOptions())
+    found = identify_record(record, RUNNING_GEAR, CONSTANTS, EstimationOptions())
     motion = found.paths[0].physical
     assert motion is not None
     assert found.offsets is not None
@@ -64,11 +64,25 @@ def test_a_command_that_is_constant_from_the_first_sample_is_a_step_with_which_t
 
 def test_a_record_that_is_too_short_is_told_what_would_help() -> None:
     record = measured(log_sweep(DT * np.arange(600), 1e-4, 0.6, 60.0), "sweep")
-    motion = identify_record(record, RUNNING_GEAR, CONSTANTS, True, EstimationOptions()).paths[0]
+    motion = identify_record(record, RUNNING_GEAR, CONSTANTS, EstimationOptions()).paths[0]
     assert motion.fit is None
     assert motion.problem is not None
     assert "does not determine" in motion.problem
     assert "Record for longer" in motion.problem
+
+
+def test_more_data_are_not_advised_where_the_response_is_another() -> None:
+    t, rng = DT * np.arange(8000), np.random.default_rng(3)
+    drive = log_sweep(t, 0.5, 0.5, 60.0)
+    # A resonance inside the band whose reading is rectified: a response that noise does not blur, but that is no PT2.
+    structure = compose(RUNNING_GEAR, [])
+    own = Record("own", DT, {"u": drive}, {"u": "A", "psi": "rad"}, kind="sweep")
+    psi = np.abs(simulate(structure, VALUES, own)["psi"]) + rng.normal(0.0, 2e-5, t.size)
+    problem = identify_record(
+        own.with_signals(psi=psi), RUNNING_GEAR, CONSTANTS, EstimationOptions()
+    ).motion.problem
+    assert problem
+    assert "Record for longer" not in problem
 
 
 def test_a_signal_of_the_wrong_sign_is_told_also_where_friction_spoils_the_phases() -> None:
@@ -77,14 +91,12 @@ def test_a_signal_of_the_wrong_sign_is_told_also_where_friction_spoils_the_phase
     rng = np.random.default_rng(3)
     structure = compose(RUNNING_GEAR, [effect_named("coulomb_friction")])
     psi = simulate(structure, {**VALUES, "T_c": 0.02}, driven)["psi"] + rng.normal(0.0, 2e-5, t.size)
-    right = identify_record(
-        driven.with_signals(psi=psi), RUNNING_GEAR, CONSTANTS, True, EstimationOptions()
-    ).paths[0]
+    right = identify_record(driven.with_signals(psi=psi), RUNNING_GEAR, CONSTANTS, EstimationOptions()).paths[
+        0
+    ]
     assert right.fit is not None
     assert "magnitudes only" in right.fit.message
-    turned = identify_record(
-        driven.with_signals(psi=-psi), RUNNING_GEAR, CONSTANTS, True, EstimationOptions()
-    )
+    turned = identify_record(driven.with_signals(psi=-psi), RUNNING_GEAR, CONSTANTS, EstimationOptions())
     assert "Change the sign" in turned.paths[0].problem
 
 
@@ -114,7 +126,7 @@ def test_a_sweep_that_begins_with_the_record_gives_its_numbers(
     if method != "local_rational" and (own is STIFF or first):
         pytest.skip("one rig shows that every method has the same fit")
     found = identify_record(
-        swept_at_once(shape, own, first), RUNNING_GEAR, CONSTANTS, True, EstimationOptions(method)
+        swept_at_once(shape, own, first), RUNNING_GEAR, CONSTANTS, EstimationOptions(method)
     )
     assert not found.warnings
     for name, (value, error) in found.estimates.items():

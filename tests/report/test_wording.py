@@ -40,6 +40,19 @@ def test_the_verdict_is_one_plain_sentence(
     assert "nan" not in sentence
 
 
+def test_an_effect_has_no_share_of_what_refitting_closed(variant: Callable[[str], Diagnosis]) -> None:
+    named = variant("effect")
+    # In floors: 101 as given, 11 refitted, 6 with the effect, which closes half and not 95 %.
+    gap = {
+        name: replace(g, before=1.01, reidentified=0.11, after=0.06, noise_floor=0.01)
+        for name, g in named.gap.items()
+    }
+    sentence = verdict_sentence(replace(named, gap=gap))
+    assert "closes 50 % of the gap that refitting leaves" in sentence
+    refitted = verdict_sentence(replace(variant("parameters"), gap=gap))
+    assert "closes 95 % of the gap" in refitted
+
+
 def test_no_gap_far_above_the_floor_says_that_the_floor_seems_too_low(
     variant: Callable[[str], Diagnosis],
 ) -> None:

@@ -58,4 +58,4 @@ def has_stiffness(campaign: Campaign) -> bool:
     campaign
         The campaign.
     """
-    return not (campaign.rig.has_one_motion and campaign.parameters.get("k") == 0.0)
+    return campaign.absent_spring is None

@@ -80,7 +80,8 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
     either_sign = np.array([p.lower < 0.0 for p in parameters]) & (np.abs(values) < _OWN_SIZE * scales)
     # So would that of a parameter at its bound of zero, as a damping that is none.
     least = noise * conditional_errors(np.vstack(model.rows)) / POORLY_KNOWN
-    at_zero = np.array([p.lower == 0.0 and not p.logarithmic for p in parameters]) & (values < least)
+    known = [np.isfinite(result.standard_errors[name]) for name in names]
+    at_zero = np.array([p.lower == 0.0 and not p.logarithmic for p in parameters]) & known & (values < least)
     sizes = np.where(either_sign | (at_zero & (values < scales)) | (values == 0.0), scales, values)
     root = np.vstack([_triangle(rows) for rows in model.rows]) * sizes / noise
     return Information(

@@ -227,7 +227,7 @@ def _by_transfer_functions(
             found.append(record)
             stage.finished(record.record.name)
         if all(record.motion.problem for record in found):
-            followed = _over_time_alone(campaign, found, options, n_jobs)
+            followed = _over_time_alone(campaign, options, n_jobs)
             if followed is not None:
                 return followed
         joint = identify_jointly(campaign, found)
@@ -261,25 +261,26 @@ def _by_transfer_functions(
     return identification
 
 
-def _over_time_alone(
-    campaign: Campaign, found: Sequence[RecordIdentification], options: EstimationOptions, n_jobs: int
-) -> Identification | None:
-    """Return the identification in the time domain, for records without a transfer function; None if it does not follow them.
+def _over_time_alone(campaign: Campaign, options: EstimationOptions, n_jobs: int) -> Identification | None:
+    """Return the identification in the time domain of a rig that may have no spring; None if it does not follow the records.
 
-    A rig that hardly returns to rest has no break frequency in a record, but moves as its equations say.
+    Such a rig has no break frequency in a record, but moves as its equations say. Its stiffness is estimated only if it shows, as
+    one that is given as zero.
     """
-    if options.method not in METHODS_OF_ANY_RIG:
+    rig = campaign.rig
+    loose = {p.name: 0.0 for p in rig.parameters if p.name == str(rig.motion.stiffness) and p.lower <= 0.0}
+    if not (loose and rig.is_driven) or options.method not in METHODS_OF_ANY_RIG:
         return None
+    without = replace(campaign, parameters={**campaign.parameters, **loose})
     try:
-        result = identify_any_rig(campaign, options, n_jobs, silent)
+        result = identify_any_rig(without, options, n_jobs, silent)
     except RigsightError:
         return None
     scores = [score for score in result.joint.scores if score.role == "estimation"]
     if any(not value < UNSERVED for score in scores for value in score.nrmse.values()):
         return None
-    problems = [f"Record '{r.record.name}' gives no transfer function: {r.motion.problem}" for r in found]
-    note = "All records were fitted in the time domain instead."
-    return replace(result, warnings=(*problems, note, *result.warnings))
+    note = "No record shows a transfer function of these equations: all were fitted in the time domain."
+    return replace(result, warnings=(note, *result.warnings))
 
 
 def write_identification(

@@ -68,7 +68,7 @@ def with_weighed_spring(campaign: Campaign) -> Campaign:
         else f"{name} = 0 is held in all fits"
     )
     note = (
-        f"{name} = 0 is given, no spring. Estimated from windows of {length:.3g} s, {name} is {value:.3g} +/- {std:.2g} {unit} "
+        f"{name} = 0 stands for no spring. Estimated from windows of {length:.3g} s, {name} is {value:.3g} +/- {std:.2g} {unit} "
         f"and leaves {share:.2f} times the error without a spring: {done}."
     )
     return replace(campaign, spring_released=released, notes=(*campaign.notes, note))
