@@ -109,6 +109,10 @@ def write_samples(format_name: str, folder: Path) -> list[Path]:
         found.append(_matlab_groups(folder, record))
     if format_name == "HDF5":
         found += _hdf5(folder, record)
+    if format_name == "TDMS":
+        found.append(_tdms_clocks(folder, record))
+    if format_name == "MDF4":
+        found.append(_mdf_rasters(folder, record))
     return found
 
 
@@ -121,6 +125,11 @@ def _texts(folder: Path) -> list[Path]:
         "blanks.txt": "% t u psi y\n" + _lines(table, "  "),
         "quoted.csv": '"t","u","psi","y, mm"\n' + _lines(table, ","),
         "nothing.csv": _lines(table, ","),
+        "two_clocks.csv": "t_u,u,t_psi,psi\n" + _lines(table[:, [0, 1, 0, 2]] + [0.0, 0.0, 0.004, 0.0], ","),
+        "sentinels.csv": "t,u,psi,y\n" + _lines(np.where(table > 0.99, 9.9e37, table), ","),
+        "thousands.csv": "t;u;psi\n"
+        + "".join(f"{row[0]:.2f};{4e4 * row[1]:,.1f};{row[2]:.4f}\n" for row in table),
+        "names.csv": "a1 torque cmd [Nm],X_Value,control[0]\n" + _lines(table[:, [1, 0, 2]], ","),
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -147,6 +156,8 @@ def _matlab(folder: Path, record: dict[str, np.ndarray], packed: bool) -> list[P
     runs = np.array([[(record["t"], {"u": record["u"]})] * 2] * 2, dtype=[("t", object), ("drive", object)])
     logged = {"logsout": {"time": record["t"][:, None], "signals": signals}, "runs": runs}
     savemat(folder / "others.mat", record | others, do_compression=packed)
+    late = {"time": record["t"] + 0.004, "psi": record["psi"]}
+    logged |= {"scope_1": {"time": record["t"], "u": record["u"]}, "scope_2": late}
     savemat(folder / "logged.mat", logged, do_compression=packed)
     return [folder / "others.mat", folder / "logged.mat"]
 
@@ -173,7 +184,13 @@ def _matlab_groups(folder: Path, record: dict[str, np.ndarray]) -> Path:
 def _hdf5(folder: Path, record: dict[str, np.ndarray]) -> list[Path]:
     import h5py
 
-    plain, tables = folder / "contiguous.h5", folder / "tables.h5"
+    plain, tables, packed = folder / "contiguous.h5", folder / "tables.h5", folder / "packed.h5"
+    with h5py.File(packed, "w") as file:
+        for name, samples in record.items():
+            file[name] = np.round(1e3 * samples).astype(np.int16)
+            file[name].attrs.update(
+                {"scale_factor": 1e-3, "add_offset": 0.0, "_FillValue": np.int16(-32768), "units": "mm"}
+            )
     with h5py.File(plain, "w") as file:
         for name, samples in record.items():
             file[name] = samples
@@ -181,7 +198,35 @@ def _hdf5(folder: Path, record: dict[str, np.ndarray]) -> list[Path]:
         file["run"] = np.column_stack(list(record.values()))
         file["note"] = "text"
         file["alias"] = h5py.SoftLink("/run")
-    return [plain, tables]
+    return [plain, tables, packed]
+
+
+def _tdms_clocks(folder: Path, record: dict[str, np.ndarray]) -> Path:
+    """Two waveforms that start at different times, and one with stamps of its own."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    path, start = folder / "clocks.tdms", np.datetime64("2026-11-27T08:00:00")
+    with TdmsWriter(path) as writer:
+        for i, name in enumerate(("u", "psi")):
+            own = {"wf_start_time": start + np.timedelta64(4 * i, "ms"), "wf_increment": 0.01}
+            writer.write_segment([ChannelObject(f"scope {i}", name, record[name], own)])
+        stamps = start + np.round(1e6 * record["t"]).astype("timedelta64[us]")
+        writer.write_segment([ChannelObject("slow", "t", stamps), ChannelObject("slow", "y", record["y"])])
+    return path
+
+
+def _mdf_rasters(folder: Path, record: dict[str, np.ndarray]) -> Path:
+    """Groups of two rasters, and a channel whose first samples are invalid."""
+    from asammdf import MDF, Signal
+
+    path, t = folder / "rasters.mf4", record["t"]
+    invalid = np.arange(t.size) < 5
+    with MDF(version="4.10") as file:
+        file.append([Signal(record["u"], t, name="u", unit="A")])
+        file.append([Signal(record["psi"][::2], t[::2], name="psi", unit="rad")])
+        file.append([Signal(record["y"], t, name="y", unit="m", invalidation_bits=invalid)])
+        file.save(path, overwrite=True)
+    return path
 
 
 def model_texts() -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.rigs import read_rig_file
+from rigsight.rigs.reading.rig_file import rig_of_text
 
 Run = Callable[..., tuple[int, str, str]]
 CART = Path(__file__).parents[1] / "robots" / "models" / "cart_pole.xml"
@@ -22,7 +23,11 @@ def test_a_model_becomes_a_rig_file_and_a_campaign_once_records_are_there(tmp_pa
     assert f"Written: {folder / 'cart_pole.toml'} (2 joints)" in stdout
     assert "agrees with MuJoCo, without dry friction" in stdout
     assert "columns t, push_ctrl, slider_position, hinge_angle" in stdout
-    assert read_rig_file(folder / "cart_pole.toml").name == "cart_pole"
+    rig_file = folder / "cart_pole.toml"
+    assert read_rig_file(rig_file).name == "cart_pole"
+    assert "[parameters.NAME]" in stdout
+    released = rig_file.read_text("utf-8").replace("[constants.hinge_inertia]", "[parameters.hinge_inertia]")
+    assert "hinge_inertia" in {p.name for p in rig_of_text(released).parameters}
     t = 0.01 * np.arange(200)
     rows = np.column_stack([t, np.sin(t), 0.1 * np.sin(t), 0.3 + 0.01 * np.sin(t)])
     np.savetxt(

@@ -185,6 +185,11 @@ def _init_from_mjcf(
         )
     for note in draft.notes:
         typer.echo(note)
+    if not as_it_is:
+        typer.echo(
+            f"Gains, filter times and masses are constants. To identify one, rename its table in {written.path} from "
+            "[constants.NAME] to [parameters.NAME]."
+        )
     for what in draft.left_out:
         typer.echo(f"Not taken over: {what}")
     if written.campaign is None:
