@@ -354,7 +354,7 @@ def test_the_gain_of_an_input_in_another_unit_is_asked_about(tmp_path: Path) -> 
     (tmp_path / "campaign.toml").write_text(
         '[rig]\nmodel = "axis"\n[rig.constants]\ngain = 2.0\n[[records]]\nfile = "a.csv"\n'
     )
-    with pytest.raises(InputError, match="'u': is in kN.*gain counts per N"):
+    with pytest.raises(InputError, match=r"'u': is in kN.*gain counts per N"):
         read_campaign(tmp_path)
     with (tmp_path / "campaign.toml").open("a") as file:
         file.write('columns = { u = { name = "u", unit = "kN", unwrap = false } }\n')
