@@ -51,5 +51,5 @@ def test_a_rig_that_can_rest_anywhere_may_lie_anywhere(two_masses: Rig) -> None:
 
 
 def test_runs_forward_and_backward_are_no_other_zero(two_masses: Rig) -> None:
-    assert told(two_masses, runs(1.5, push=0.9)) == []
-    assert len(told(two_masses, runs(1.5))) == 1
+    assert told(two_masses, runs(3.0, push=1.8)) == []
+    assert len(told(two_masses, runs(3.0))) == 1

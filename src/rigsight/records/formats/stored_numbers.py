@@ -50,7 +50,10 @@ class Stored:
     @classmethod
     def of_json(cls, content: Mapping[str, Any]) -> Stored:
         """Return what `dataclasses.asdict` and JSON made of one: tuples are lists there."""
-        return cls(**{key: tuple(own) if isinstance(own, list) else own for key, own in content.items()})
+        fields: dict[str, Any] = {
+            k: tuple(own) if isinstance(own, list) else own for k, own in content.items()
+        }
+        return cls(**fields)
 
     def quantity(self, stored: NDArray[Any]) -> NDArray[Any]:
         """Return the quantity, shape (n_samples,), NaN where the file says that a reading is missing or invalid."""
