@@ -60,6 +60,11 @@ def closeness(name: str, signal: str) -> float:
     return 1.0 if any(word in single for word in known if len(word) > 2) else 0.0
 
 
+def plain_words(name: str) -> str:
+    """Return a name without its unit in lower case, words apart."""
+    return _words(split_unit(name)[0])
+
+
 def _plain(name: str) -> str:
     """Return a name in lower case, words apart, without numbers at its end."""
     words = _words(name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,10 @@ class ColumnMapping:
         Value added after scaling or conversion of the file's unit, in the SI unit.
     unit
         Unit of the column, instead of scale and offset: ``"deg"``.
+    time
+        Name or number of the column of its time, where signals have clocks of their own and the file does not show which.
+    file
+        File that holds the column, where it is another than that of the record.
 
     Raises
     ------
@@ -37,6 +42,8 @@ class ColumnMapping:
     scale: float | None = None
     offset: float | None = None
     unit: str | None = None
+    time: str | int | None = None
+    file: Path | None = None
 
     def __post_init__(self) -> None:
         if self.scale is not None and (not math.isfinite(self.scale) or self.scale == 0.0):
@@ -124,11 +131,15 @@ class Columns:
     units
         Signal name -> unit stated in a dedicated field of the file.
     axes
-        Signal name -> time stamps [s], shape (n_samples,), where the signals do not share one axis; else empty.
+        Signal name -> time stamps, shape (n_samples,), where the signals do not share one axis; else empty. In the unit of time.
+    clocks
+        Signal name -> how its time is called, where `axes` has it.
     row
         Name of a row in messages: ``"line"`` of a text, ``"sample"`` otherwise.
     names
         Names of all columns in the file.
+    origins
+        Signal name -> moment from which its time counts, where the file says so.
     """
 
     values: Mapping[str, NDArray[np.float64]]
@@ -137,5 +148,7 @@ class Columns:
     notes: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     axes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    clocks: Mapping[str, str] = field(default_factory=dict)
     row: str = "line"
     names: tuple[str, ...] = ()
+    origins: Mapping[str, np.datetime64] = field(default_factory=dict)

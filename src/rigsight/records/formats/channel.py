@@ -45,6 +45,8 @@ class TimeAxis:
         Reads stored stamps; None for an even axis.
     unit
         Of dt, t0 and stamps.
+    origin
+        Moment from which they count, the same for all channels of a file; None where the file does not say.
     """
 
     n_samples: int
@@ -52,6 +54,7 @@ class TimeAxis:
     t0: float = 0.0
     load: Load | None = None
     unit: str = "s"
+    origin: np.datetime64 | None = None
 
     def stamps(self) -> NDArray[np.float64]:
         """Return the time stamps, shape (n_samples,)."""
@@ -76,6 +79,8 @@ class Channel:
         What the file states, None where it states none.
     axis
         Its own time; None where time is a channel like any other.
+    origin
+        Of a channel of dates, the moment from which its seconds count.
     """
 
     name: str
@@ -83,6 +88,7 @@ class Channel:
     load: Load
     unit: str | None = None
     axis: TimeAxis | None = None
+    origin: np.datetime64 | None = None
 
     @property
     def short_name(self) -> str:

@@ -79,10 +79,18 @@ def _answer(answers: IO[bytes], content: dict[str, Any], data: bytes = b"") -> N
 def _contents(file: ChannelFile, axes: list[TimeAxis]) -> dict[str, Any]:
     return {
         "channels": [
-            [one.name, one.n_samples, one.unit, None if one.axis is None else axes.index(one.axis)]
+            [
+                one.name,
+                one.n_samples,
+                one.unit,
+                None if one.axis is None else axes.index(one.axis),
+                None if one.origin is None else str(one.origin),
+            ]
             for one in file.channels
         ],
-        "axes": [[axis.n_samples, axis.unit] for axis in axes],
+        "axes": [
+            [axis.n_samples, axis.unit, None if axis.origin is None else str(axis.origin)] for axis in axes
+        ],
         "refused": [[one.name, one.reason] for one in file.refused],
     }
 

@@ -33,12 +33,17 @@ Checked = TypeVar("Checked", bound=FileTable)
 
 
 class ColumnTable(FileTable):
-    """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset; or ``unit = "mA"`` instead."""
+    """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset; or ``unit = "mA"`` instead.
+
+    ``time`` names the column of its time, ``file`` the file that holds both, where they are not those of the record.
+    """
 
     name: str | int
     scale: Number | None = None
     offset: Number | None = None
     unit: Annotated[str, Field(min_length=1)] | None = None
+    time: str | int | None = None
+    file: Annotated[str, Field(min_length=1)] | None = None
 
 
 class RigTable(FileTable):
@@ -63,6 +68,8 @@ class RecordTable(FileTable):
     hold: Hold = "foh"
     dt: Seconds | None = None
     resample: Seconds | None = None
+    start: Number | None = None
+    end: Number | None = None
     columns: dict[str, str | int | ColumnTable] = {}
     separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
     decimal: Annotated[str, Field(pattern=r"^[.,]$")] | None = None
