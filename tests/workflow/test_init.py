@@ -182,7 +182,7 @@ def test_different_rates_are_written_out(tmp_path: Path) -> None:
     run_init(tmp_path)
     (record,) = read_campaign(tmp_path).records
     assert record.dt == 0.01
-    assert "resampled" in record.notes[0]
+    assert "every 0.02 s" in record.notes[0]
 
 
 def test_units_that_the_file_states_need_no_mapping(tmp_path: Path) -> None:

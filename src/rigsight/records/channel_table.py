@@ -237,7 +237,7 @@ def _clocks(
         if channel.axis is not None and (not possible or foreign):
             if id(channel.axis) not in axes:
                 stamps = _finite(path, channel, _in_seconds(path, channel, channel.axis))
-                axes[id(channel.axis)] = Clock(_OWN_AXIS, stamps, None, channel.axis.origin)
+                axes[id(channel.axis)] = Clock(_OWN_AXIS, stamps, "s", channel.axis.origin)
             clocks[signal] = axes[id(channel.axis)]
             continue
         tried = [stamps_of(number) for number in possible]
@@ -360,7 +360,7 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
             lines=lines,
             origins=known,
         )
-    if len({clock.unit for clock in chosen}) > 1:
+    if len({clock.unit or "s" for clock in chosen}) > 1:
         raise InputError(f"{file}: its signals have times in different units; export them in seconds.")
     if 0 < len(known) < len(clocks):
         dated = ", ".join(f"{signal} ({clocks[signal].label})" for signal in known)
@@ -378,7 +378,7 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
             axes[signal] = clock.stamps
         else:
             axes[signal] = clock.stamps + float(seconds_since(np.array([clock.origin]), first)[0])
-    unit = chosen[0].unit
+    unit = next((clock.unit for clock in chosen if clock.unit is not None), None)
     return replace(
         table,
         labels={**table.labels, time: chosen[0].label},

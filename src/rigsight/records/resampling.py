@@ -63,9 +63,9 @@ def joined(
 ) -> Resampled:
     """Return the signals on the even clock that all of them cover.
 
-    A held input (``"zoh"``) becomes its mean over each sample, which keeps its impulse; one of ``"foh"`` is interpolated
-    linearly; outputs and band-limited inputs, which are smooth, by cubic splines. For a clock coarser than that of a signal, the
-    signal is low-pass filtered first, without delay.
+    A held input (``"zoh"``) becomes its mean over each sample, which keeps its impulse; outputs and other inputs are interpolated
+    by cubic splines, inputs of ``"foh"`` linearly where that predicts left out samples better. For a clock coarser than that of a
+    signal, the signal is low-pass filtered first, without delay.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def joined(
     jitter = max(base.jitter for base in distinct)
     apart = len(distinct) > 1 and _differ(distinct)
     if how or apart:
-        notes.append(_note(file, bases, clocks, dt, how, costs, jitter, step, is_filtered))
+        notes.append(_note(file, bases, clocks if apart else {}, dt, how, costs, jitter, step, is_filtered))
     # Separate clocks agree no better than to a sample: a stamp tells when a device wrote it.
     uncertainty = max(max(float(apart), base.jitter) * base.dt for base in distinct)
     return Resampled(start, dt, on_clock, tuple(notes), driven_finer, uncertainty)
@@ -167,36 +167,55 @@ def _interpolated(
     if hold == "zoh":
         means, spread = _means_of_held(samples, stamps, grid, dt)
         return means, "held", spread / rms
+    kept, left = slice(None, None, 2), slice(1, -1, 2)
+    missed = _spline(stamps[kept], samples[kept], stamps[left], 2.0 * base.dt) - samples[left]
+    by_spline = float(np.sqrt(np.mean(missed**2))) / rms
     if hold == "foh":
-        missed = np.interp(stamps[1:-1:2], stamps[::2], samples[::2]) - samples[1:-1:2]
-        return np.interp(grid, stamps, samples), "linearly", float(np.sqrt(np.mean(missed**2))) / rms
-    found = _spline(stamps[::2], samples[::2], stamps[1:-1:2], 2.0 * base.dt)
-    missed = found - samples[1:-1:2]
-    return (
-        _spline(stamps, samples, grid, base.dt),
-        "by cubic splines",
-        float(np.sqrt(np.mean(missed**2))) / rms,
-    )
+        missed = np.interp(stamps[left], stamps[kept], samples[kept]) - samples[left]
+        linearly = float(np.sqrt(np.mean(missed**2))) / rms
+        # A smooth input loses height on straight lines, one with corners overshoots on splines: its own samples tell which it is.
+        if linearly <= by_spline:
+            return np.interp(grid, stamps, samples), "linearly", linearly
+    return _spline(stamps, samples, grid, base.dt), "by cubic splines", by_spline
 
 
 def _means_of_held(
     samples: NDArray[np.float64], stamps: NDArray[np.float64], grid: NDArray[np.float64], dt: float
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the mean of a held signal over each sample of the grid, and the RMS of what it differs from that within samples."""
+    """Return a signal that is held over each sample of the grid, and the RMS of what it differs from the one held at the stamps.
+
+    It is the mean over the sample, which alone would be late or early by the moment of what lies within; that moment is made up
+    for by the samples beside it.
+    """
     edges = np.append(grid, grid[-1] + dt)
     first = np.clip(np.searchsorted(stamps, grid + _ON_GRID * dt, "right") - 1, 0, None)
     last = np.clip(np.searchsorted(stamps, edges[1:] - _ON_GRID * dt, "left") - 1, 0, None)
-
-    def means(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        knots = np.append(stamps, max(stamps[-1], edges[-1]) + dt)
-        area = np.concatenate([[0.0], np.cumsum(values * np.diff(knots))])
-        return np.asarray(np.diff(np.interp(edges, knots, area)) / dt)
-
+    changes = np.concatenate([[0], np.cumsum(np.diff(samples) != 0.0)])
+    is_held = changes[first] == changes[last]
+    if is_held.all():
+        return samples[first], 0.0
     center = float(np.mean(samples))
-    mean = np.where(first == last, samples[first], center + means(samples - center))
-    mean = np.clip(mean, samples.min(), samples.max())
-    spread = np.where(first == last, 0.0, means((samples - center) ** 2) - (mean - center) ** 2)
-    return mean, float(np.sqrt(np.mean(np.maximum(spread, 0.0))))
+    levels = samples - center
+    steps = np.diff(np.append(stamps, max(stamps[-1], edges[-1]) + dt))
+    at = np.clip(np.searchsorted(stamps, edges, "right") - 1, 0, None)
+    within = edges - stamps[at]
+
+    def integral(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        once = np.concatenate([[0.0], np.cumsum(values * steps)])
+        return once[at] + values[at] * within, once
+
+    area, once = integral(levels)
+    twice = np.concatenate([[0.0], np.cumsum((once[:-1] + 0.5 * levels * steps) * steps)])
+    area_of_area = twice[at] + (once[at] + 0.5 * levels[at] * within) * within
+    mean = np.where(is_held, levels[first], np.diff(area) / dt)
+    moment = 0.5 * dt * (area[1:] + area[:-1]) - np.diff(area_of_area)
+    moment[is_held] = 0.0
+    beside = np.pad(moment, 1)
+    mean_square = np.diff(integral(levels**2)[0]) / dt
+    spread = float(np.sqrt(np.mean(np.where(is_held, 0.0, np.maximum(mean_square - mean**2, 0.0)))))
+    # Exact where nothing changes near.
+    mean = np.where(is_held, samples[first], center + mean)
+    return mean + (beside[:-2] - beside[2:]) / (2.0 * dt**2), spread
 
 
 def _spline(
@@ -257,7 +276,7 @@ def _note(
     is_filtered: bool,
 ) -> str:
     why = []
-    if len({id(base) for base in bases.values()}) > 1:
+    if clocks:
         listed = ", ".join(
             f"{signal} by '{clocks[signal]}' every {base.dt:.6g} s from {written_stamp(base.t0, base.dt, 6)} s"
             for signal, base in bases.items()

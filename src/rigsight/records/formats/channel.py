@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -267,14 +267,20 @@ def stated_unit(text: object) -> str | None:
 
 def with_distinct_names(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     """Return the channels with printable names, with a number behind each that is not the first of its name."""
-    channels = tuple(replace(channel, name=printable(channel.name)) for channel in channels)
-    taken, used, named = {channel.name for channel in channels}, Counter[str](), []
-    for channel in channels:
-        used[channel.name] += 1
-        name = channel.name
-        while used[channel.name] > 1 and name in taken:
-            name = f"{channel.name}_{used[channel.name]}"
-            used[channel.name] += name in taken
+    channels = tuple(channels)
+    names = distinct_names([printable(channel.name) for channel in channels])
+    return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
+
+
+def distinct_names(names: Sequence[str]) -> list[str]:
+    """Return the names with a number behind each that is not the first of its kind."""
+    taken, used, distinct = set(names), Counter[str](), []
+    for own in names:
+        used[own] += 1
+        name = own
+        while used[own] > 1 and name in taken:
+            name = f"{own}_{used[own]}"
+            used[own] += name in taken
         taken.add(name)
-        named.append(channel if name == channel.name else replace(channel, name=name))
-    return tuple(named)
+        distinct.append(name)
+    return distinct

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError, nearest
 from rigsight.records.clocks import TIME, increases, possible_clocks
 from rigsight.records.column_mapping import ColumnMapping, Columns
-from rigsight.records.formats.channel import check_count, printable
+from rigsight.records.formats.channel import check_count, distinct_names, printable
 from rigsight.records.formats.dialect import Dialect, is_comment, looks_like_names, sniff
 from rigsight.records.formats.table_head import LAST_LINES, MOST_HEAD, UnclearHeadError, find_head
 from rigsight.records.formats.text_file import read_text
@@ -111,16 +111,16 @@ def read_csv(
     needed = found | {f"time {one}": one for possible in clocks.values() for one in possible}
     table = _numbers(path, lines, rows, layout, needed, blank=several) if needed else np.empty((len(rows), 0))
     cells = {position: np.ascontiguousarray(table[:, i]) for i, position in enumerate(needed.values())}
-    values, axes, called = {}, {}, {}
+    values, axes, called, distinct = {}, {}, {}, distinct_names(layout.names)
     for signal, position in found.items():
         possible = clocks.get(signal, [])
         stamps = [cells[one][: _filled(cells[one], cells[position])] for one in possible]
         chosen = next((i for i, own in enumerate(stamps) if increases(own)), len(stamps) - 1)
         values[signal] = cells[position]
         if stamps:
-            axes[signal], called[signal] = stamps[chosen], layout.names[possible[chosen]]
+            axes[signal], called[signal] = stamps[chosen], distinct[possible[chosen]]
             values[signal] = values[signal][: stamps[chosen].size]
-    shared = len(set(called.values())) == 1
+    shared = len(set(called.values())) == 1 and len({stamps.size for stamps in axes.values()}) == 1
     columns_read = [(layout.names[found[s]], column) for s, column in values.items()]
     for label, column in [*columns_read, *((called[s], axes[s]) for s in axes)]:
         finite = np.isfinite(column)
@@ -279,6 +279,9 @@ def _position(path: Path, signal: str, mapping: ColumnMapping, layout: Layout, o
             f"{path.name}: {count} columns are called '{mapping.name}'; "
             f"name the one for signal '{signal}' by its number, counted from 1."
         )
+    # Of several columns of one name, all but the first have a number behind it where a file is inspected.
+    if mapping.name in (distinct := distinct_names(layout.names)):
+        return distinct.index(mapping.name)
     if optional:
         return None
     if not layout.has_names:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records import Kind, Role
-from rigsight.records.channel_summary import step_and_gaps
 from rigsight.records.channel_units import has_si, in_drive_unit, is_a
+from rigsight.records.clocks import increases, is_time
 from rigsight.records.excitation_kind import guess_amplitude, guess_kind
 from rigsight.records.formats.channel import Channel, ChannelFile, as_floats
 from rigsight.records.read_record import TIME
@@ -91,7 +91,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
         If a channel cannot be read.
     """
     is_text = file.format == "delimited text"
-    guess = guess_file(file.channels, is_text, rigs)
+    guess = guess_file(file.channels, is_text, rigs, _rising(file.channels))
     # With several inputs, the kind cannot be guessed from one of them.
     driven = guess.signals[0] if len(guess.rig.inputs) == 1 else None
     kind: Kind = "operation"
@@ -135,23 +135,21 @@ def _in_si(samples: NDArray[np.float64], guess: Guess) -> NDArray[np.float64]:
 def _timing(guess: FileGuess) -> tuple[list[str], int]:
     """Return the keys of timing other than the time column, and the number of blanks."""
     found = [one.channel for one in guess.signals if one.channel is not None]
-    if guess.time.is_clear or guess.time.candidates:
+    if guess.time.is_clear or guess.time.candidates or guess.times:
         return [], 0
     if not found or any(channel.axis is None for channel in found):
         return [f"dt = {BLANK}  # sample time [s]: no channel of time was found"], 1
-    steps = []
-    for channel in found:
-        with suppress(InputError):
-            assert channel.axis is not None
-            steps.append((channel.n_samples, step_and_gaps(channel.axis.stamps())[0]))
-    if len(set(steps)) <= 1:
-        return [], 0
-    finest = min((step for _, step in steps if step), default=None)
-    if finest is None:
-        return [], 0
-    return [
-        f"resample = {finest:.9g}  # [s]: the signals have different sample rates and are resampled; check"
-    ], 0
+    return [], 0
+
+
+def _rising(channels: Sequence[Channel]) -> Channel | None:
+    """Return the first channel if it rises throughout; none where a channel is called like time or has its own."""
+    if not channels or any(channel.axis is not None or is_time(channel.name) for channel in channels):
+        return None
+    with suppress(InputError):
+        if increases(as_floats(channels[0].load())):
+            return channels[0]
+    return None
 
 
 def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], int]:
@@ -161,11 +159,12 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     left = _left(guess, channels)
     for one in (guess.time, *guess.signals):
         if one.channel is not None and one.is_alone:
-            (line,) = _column(one)
+            (line,) = _column(one, guess.clocks)
             mark = "; " if "  # " in line else "  # "
-            lines.append(f"{line}{mark}guessed: the only remaining channel; check")
+            why = "it rises throughout" if one.signal == TIME else "the only remaining channel"
+            lines.append(f"{line}{mark}guessed: {why}; check")
         elif one.channel is not None:
-            lines += _column(one)
+            lines += _column(one, guess.clocks)
         elif one.candidates:
             listed = ", ".join(quoted(name) for name in one.candidates[:_LISTED])
             lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {listed}")
@@ -206,6 +205,7 @@ def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
     """Return the channels that belong to no signal yet; empty if there are none."""
     known = (guess.time, guess.reference, *guess.signals)
     taken = {one.channel.name for one in known if one.channel is not None}
+    taken |= guess.times
     free = [quoted(channel.name) for channel in channels if channel.name not in taken]
     return f"one of: {', '.join(free[:_LISTED])}" if free else ""
 
@@ -220,14 +220,27 @@ def _coarse_step(time: Channel) -> float | None:
     return None
 
 
+def _with_time(line: str, guess: Guess, name: str, clocks: Mapping[str, str]) -> str:
+    """Return the line that maps a signal with the time that is its own."""
+    own = f"{{ name = {name}, time = {quoted(clocks[guess.signal])}"
+    if f"{{ name = {name}" in line:
+        return line.replace(f"{{ name = {name}", own, 1)
+    return line.replace(f"{guess.signal} = {name}", f"{guess.signal} = {own} }}", 1)
+
+
 def _unit_of(guess: Guess) -> str:
     return f"[{guess.si}], " if has_si(guess.si) else ""
 
 
-def _column(guess: Guess) -> list[str]:
+def _column(guess: Guess, clocks: Mapping[str, str]) -> list[str]:
     """Return the line that maps a signal; empty if its channel has the name of the signal."""
     assert guess.channel is not None
     name = quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)
+    if guess.signal in clocks:
+        return [
+            _with_time(line, guess, name, clocks)
+            for line in _column(guess, {}) or [f"{guess.signal} = {name}"]
+        ]
     if guess.unit is None:
         needed = guess.channel.name != guess.signal
         if guess.signal == TIME and (step := _coarse_step(guess.channel)):
