@@ -68,7 +68,9 @@ class TimeBase:
 
     def times(self) -> NDArray[np.float64]:
         """Return the stamps, shape (n_samples,)."""
-        return self.t0 + self.dt * np.arange(self.n_samples) if self.stamps is None else self.stamps
+        if self.stamps is not None:
+            return self.stamps
+        return self.t0 + self.dt * np.arange(self.n_samples, dtype=np.float64)
 
     def in_seconds(self, scale: float, offset: float) -> TimeBase:
         """Return the grid in seconds: stamp in seconds = scale * stamp + offset."""
