@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,37 +10,14 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
 from rigsight.records.channel_units import UnknownUnitError, factor
-from rigsight.records.clocks import increases, possible_clocks
+from rigsight.records.clocks import Clock, increases, possible_clocks, shared_clock, with_clocks
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.formats.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
 from rigsight.records.formats.channel_file import open_channels
-from rigsight.records.formats.time_stamps import seconds_since
 
 _LISTED = 30
 """Channels that a message lists; a logger may record thousands."""
 _OWN_AXIS = "its own time axis"
-
-
-@dataclass(frozen=True, eq=False)
-class Clock:
-    """The time of a signal.
-
-    Attributes
-    ----------
-    label
-        How it is called.
-    stamps
-        Time stamps, shape (n_samples,).
-    unit
-        Stated by the file; None where it is that of the campaign.
-    origin
-        Moment from which they count; None where the file does not say.
-    """
-
-    label: str
-    stamps: NDArray[np.float64]
-    unit: str | None = None
-    origin: np.datetime64 | None = None
 
 
 def read_channels(
@@ -308,7 +284,7 @@ def _refuse_other_clocks(
     )
     if found and all(shown[signal] or channel.axis is not None for signal, channel in found.items()):
         clocks = _clocks(path, file, found, columns, time, False)
-    if len(lengths) > 1 or (clocks and _shared(clocks.values()) is None):
+    if len(lengths) > 1 or (clocks and shared_clock(clocks.values()) is None):
         raise InputError(
             f"{path.name}: dt = {dt:g} cannot hold for signals that have clocks of their own or other lengths. Leave dt out, and "
             'name the time of each where the file does not show it: { name = "...", time = "..." }.'
@@ -324,120 +300,3 @@ def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> NDArray[np.floa
         ) from None
     stamps = axis.stamps()
     return stamps if scale == 1.0 else scale * stamps
-
-
-def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock]) -> Columns:
-    """Return a table with the time of its signals: one for all where they share it, else the stamps of each.
-
-    Parameters
-    ----------
-    file
-        Name for messages.
-    time
-        Name of time among the signals.
-    table
-        What was read.
-    clocks
-        Signal -> its clock.
-
-    Raises
-    ------
-    InputError
-        If clocks differ, and do not count from the same moment or in the same unit.
-    """
-    chosen = list(clocks.values())
-    shared = _shared(chosen)
-    known = {signal: clock.origin for signal, clock in clocks.items() if clock.origin is not None}
-    if shared is not None:
-        labels = {**table.labels, time: shared.label}
-        units = table.units if shared.unit is None else {**table.units, time: shared.unit}
-        lines = table.lines if table.lines.size else np.arange(1, shared.stamps.size + 1, dtype=np.int64)
-        return replace(
-            table,
-            values={**table.values, time: shared.stamps},
-            labels=labels,
-            units=units,
-            lines=lines,
-            origins=known,
-        )
-    if len({clock.unit or "s" for clock in chosen}) > 1:
-        raise InputError(f"{file}: its signals have times in different units; export them in seconds.")
-    if 0 < len(known) < len(clocks):
-        dated = ", ".join(f"{signal} ({clocks[signal].label})" for signal in known)
-        raise InputError(
-            f"{file}: the clocks of the signals cannot be compared: only the time of {dated} has a date. Export all with a start "
-            "time, or all without."
-        )
-    first = min(known.values(), default=None)
-    axes: dict[str, NDArray[np.float64]] = {}
-    for signal, clock in clocks.items():
-        alike = next((s for s in axes if _shared([clocks[s], clock])), None)
-        if alike is not None:
-            axes[signal] = axes[alike]
-        elif first is None or clock.origin is None:
-            axes[signal] = clock.stamps
-        else:
-            axes[signal] = clock.stamps + float(seconds_since(np.array([clock.origin]), first)[0])
-    unit = next((clock.unit for clock in chosen if clock.unit is not None), None)
-    return replace(
-        table,
-        labels={**table.labels, time: chosen[0].label},
-        units=table.units if unit is None else {**table.units, time: unit},
-        axes=axes,
-        clocks={signal: clock.label for signal, clock in clocks.items()},
-        origins=dict.fromkeys(clocks, first) if first is not None else {},
-    )
-
-
-def side_by_side(file: str, time: str, tables: Mapping[Path, Columns]) -> Columns:
-    """Return the signals of several files as those of one record, each with the time of its file.
-
-    Parameters
-    ----------
-    file
-        Name of the record for messages.
-    time
-        Name of time among the signals.
-    tables
-        File -> what was read from it.
-
-    Raises
-    ------
-    InputError
-        As `with_clocks`.
-    """
-    values, labels, units, clocks = {}, {}, {}, {}
-    for path, table in tables.items():
-        for signal, samples in table.values.items():
-            if signal == time:
-                continue
-            values[signal] = samples
-            labels[signal] = f"{table.labels[signal]} of {path.name}"
-            label = table.clocks.get(signal, table.labels[time])
-            stamps = table.axes[signal] if table.axes else table.values[time]
-            clocks[signal] = Clock(
-                f"{label} of {path.name}", stamps, table.units.get(time), table.origins.get(signal)
-            )
-            if signal in table.units:
-                units[signal] = table.units[signal]
-    longest = max(tables.values(), key=lambda table: table.lines.size)
-    joint = Columns(
-        values,
-        labels,
-        longest.lines,
-        tuple(note for table in tables.values() for note in table.notes),
-        units,
-        row=longest.row,
-        names=tuple(name for table in tables.values() for name in table.names),
-    )
-    return with_clocks(file, time, joint, clocks)
-
-
-def _shared(clocks: Iterable[Clock]) -> Clock | None:
-    """Return the clock that all signals have, None if they differ."""
-    first, *others = clocks
-    alike = all(
-        other is first or (other.origin == first.origin and np.array_equal(other.stamps, first.stamps))
-        for other in others
-    )
-    return first if alike else None

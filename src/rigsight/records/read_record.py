@@ -10,9 +10,10 @@ from typing import Literal, TypedDict, Unpack
 import numpy as np
 
 from rigsight.errors import InputError, readable
-from rigsight.records.channel_table import read_channels, side_by_side, unread_time
+from rigsight.records.channel_table import read_channels, unread_time
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.clocks import TIME as TIME
+from rigsight.records.clocks import side_by_side
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
 from rigsight.records.conditioning import check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
