@@ -228,6 +228,28 @@ def test_one_sample_time_is_refused_for_clocks_that_differ(tmp_path: Path) -> No
         read(tmp_path / "a.tdms", {"u": "Force", "x": "Pos"}, dt=0.01)
 
 
+def test_one_sample_time_is_refused_for_columns_of_several_clocks(tmp_path: Path) -> None:
+    rows = [f"{t},{force(t)},{t},{position(t)}" for t in DRIVE]
+    (tmp_path / "a.csv").write_text("\n".join(["Time,Force,Time,Pos", *rows]), encoding="utf-8")
+    with pytest.raises(InputError, match=r"dt = 0.01 cannot hold"):
+        read(tmp_path / "a.csv", {"u": "Force", "x": "Pos"}, dt=0.01)
+    with pytest.raises(InputError, match=r"names a time of its own"):
+        read(tmp_path / "a.csv", {"u": ColumnMapping("Force", time=1), "x": "Pos"}, dt=0.01)
+
+
+def test_a_waveform_without_a_start_beside_one_with_it_is_refused(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    start = {"wf_start_time": np.datetime64("2024-03-01T12:00:00", "us")}
+    channels = [
+        nptdms.ChannelObject("log", "u", force(DRIVE), properties={"wf_increment": DT}),
+        nptdms.ChannelObject("log", "x", position(DRIVE), properties={"wf_increment": DT, **start}),
+    ]
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        file.write_segment(channels)
+    with pytest.raises(InputError, match="cannot be compared"):
+        read(tmp_path / "a.tdms", {})
+
+
 @pytest.mark.parametrize(
     ("names", "clocks"),
     [

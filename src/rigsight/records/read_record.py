@@ -13,7 +13,7 @@ from rigsight.errors import InputError, readable
 from rigsight.records.channel_table import read_channels, unread_time
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.clocks import TIME as TIME
-from rigsight.records.clocks import side_by_side
+from rigsight.records.clocks import own_clocks, side_by_side
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
 from rigsight.records.conditioning import check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
@@ -162,6 +162,12 @@ def read_stretches(
         raise InputError(
             f"{path.name}: dt = {dt:g} is given together with a column for time; give one of the two."
         )
+    for signal, column in columns.items():
+        if column.time is not None and (signal == TIME or dt is not None):
+            why = f"dt = {dt:g} is the time of all signals" if dt is not None else f"{TIME} is a time itself"
+            raise InputError(
+                f"{path.name}: the column of {signal} names a time of its own, but {why}; give one of the two."
+            )
     constant_inputs = constant_inputs or {}
     recorded = [signal for signal in inputs if signal.name not in constant_inputs]
     names = [*(signal.name for signal in (*recorded, *outputs)), *beside]
@@ -279,6 +285,12 @@ def _table(
     table = read_csv(path, own, optional=spare, **vars(dialect))
     if dt is None:
         return table
+    clocks = own_clocks(table.names)
+    if len({clocks.get(table.names.index(label)) for label in table.labels.values()}) > 1:
+        raise InputError(
+            f"{path.name}: dt = {dt:g} cannot hold for signals that have clocks of their own. Leave dt out, and name the time of "
+            'each where the file does not show it: { name = "...", time = "..." }.'
+        )
     stamps = dt * np.arange(table.lines.size, dtype=np.float64)
     notes = unread_time(path, dt, [TIME] if TIME in table.names else [])
     return replace(
