@@ -38,7 +38,8 @@ _BEHIND = re.compile(r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_|,\s*)(?P<unit>[A-Za
 def split_unit(name: str) -> tuple[str, str | None]:
     """Return a channel's name without its unit, and the unit: ``"Kraft [kN]"``, ``"Weg mm"``, ``"pos_mm"``."""
     match = _IN_BRACKETS.match(name)
-    if match and match["unit"]:
+    # A number in brackets is a place: data(:,1), control[0].
+    if match and re.search(r"[^\W\d_]|[°%]", match["unit"]):
         return match["bare"], match["unit"]
     match = _BEHIND.match(name)
     if match and match["unit"] in _UNITS_BEHIND:

@@ -245,14 +245,17 @@ def _decimated(
     """Return samples of shape (n_samples,) on a coarser clock, low-pass filtered forward and backward."""
     from scipy.signal import filtfilt, firwin
 
-    own = base.t0 + base.dt * np.arange(int((base.end - base.t0) / base.dt + _ON_GRID) + 1)
+    count = int((base.end - base.t0) / base.dt + _ON_GRID) + 1
+    own = base.t0 + base.dt * np.arange(count, dtype=np.float64)
     even = samples if base.stamps is None else _interpolated(samples, base, own, base.dt, hold)[0]
     n_taps = 2 * int(np.ceil(_FILTER_LENGTH * dt / base.dt)) + 1
-    taps = firwin(n_taps, 0.5 * (1.0 + _PASSBAND) * base.dt / dt, window=("kaiser", _FILTER_SHAPE))
+    taps = np.asarray(
+        firwin(n_taps, 0.5 * (1.0 + _PASSBAND) * base.dt / dt, window=("kaiser", _FILTER_SHAPE))
+    )
     # A held sample stands for the time behind it: in the middle, half a sample later.
     late = 0.5 * base.dt if hold == "zoh" else 0.0
-    smooth = filtfilt(taps, 1.0, even, padlen=min(even.size - 1, n_taps))
-    return _spline(own + late, smooth, grid, base.dt)
+    smooth = filtfilt(taps, [1.0], np.asarray(even, dtype=np.float64), padlen=min(even.size - 1, n_taps))
+    return _spline(own + late, np.asarray(smooth, dtype=np.float64), grid, base.dt)
 
 
 def _differ(distinct: Sequence[TimeBase]) -> bool:
