@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -111,6 +112,13 @@ def write_uff(path: Path, rows: Rows, units: Units, binary: int = 1) -> None:
     pyuff.UFF(str(path)).write_sets(sets, mode="add", force_double=True)
 
 
+def write_json(path: Path, rows: Rows, units: Units) -> None:
+    columns = {name: samples.tolist() for name, samples in rows.items()}
+    path.write_text(
+        json.dumps([dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)])
+    )
+
+
 FORMATS: dict[str, tuple[str, Write]] = {
     "MATLAB 5": (".mat", write_matlab),
     "MATLAB 7": (".mat", write_matlab_packed),
@@ -120,6 +128,7 @@ FORMATS: dict[str, tuple[str, Write]] = {
     "TDMS": (".tdms", write_tdms),
     "Parquet": (".parquet", write_parquet),
     "UFF": (".uff", write_uff),
+    "JSON": (".json", write_json),
 }
 """Name -> suffix and writer; delimited text is left out."""
 

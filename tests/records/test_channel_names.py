@@ -36,7 +36,8 @@ def test_units_in_names(name: str, bare: str, unit: str | None) -> None:
         ("u", "u"), ("Motor current [A]", "u"), ("MotorCurrent", "u"), ("Strom", "u"), ("log/u", "u"), ("Time_s", "t"),
         ("Zeit [ms]", "t"), ("Weg mm", "x"), ("Signal/Weg mm", "x"), ("Kraft [kN]", "force"), ("yaw angle", "psi"),
         ("Motor Angle [deg]", "motor_angle"), ("angle of the motor", "motor_angle"), ("log/pos_m", "pos_m"),
-        ("Angle 1", "angle_1"),
+        ("Angle 1", "angle_1"), ("a1 torque cmd [Nm]", "u"), ("pwm", "u"), ("m2 torque", "u"), ("joint1 speed", "velocity"),
+        ("q", "angle"), ("motor torque", "torque"),
     ],
 )  # fmt: skip
 def test_names_of_signals(name: str, signal: str) -> None:

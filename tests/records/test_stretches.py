@@ -13,7 +13,7 @@ from rigsight.records import read_record
 from rigsight.records.read_record import read_stretches
 from rigsight.workflow.campaign.read_campaign import read_campaign
 
-from .test_read_record import INPUTS, OUTPUTS
+from .test_read_record import INPUTS, OUTPUTS, Named
 
 WriteCsv = Callable[..., Path]
 T = 0.01 * np.arange(400)
@@ -79,19 +79,62 @@ def test_a_single_record_is_refused_with_what_a_campaign_does(write_csv: WriteCs
     ("rows", "message"),
     [
         (
-            table(kept=np.flatnonzero(np.arange(400) % 25 > 1)),
-            r"Only 0 of 368 samples lie in stretches of 50 or more",
+            table(kept=np.flatnonzero(np.arange(400) % 25 > 2)),
+            r"Only 0 of 352 samples lie in stretches of 50 or more",
         ),
-        # Every other sample lost now and then: no pause but a clock that cannot be trusted.
-        (table(kept=np.delete(np.arange(400), np.arange(3, 400, 9))), "not equally spaced"),
         # Two decimals of a sample time of 10.4 ms: what seems to jump is rounding.
         (np.column_stack([np.round(0.0101 * np.arange(400), 2), table()[:, 1:]]), "1 samples are missing"),
     ],
-    ids=["dropouts everywhere", "jitter", "coarse stamps"],
+    ids=["dropouts everywhere", "coarse stamps"],
 )
 def test_what_cannot_be_parted_is_told(write_csv: WriteCsv, rows: np.ndarray, message: str) -> None:
     with pytest.raises(InputError, match=message):
         read(write_csv, rows)
+
+
+@pytest.mark.parametrize("lost", [np.arange(3, 400, 9), np.flatnonzero(np.arange(400) % 40 < 2)[2:]])
+def test_samples_lost_everywhere_are_interpolated_where_few_are_lost_at_once(
+    write_csv: WriteCsv, lost: np.ndarray
+) -> None:
+    (record,) = read(write_csv, table(kept=np.delete(np.arange(400), lost)))
+    np.testing.assert_allclose(record["psi"], np.cos(9.0 * record.t), atol=1e-3)
+    assert "jitter" in record.notes[0]
+
+
+def test_a_late_stamp_is_no_gap(write_csv: WriteCsv) -> None:
+    rows = table()
+    rows[200, 0] += 0.0094
+    (record,) = read(write_csv, rows)
+    assert (record.dt, record.n_samples) == (0.01, 400)
+
+
+def test_a_gap_of_one_clock_ends_the_others_there_as_well(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    drive, stage = T, np.delete(T + 0.002, np.arange(200, 220))
+    content = {"a": {"t": drive, "u": np.sin(9 * drive)}, "b": {"t": stage, "x": np.cos(9 * stage)}}
+    savemat(tmp_path / "run.mat", content)
+    found = read_stretches(tmp_path / "run.mat", INPUTS, (Named("x", "m"),))
+    assert [(r.t[0], r.t[-1]) for r in found] == [
+        pytest.approx((0.01, 1.99)),
+        pytest.approx((2.21, 3.99)),
+    ]
+    for record in found:
+        np.testing.assert_allclose(record["x"], np.cos(9 * record.t), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "span"), [(1.0, 2.0, (1.0, 2.0)), (None, 1.5, (0.0, 1.5)), (3.0, None, (3.0, 3.99))]
+)
+def test_start_and_end_choose_a_stretch(write_csv: WriteCsv, start, end, span) -> None:
+    (record,) = read_stretches(write_csv(rows=table()), INPUTS, OUTPUTS, start=start, end=end)
+    assert (record.t[0], record.t[-1]) == pytest.approx(span)
+    np.testing.assert_allclose(record["psi"], np.cos(9.0 * record.t), atol=1e-8)
+
+
+def test_a_stretch_outside_the_record_is_told_with_its_span(write_csv: WriteCsv) -> None:
+    with pytest.raises(InputError, match=r"start = 5, end = 9 .*0 s to 3.99 s"):
+        read_stretches(write_csv(rows=table()), INPUTS, OUTPUTS, start=5.0, end=9.0)
 
 
 def test_a_campaign_holds_the_stretches(tmp_path: Path) -> None:

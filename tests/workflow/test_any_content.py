@@ -52,8 +52,8 @@ CAMPAIGN: dict[str, Any] = {
     "records": [
         {
             "file": "a.csv", "name": "a", "role": "validation", "kind": "step", "amplitude": 1.0, "hold": "zoh", "dt": 0.1,
-            "resample": 0.1, "separator": ",", "decimal": ".", "header": True, "comment": "#",
-            "columns": {"t": 1, "u": {"name": "u", "scale": 1.0, "offset": 0.0, "unit": "A"}},
+            "resample": 0.1, "start": 0.0, "end": 9.0, "separator": ",", "decimal": ".", "header": True, "comment": "#",
+            "columns": {"t": 1, "u": {"name": "u", "scale": 1.0, "offset": 0.0, "unit": "A", "time": 1, "file": "b.csv"}},
         }
     ],
 }  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import tomllib
 from pathlib import Path
@@ -182,7 +183,31 @@ def test_different_rates_are_written_out(tmp_path: Path) -> None:
     run_init(tmp_path)
     (record,) = read_campaign(tmp_path).records
     assert record.dt == 0.01
-    assert "resampled" in record.notes[0]
+    assert "every 0.02 s" in record.notes[0]
+
+
+def test_a_first_column_that_only_rises_is_proposed_as_time(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"data": np.column_stack([T, ANSWER]), "u": SWEEP})
+    run_init(tmp_path, model="axis")
+    (record,) = read_campaign(tmp_path).records
+    assert record.dt == pytest.approx(T[1] - T[0])
+    np.testing.assert_array_equal(record["u"], SWEEP)
+    np.testing.assert_array_equal(record["x"], ANSWER)
+
+
+def test_a_log_of_a_robot_is_read_from_json(tmp_path: Path) -> None:
+    columns = {"time": T, "a1 torque cmd [Nm]": SWEEP, "a1 angle [rad]": ANSWER, "a1 velocity": SWEEP**2}
+    rows = [
+        dict(zip(columns, row, strict=True))
+        for row in zip(*(c.tolist() for c in columns.values()), strict=True)
+    ]
+    (tmp_path / "a.json").write_text(json.dumps(rows), encoding="utf-8")
+    run_init(tmp_path, model="axis")
+    (record,) = read_campaign(tmp_path).records
+    np.testing.assert_allclose(record["u"], SWEEP)
+    np.testing.assert_allclose(record["x"], ANSWER)
 
 
 def test_units_that_the_file_states_need_no_mapping(tmp_path: Path) -> None:

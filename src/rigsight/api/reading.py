@@ -27,6 +27,8 @@ def read_record(
     hold: Hold = "foh",
     dt: float | None = None,
     resample: float | None = None,
+    start: float | None = None,
+    end: float | None = None,
     constants: Mapping[str, float] | None = None,
 ) -> Record:
     r"""Read, check and repair one record.
@@ -56,7 +58,10 @@ def read_record(
     dt
         Sample time [s] of a file without time; time that it has is not read then, with a note.
     resample
-        Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
+        Sample time [s] onto which signals are resampled, low-pass filtered where it is coarser than theirs; without it, signals
+        with clocks of their own come onto the finest of them.
+    start, end
+        Stretch of the file that is the record, by its time [s]; by default all of it.
     constants
         Constants of the rig with a different value in this record, such as a known payload.
 
@@ -104,6 +109,8 @@ def read_record(
         hold=hold,
         dt=dt,
         resample=resample,
+        start=start,
+        end=end,
         constants=checked_numbers(
             Where(Path(path).name), ("constants",), found, found.constants, constants or {}
         ),

@@ -21,7 +21,7 @@ def inspect(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="A measured file: CSV, MATLAB, HDF5, MDF4, TDMS, Parquet or UFF."
+            metavar="FILE", help="A measured file: CSV, MATLAB, HDF5, MDF4, TDMS, Parquet, UFF or JSON."
         ),
     ],
     rigs: OwnRigs = None,

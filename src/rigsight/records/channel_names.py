@@ -9,14 +9,21 @@ NAMES_OF: dict[str, tuple[str, ...]] = {
     "t": ("t", "time", "zeit", "times", "timestamp", "time stamp", "elapsed time", "tout", "x value"),
     "u": (
         "u", "input", "current", "strom", "motor current", "motorstrom", "i", "voltage", "spannung", "drive", "command",
-        "control", "excitation", "anregung", "stellgröße", "drive force", "antriebskraft",
+        "control", "excitation", "anregung", "stellgröße", "drive force", "antriebskraft", "torque", "drehmoment", "effort",
+        "pwm", "duty", "duty cycle", "cmd", "torque cmd", "torque command", "current cmd", "voltage cmd", "force cmd",
     ),
     "psi": ("psi", "yaw", "yaw angle", "gierwinkel", "wendewinkel"),
     "y": ("y", "lateral", "lateral displacement", "lateral position", "querverschiebung", "spurlage"),
     "x": ("x", "position", "displacement", "weg", "pos", "auslenkung", "stroke", "travel", "hub", "deflection"),
+    "angle": ("angle", "winkel", "q", "theta", "position", "pos"),
+    "speed": ("speed", "velocity", "geschwindigkeit", "drehzahl", "vel", "qd", "dq"),
+    "velocity": ("velocity", "speed", "geschwindigkeit", "drehzahl", "vel", "qd", "dq"),
+    "torque": ("torque", "drehmoment", "moment", "effort", "tau"),
     "reference": ("reference", "ref", "setpoint", "set point", "goal", "sollwert", "führungsgröße"),
     "force": ("force", "kraft", "f", "load", "last", "damper force", "dämpferkraft"),
 }  # fmt: skip
+_SYMBOLS = ("t", "u", "psi", "y", "x", "reference", "force")
+"""Of built-in rigs: too short or too common for a channel that has them among other words."""
 _IN_PART = 0.9
 """Below what a unit that fits makes clear: a word that is shared is a hint, no more."""
 # A last word without brackets is a unit only if it can hardly be anything else: x_a is no length of years.
@@ -33,7 +40,8 @@ _BEHIND = re.compile(r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_|,\s*)(?P<unit>[A-Za
 def split_unit(name: str) -> tuple[str, str | None]:
     """Return a channel's name without its unit, and the unit: ``"Kraft [kN]"``, ``"Weg mm"``, ``"pos_mm"``."""
     match = _IN_BRACKETS.match(name)
-    if match and match["unit"]:
+    # A number in brackets is a place: data(:,1), control[0].
+    if match and re.search(r"[^\W\d_]|[°%]", match["unit"]):
         return match["bare"], match["unit"]
     match = _BEHIND.match(name)
     if match and match["unit"] in _UNITS_BEHIND:
@@ -50,22 +58,29 @@ def closeness(name: str, signal: str) -> float:
     words, asked = _words(bare.rpartition("/")[2]), _words(signal)
     if signal.lower() in (whole, last) or (asked and asked in (_words(bare), words)):
         return 3.0
-    known = NAMES_OF.get(signal)
-    if known is None:
-        # A name from a rig file: no other names are known for it, but its words may be in another order or among others.
-        own = set(asked.split())
-        shared = own & set(words.split())
-        return 2.0 if own and shared == own else _IN_PART * len(shared) / max(1, len(own))
+    known = NAMES_OF.get(signal, ())
     if whole in known or last in known:
         return 2.0
     single = set(last.split())
-    return 1.0 if any(word in single for word in known if len(word) > 2) else 0.0
+    by_other_names = 1.0 if any(word in single for word in known if len(word) > 2) else 0.0
+    if signal in _SYMBOLS:
+        return by_other_names
+    # A name from a rig file: its words may be in another order or among others.
+    own = set(asked.split())
+    shared = own & set(words.split())
+    by_words = 2.0 if own and shared == own else _IN_PART * len(shared) / max(1, len(own))
+    return max(by_words, by_other_names)
+
+
+def plain_words(name: str) -> str:
+    """Return a name without its unit in lower case, words apart."""
+    return _words(split_unit(name)[0])
 
 
 def _plain(name: str) -> str:
-    """Return a name in lower case, words apart, without numbers at its end."""
+    """Return a name in lower case, words apart, without a device in front (``a1 torque``) and numbers at its end."""
     words = _words(name)
-    return re.sub(r"\s*\d+$", "", words) or words
+    return re.sub(r"^(?:[a-z]{1,6}\d+ )+|\s*\d+$", "", words) or words
 
 
 def _words(name: str) -> str:

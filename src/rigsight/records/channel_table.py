@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
 from rigsight.records.channel_units import UnknownUnitError, factor
+from rigsight.records.clocks import Clock, increases, possible_clocks, shared_clock, with_clocks
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.formats.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
 from rigsight.records.formats.channel_file import open_channels
@@ -30,7 +31,8 @@ def read_channels(
 ) -> Columns:
     """Read the channels that `columns` asks for, and their time.
 
-    Time is, in this order: `dt`; the channel that was mapped to it; a channel of its name; the channels' own axes.
+    Time is, in this order: `dt`; the channel that a signal's mapping names as its time; the time that the file shows to be the
+    signal's own; the channel that was mapped to time, or has its name; the axis of the channel.
 
     Parameters
     ----------
@@ -57,33 +59,37 @@ def read_channels(
             signal: channel
             for signal, mapping in columns.items()
             if signal != time
-            and (channel := _find(path, file, signal, mapping, signal in optional)) is not None
+            and (channel := _find(path, file, signal, mapping.name, signal in optional)) is not None
         }
         values = {
             signal: _finite(path, channel, _quantity(path, channel, columns[signal]))
             for signal, channel in found.items()
         }
-        axes, label = _axes(path, file, found, columns[time], time, time_is_mapped, dt)
-        labels = {signal: channel.name for signal, channel in found.items()} | {time: label[0]}
-        units = {signal: channel.unit for signal, channel in found.items()} | {time: label[1]}
         names = tuple(channel.name for channel in file.channels)
-        unread = [channel.name for channel in _named(file.channels, time)]
-        if not unread and any(channel.axis is not None for channel in found.values()):
-            unread = [_OWN_AXIS]
-    shared = _shared(axes.values())
-    if shared is not None:
-        values[time] = shared
-    n_rows = max((samples.size for samples in values.values()), default=0)
-    return Columns(
+        unread: list[str] = []
+        if dt is None:
+            clocks = _clocks(path, file, found, columns, time, time_is_mapped)
+        else:
+            unread = [channel.name for channel in _named(file.channels, time)]
+            if not unread and any(channel.axis is not None for channel in found.values()):
+                unread = [_OWN_AXIS]
+            _refuse_other_clocks(path, file, found, columns, time, dt)
+            clocks = {
+                signal: Clock("dt", dt * np.arange(channel.n_samples, dtype=np.float64))
+                for signal, channel in found.items()
+            }
+        labels = {signal: channel.name for signal, channel in found.items()}
+        units = {signal: channel.unit for signal, channel in found.items()}
+    table = Columns(
         values,
         labels,
-        np.arange(1, n_rows + 1, dtype=np.int64),
+        np.arange(1, max((v.size for v in values.values()), default=0) + 1, dtype=np.int64),
         (*_notes(path, found), *(() if dt is None else unread_time(path, dt, unread))),
         units={signal: unit for signal, unit in units.items() if unit is not None},
-        axes={} if shared is not None else axes,
         row="sample",
         names=names,
     )
+    return with_clocks(path.name, time, table, clocks)
 
 
 def unread_time(path: Path, dt: float, unread: Sequence[str]) -> tuple[str, ...]:
@@ -107,37 +113,35 @@ def unread_time(path: Path, dt: float, unread: Sequence[str]) -> tuple[str, ...]
 
 
 def _find(
-    path: Path, file: ChannelFile, signal: str, mapping: ColumnMapping, optional: bool
+    path: Path, file: ChannelFile, signal: str, name: str | int, optional: bool = False
 ) -> Channel | None:
     """Return the channel of a mapping, by full name, by name without group, or by number."""
     channels = file.channels
-    if isinstance(mapping.name, int):
-        if 1 <= mapping.name <= len(channels):
-            return channels[mapping.name - 1]
+    if isinstance(name, int):
+        if 1 <= name <= len(channels):
+            return channels[name - 1]
         raise InputError(
-            f"{path.name}: signal '{signal}' is mapped to channel {mapping.name}, but there are {len(channels)}: {_listed(file)}."
+            f"{path.name}: signal '{signal}' is mapped to channel {name}, but there are {len(channels)}: {_listed(file)}."
         )
-    matches = _named(channels, mapping.name)
+    matches = _named(channels, name)
     if len(matches) == 1:
         return matches[0]
     if matches:
         listed = ", ".join(f"'{channel.name}'" for channel in matches[:_LISTED])
         raise InputError(
-            f"{path.name}: {len(matches)} channels are called '{mapping.name}': {listed}; name the one for signal '{signal}' "
+            f"{path.name}: {len(matches)} channels are called '{name}': {listed}; name the one for signal '{signal}' "
             "with its group."
         )
     for refused in file.refused:
-        if mapping.name in (refused.name, refused.name.rpartition("/")[2]):
+        if name in (refused.name, refused.name.rpartition("/")[2]):
             raise InputError(
                 f"{path.name}: '{refused.name}', which signal '{signal}' is mapped to, {refused.reason}."
             )
     if optional:
         return None
-    hint = nearest(
-        mapping.name, [name for channel in channels for name in (channel.name, channel.short_name)]
-    )
+    hint = nearest(name, [own for channel in channels for own in (channel.name, channel.short_name)])
     raise InputError(
-        f"{path.name} has no channel '{mapping.name}' for signal '{signal}'.{hint} Its channels: {_listed(file)}. "
+        f"{path.name} has no channel '{name}' for signal '{signal}'.{hint} Its channels: {_listed(file)}. "
         f'Map it under columns: {signal} = "..." (on a command line --column {signal}=...). See rigsight inspect for details.'
     )
 
@@ -194,65 +198,124 @@ def _finite(path: Path, channel: Channel, samples: NDArray[np.float64]) -> NDArr
     return samples
 
 
-def _axes(
+def _clocks(
     path: Path,
     file: ChannelFile,
     found: Mapping[str, Channel],
+    columns: Mapping[str, ColumnMapping],
+    time: str,
+    time_is_mapped: bool,
+) -> dict[str, Clock]:
+    """Return the clock of every signal; of a record of nothing but time, that of the time itself."""
+    channels = list(file.channels)
+    numbers = {signal: channels.index(channel) for signal, channel in found.items()}
+    given = {
+        signal: channels.index(channel)
+        for signal in found
+        if (own := columns[signal].time) is not None
+        and (channel := _find(path, file, f"{signal}, time", own)) is not None
+    }
+    names = [channel.name for channel in channels]
+    shown = possible_clocks(names, numbers, given, None)
+    declared = _declared(path, file, found, shown, columns[time], time, time_is_mapped)
+    read: dict[int, Clock] = {}
+
+    def stamps_of(number: int) -> Clock:
+        if number not in read:
+            channel = channels[number]
+            stamps = _finite(path, channel, as_stamps(channel.load()))
+            read[number] = Clock(channel.name, stamps, channel.unit, channel.origin)
+        return read[number]
+
+    if not found:
+        assert declared is not None
+        return {time: stamps_of(declared)}
+    axes: dict[int, Clock] = {}
+    clocks = {}
+    for signal, possible in possible_clocks(names, numbers, given, declared).items():
+        channel = found[signal]
+        foreign = (
+            possible == [declared] and signal not in given and not _around(channels[possible[0]], channel)
+        )
+        if channel.axis is not None and (not possible or foreign):
+            if id(channel.axis) not in axes:
+                stamps = _finite(path, channel, _in_seconds(path, channel, channel.axis))
+                axes[id(channel.axis)] = Clock(_OWN_AXIS, stamps, "s", channel.axis.origin)
+            clocks[signal] = axes[id(channel.axis)]
+            continue
+        tried = [stamps_of(number) for number in possible]
+        clocks[signal] = next((clock for clock in tried if increases(clock.stamps)), tried[-1])
+        if clocks[signal].stamps.size != channel.n_samples:
+            raise InputError(
+                f"{path.name}: '{channel.name}' has {channel.n_samples} samples, but the time '{clocks[signal].label}' "
+                f"{clocks[signal].stamps.size}. Give it the time that belongs to it: {signal} = "
+                f'{{ name = "{channel.name}", time = "..." }}.'
+            )
+    return clocks
+
+
+def _declared(
+    path: Path,
+    file: ChannelFile,
+    found: Mapping[str, Channel],
+    shown: Mapping[str, list[int]],
     mapping: ColumnMapping,
     time: str,
     time_is_mapped: bool,
-    dt: float | None,
-) -> tuple[dict[str, NDArray[np.float64]], tuple[str, str | None]]:
-    """Return the stamps of every signal, and how time is called and in which unit it stands."""
-    if dt is not None:
-        return {s: dt * np.arange(c.n_samples, dtype=np.float64) for s, c in found.items()}, ("dt", None)
+) -> int | None:
+    """Return the number of the channel that is the time of all signals; None where each has its own."""
+    every_one = bool(found) and all(shown[s] or c.axis is not None for s, c in found.items())
     matches = [] if isinstance(mapping.name, int) else _named(file.channels, mapping.name)
-    # Groups that each have a channel of this name: every signal goes by the time of its own group.
-    if len(matches) > 1 and {c.group for c in found.values()} <= {m.group for m in matches}:
-        by_group = {match.group: match for match in matches}
-        chosen = {signal: by_group[channel.group] for signal, channel in found.items()}
-    elif matches or time_is_mapped or all(channel.axis is None for channel in found.values()):
-        if not matches and not time_is_mapped:
+    if every_one and len(matches) > 1 and all(shown.values()):
+        return None
+    if not matches and not time_is_mapped:
+        if every_one:
+            return None
+        lacking = [channel for signal, channel in found.items() if not shown[signal] and channel.axis is None]
+        if len(lacking) < len(found):
             raise InputError(
-                f"{path.name} has no channel '{time}', and its channels have no time axis. Map time under columns "
-                f'({time} = "..."), or give the sample time in seconds with the record: dt = 0.001. '
-                f"Its channels: {_listed(file)}."
+                f"{path.name}: channel '{lacking[0].name}' has no time axis, unlike others. Map time under columns, or "
+                f'give it one: {{ name = "{lacking[0].name}", time = "..." }}.'
             )
-        named = _find(path, file, time, mapping, optional=False)
-        assert named is not None
-        # Of a record of nothing but time, the time itself.
-        chosen = dict.fromkeys(found or [time], named)
-    else:
-        return _own_axes(path, found), (_OWN_AXIS, None)
-    stamps = {
-        name: _finite(path, channel, as_stamps(channel.load()))
-        for name, channel in {channel.name: channel for channel in chosen.values()}.items()
-    }
-    for signal, channel in found.items():
-        if stamps[chosen[signal].name].size != channel.n_samples:
-            raise InputError(
-                f"{path.name}: '{channel.name}' has {channel.n_samples} samples, but the time '{chosen[signal].name}' "
-                f"{stamps[chosen[signal].name].size}. Map time to the channel that belongs to it."
-            )
-    units = {channel.unit for channel in chosen.values()}
-    if len(units) > 1:
-        raise InputError(f"{path.name}: the groups have times in different units; export them in seconds.")
-    return {s: stamps[c.name] for s, c in chosen.items()}, (next(iter(chosen.values())).name, units.pop())
+        raise InputError(
+            f"{path.name} has no channel '{time}', and its channels have no time axis. Map time under columns "
+            f'({time} = "..."), or give the sample time in seconds with the record: dt = 0.001. '
+            f"Its channels: {_listed(file)}."
+        )
+    channel = _find(path, file, time, mapping.name)
+    assert channel is not None
+    return list(file.channels).index(channel)
 
 
-def _own_axes(path: Path, found: Mapping[str, Channel]) -> dict[str, NDArray[np.float64]]:
-    """Return the stamps [s] of channels that keep their own."""
-    read: dict[int, NDArray[np.float64]] = {}
-    axes = {}
-    for signal, channel in found.items():
-        if channel.axis is None:
-            raise InputError(
-                f"{path.name}: channel '{channel.name}' has no time axis, unlike others. Map time under columns."
-            )
-        if id(channel.axis) not in read:
-            read[id(channel.axis)] = _finite(path, channel, _in_seconds(path, channel, channel.axis))
-        axes[signal] = read[id(channel.axis)]
-    return axes
+def _around(time: Channel, channel: Channel) -> bool:
+    """Return True if a time stands in the group of a channel, or in one around it."""
+    return f"{channel.group}/".startswith(f"{time.group}/") or not time.group
+
+
+def _refuse_other_clocks(
+    path: Path,
+    file: ChannelFile,
+    found: Mapping[str, Channel],
+    columns: Mapping[str, ColumnMapping],
+    time: str,
+    dt: float,
+) -> None:
+    """Refuse one sample time for signals that the file shows to have clocks of their own that differ, or other lengths."""
+    lengths = {channel.n_samples for channel in found.values()}
+    clocks: dict[str, Clock] = {}
+    shown = possible_clocks(
+        [channel.name for channel in file.channels],
+        {signal: list(file.channels).index(channel) for signal, channel in found.items()},
+        {},
+        None,
+    )
+    if found and all(shown[signal] or channel.axis is not None for signal, channel in found.items()):
+        clocks = _clocks(path, file, found, columns, time, False)
+    if len(lengths) > 1 or (clocks and shared_clock(clocks.values()) is None):
+        raise InputError(
+            f"{path.name}: dt = {dt:g} cannot hold for signals that have clocks of their own or other lengths. Leave dt out, and "
+            'name the time of each where the file does not show it: { name = "...", time = "..." }.'
+        )
 
 
 def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> NDArray[np.float64]:
@@ -264,9 +327,3 @@ def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> NDArray[np.floa
         ) from None
     stamps = axis.stamps()
     return stamps if scale == 1.0 else scale * stamps
-
-
-def _shared(axes: Iterable[NDArray[np.float64]]) -> NDArray[np.float64] | None:
-    """Return the stamps that all signals have, None if they differ."""
-    first, *others = axes
-    return first if all(other is first or np.array_equal(other, first) for other in others) else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,10 @@ class ColumnMapping:
     unwrap
         True for an angle that begins again after a full turn, or the period of a counter in the numbers of the column; False for
         neither, None to find out.
+    time
+        Name or number of the column of its time, where signals have clocks of their own and the file does not show which.
+    file
+        File that holds the column, where it is another than that of the record.
 
     Raises
     ------
@@ -41,6 +46,8 @@ class ColumnMapping:
     offset: float | None = None
     unit: str | None = None
     unwrap: bool | float | None = None
+    time: str | int | None = None
+    file: Path | None = None
 
     def __post_init__(self) -> None:
         if self.scale is not None and (not math.isfinite(self.scale) or self.scale == 0.0):
@@ -134,11 +141,15 @@ class Columns:
     units
         Signal name -> unit stated in a dedicated field of the file.
     axes
-        Signal name -> time stamps [s], shape (n_samples,), where the signals do not share one axis; else empty.
+        Signal name -> time stamps, shape (n_samples,), where the signals do not share one axis; else empty. In the unit of time.
+    clocks
+        Signal name -> how its time is called, where `axes` has it.
     row
         Name of a row in messages: ``"line"`` of a text, ``"sample"`` otherwise.
     names
         Names of all columns in the file.
+    origins
+        Signal name -> moment from which its time counts, where the file says so.
     """
 
     values: Mapping[str, NDArray[np.float64]]
@@ -147,5 +158,7 @@ class Columns:
     notes: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     axes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    clocks: Mapping[str, str] = field(default_factory=dict)
     row: str = "line"
     names: tuple[str, ...] = ()
+    origins: Mapping[str, np.datetime64] = field(default_factory=dict)

@@ -1,28 +1,34 @@
-"""Check for equally spaced samples, and resampling of nearly equal ones."""
+"""Which even clock do the time stamps of a record stand for, how far do they wander from it, and where are samples missing?"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.record import Hold
 from rigsight.records.stamps import written_stamp
 
 FEWEST_SAMPLES = 50
 # Beyond, squares and quotients would overflow; data read with a wrong type looks like this.
 LARGEST_NUMBER = 1e100
 SHORTEST_TIME = 1e-100
-# Of the sample time: above the first a record is refused; below the second interpolation adds more error than it mends.
-LARGEST_JITTER = 0.01
+# Of the sample time: below, interpolation adds more error than it mends.
 NEGLIGIBLE_JITTER = 1e-4
-# Of the sample time: with stamps printed more coarsely, rounding cannot be told from a repeated or missing row.
-COARSEST_STAMPS = 0.2
-# Of the typical step: from here on a sample at least is missing. Of the steps: more long ones are jitter.
+# Of the sample time: loops of measured rigs reach 1.6; a longer step hides more than two samples, too many to interpolate.
+LARGEST_JITTER = 2.0
+# Of the sample time: with stamps printed more coarsely, rounding cannot be told from a repeated or missing row; up to the second,
+# a whole step missing is still twice what rounding does.
+COARSEST_STAMPS, COARSE_BUT_CLEAR = 0.2, 0.5
+# Of the typical step, beside what steps vary anyway: the middle between no sample missing and one.
 LEAST_PAUSE = 1.5
+# Of the steps: more long ones are jitter; the others show how much steps vary anyway.
 MOST_PAUSES = 0.05
+# Of the typical step: lost samples lengthen a step by whole ones, a late program by any share.
+_WHOLE = 0.02
+# Share of the samples that must be left in stretches that are long enough: else a record is not cut.
+FEWEST_KEPT = 0.5
 # Of the printed resolution: a half, and a little for the fitted grid.
 LARGEST_ROUNDING = 0.6
 STAMPS_LOOKED_AT = 3000
@@ -38,31 +44,38 @@ class TimeBase:
     ----------
     t0, dt
         First stamp and sample time, in the unit of the stamps.
+    n_samples
+        Number of stamps.
     stamps
         Measured stamps, shape (n_samples,), where the samples must be resampled; None where they lie on the grid.
+    jitter
+        Of these stamps, as a share of `dt`: how far they, or the steps between them, are from even at most.
     notes
-        What was found.
+        What was assumed.
     """
 
     t0: float
     dt: float
+    n_samples: int
     stamps: NDArray[np.float64] | None = None
+    jitter: float = 0.0
     notes: tuple[str, ...] = ()
 
-    def resample(self, samples: NDArray[np.float64], hold: Hold | None = None) -> NDArray[np.float64]:
-        """Return samples on the even grid, shape (n_samples,).
+    @property
+    def end(self) -> float:
+        """The last stamp."""
+        return self.t0 + self.dt * (self.n_samples - 1) if self.stamps is None else float(self.stamps[-1])
 
-        An input is interpolated according to its `hold`; None is an output, smooth by nature.
-        """
-        if self.stamps is None or hold == "zoh":
-            return samples
-        grid = np.linspace(self.stamps[0], self.stamps[-1], self.stamps.size)
-        if hold == "foh":
-            return np.interp(grid, self.stamps, samples)
-        # Slow to load, and every process that reads a file apart would wait for it.
-        from scipy.interpolate import CubicSpline
+    def times(self) -> NDArray[np.float64]:
+        """Return the stamps, shape (n_samples,)."""
+        if self.stamps is not None:
+            return self.stamps
+        return self.t0 + self.dt * np.arange(self.n_samples, dtype=np.float64)
 
-        return np.asarray(CubicSpline(self.stamps, samples)(grid), dtype=np.float64)
+    def in_seconds(self, scale: float, offset: float) -> TimeBase:
+        """Return the grid in seconds: stamp in seconds = scale * stamp + offset."""
+        stamps = None if self.stamps is None else scale * self.stamps + offset
+        return replace(self, t0=scale * self.t0 + offset, dt=scale * self.dt, stamps=stamps)
 
 
 def check_long_enough(file: str, n_samples: int) -> None:
@@ -100,7 +113,7 @@ def time_base(
     Raises
     ------
     InputError
-        Naming the line: too few samples, time not increasing, duplicate stamps, gaps, or jitter above 1 %.
+        Naming the line: too few samples, time not increasing, duplicate stamps, gaps, or steps that differ by far.
     """
     check_long_enough(file, stamps.size)
     span = abs(stamps[-1] - stamps[0])
@@ -118,7 +131,9 @@ def time_base(
     if not coarse:
         tolerated = np.maximum(tolerated, LARGEST_ROUNDING * rounding)
     if slope > 0.0 and bool(np.all(deviation <= tolerated)):
-        return TimeBase(float(stamps[0]), _plain(float(slope), float(rounding[-1]) / stamps.size))
+        return TimeBase(
+            float(stamps[0]), _plain(float(slope), float(rounding[-1]) / stamps.size), stamps.size
+        )
     _check_order(stamps, lines, file, row)
     _check_gaps(stamps, lines, file, row)
     steps = np.diff(stamps)
@@ -127,19 +142,26 @@ def time_base(
     jitter = min(float(deviation.max()) / float(slope), float(np.abs(steps - dt).max()) / dt)
     if jitter > LARGEST_JITTER:
         worst = int(np.argmax(np.abs(steps - dt)))
-        mend = (
-            "Write the time with more digits."
-            if coarse
-            else "Resample the record onto an even grid, or record with a fixed sample time."
-        )
         raise InputError(
             f"{file}, {row} {lines[worst + 1]}: the samples are not equally spaced; the step to "
             f"t = {told_stamp(stamps, worst + 1)} is {steps[worst]:.4g}, the mean step {dt:.4g} "
-            f"(jitter {100 * jitter:.2g} %, at most 1 % is resampled). "
-            f"{mend}"
+            f"(jitter {100 * jitter:.2g} %, at most {100 * LARGEST_JITTER:g} % is resampled). "
+            "Record with a fixed sample time, or cut the record to its even part with start and end."
         )
-    note = f"{file}: time stamps jitter by {100 * jitter:.2g} % of the sample time; samples were interpolated onto an even grid."
-    return TimeBase(float(stamps[0]), dt, stamps, (note,))
+    if COARSEST_STAMPS < rounding.max() / slope <= COARSE_BUT_CLEAR and bool(
+        np.all(deviation <= LARGEST_ROUNDING * rounding)
+    ):
+        note = (
+            f"{file}: time is printed in steps of {rounding.max():.2g}, coarse beside the sample time of {dt:.4g}; the samples "
+            "were taken as evenly spaced, which agrees with every stamp."
+        )
+        return TimeBase(
+            float(stamps[0] + start),
+            _plain(slope, float(rounding[-1]) / stamps.size),
+            stamps.size,
+            notes=(note,),
+        )
+    return TimeBase(float(stamps[0]), _plain(dt, jitter * dt / stamps.size), stamps.size, stamps, jitter)
 
 
 def told_stamp(stamps: NDArray[np.float64], sample: int) -> str:
@@ -158,18 +180,45 @@ def told_stamp(stamps: NDArray[np.float64], sample: int) -> str:
 
 
 def pauses(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the samples after which others are missing; none if the steps vary everywhere (jitter).
+    """Return the samples after which others are missing; none where steps vary (jitter).
+
+    A step is a gap if it is longer than the others vary by at least half a sample, if it is longer by whole samples (or by more
+    than `LARGEST_JITTER`), and if the clock does not catch up behind it. Where too little would be left between gaps
+    short enough to be interpolated, there are none.
 
     Parameters
     ----------
     stamps
         Time stamps, shape (n_samples,).
     """
-    steps = np.diff(stamps)
+    none, steps = np.zeros(0, dtype=np.intp), np.diff(stamps)
     if steps.size == 0 or np.any(steps <= 0.0):
-        return np.zeros(0, dtype=np.intp)
-    found = np.flatnonzero(steps > LEAST_PAUSE * float(np.median(steps)))
-    return found if found.size <= MOST_PAUSES * steps.size else np.zeros(0, dtype=np.intp)
+        return none
+    in_samples = steps / float(np.median(steps))
+    varies = float(np.quantile(np.abs(in_samples - 1.0), 1.0 - MOST_PAUSES))
+    found = np.flatnonzero(in_samples > LEAST_PAUSE + 2.0 * varies)
+    longest = 1.0 + LARGEST_JITTER + _WHOLE
+    off_whole = np.abs(in_samples[found] - np.round(in_samples[found]))
+    found = found[(off_whole <= max(_WHOLE, 2.0 * varies)) | (in_samples[found] > longest)]
+    found = found[[_is_missed(stamps, int(sample)) for sample in found]] if found.size else found
+    if found.size == 0 or found.size > MOST_PAUSES * steps.size:
+        return none
+    lengths = np.diff([0, *(found + 1), stamps.size])
+    if lengths[lengths >= FEWEST_SAMPLES].sum() < FEWEST_KEPT * stamps.size and bool(
+        np.all(in_samples <= longest)
+    ):
+        return none
+    return found
+
+
+def _is_missed(stamps: NDArray[np.float64], sample: int) -> bool:
+    """Return False if the stamps behind a long step are where they would be without it: one was only late."""
+    step, near = float(np.median(np.diff(stamps))), 10
+    before = stamps[max(0, sample - near) : sample + 1]
+    after = stamps[sample + 1 : sample + 1 + near]
+    expected = float(np.median(before - step * np.arange(1 - before.size, 1)))
+    found = float(np.median(after - step * np.arange(1, after.size + 1)))
+    return found - expected > 0.5 * step
 
 
 def missing_behind(stamps: NDArray[np.float64], sample: int) -> int:

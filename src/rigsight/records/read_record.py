@@ -12,13 +12,15 @@ import numpy as np
 from rigsight.errors import InputError, readable
 from rigsight.records.channel_table import read_channels, unread_time
 from rigsight.records.channel_units import si_mapping
+from rigsight.records.clocks import TIME as TIME
+from rigsight.records.clocks import own_clocks, side_by_side
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
-from rigsight.records.conditioning import TimeBase, check_long_enough, time_base
+from rigsight.records.conditioning import check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
 from rigsight.records.formats.read_csv import read_csv
 from rigsight.records.readings import between_readings, refuse_codes, unwrapped
 from rigsight.records.record import Hold, Kind, Record, Role
-from rigsight.records.resampling import Resampled, in_seconds, refuse_different_axes, resampled
+from rigsight.records.resampling import Resampled, joined
 from rigsight.records.sound_signals import (
     NamedSignal,
     alike_notes,
@@ -29,9 +31,7 @@ from rigsight.records.sound_signals import (
     refuse_implausible,
     rest_notes,
 )
-from rigsight.records.stretches import one_stretch, stretches
-
-TIME = "t"
+from rigsight.records.stretches import between, one_stretch, stretches
 
 
 class ReadingOptions(TypedDict, total=False):
@@ -50,6 +50,8 @@ class ReadingOptions(TypedDict, total=False):
     hold: Hold
     dt: float | None
     resample: float | None
+    start: float | None
+    end: float | None
     separator: str | None
     decimal: str | None
     header: bool | int | None
@@ -98,6 +100,8 @@ def read_stretches(
     hold: Hold = "foh",
     dt: float | None = None,
     resample: float | None = None,
+    start: float | None = None,
+    end: float | None = None,
     separator: str | None = None,
     decimal: str | None = None,
     header: bool | int | None = None,
@@ -134,7 +138,10 @@ def read_stretches(
     dt
         Sample time [s] of a file without time; time that it has is not read then, with a note.
     resample
-        Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
+        Sample time [s] onto which signals are resampled, low-pass filtered where it is coarser than theirs. Without it, signals
+        with clocks of their own come onto the finest of them.
+    start, end
+        Stretch of the file that is the record, by its time [s]; by default all of it.
     separator, decimal, header, comment
         See `read_csv`; only delimited text has them.
     constants
@@ -160,6 +167,12 @@ def read_stretches(
         raise InputError(
             f"{path.name}: dt = {dt:g} is given together with a column for time; give one of the two."
         )
+    for signal, column in columns.items():
+        if column.time is not None and (signal == TIME or dt is not None):
+            why = f"dt = {dt:g} is the time of all signals" if dt is not None else f"{TIME} is a time itself"
+            raise InputError(
+                f"{path.name}: the column of {signal} names a time of its own, but {why}; give one of the two."
+            )
     constant_inputs = constant_inputs or {}
     recorded = [signal for signal in inputs if signal.name not in constant_inputs]
     names = [*(signal.name for signal in (*recorded, *outputs)), *beside]
@@ -169,7 +182,7 @@ def read_stretches(
     # A column that was mapped by hand is meant to be there.
     spare = [signal for signal in (*absent_inputs, *free, *beside) if signal not in columns]
     dialect = _Dialect(separator, decimal, header, comment)
-    table = _table(path, {TIME: time, **wanted}, spare, dialect, dt, time_is_mapped=TIME in columns)
+    table = _joint_table(path, {TIME: time, **wanted}, spare, dialect, dt, time_is_mapped=TIME in columns)
     absent = [signal.name for signal in recorded if signal.name not in table.values]
     may_rest = kind == "operation" and amplitude is None
     if absent:
@@ -198,6 +211,8 @@ def read_stretches(
             gain,
         )
         unit_notes += notes
+    if start is not None or end is not None:
+        table = between(path.name, TIME, table, to_si[TIME], start, end)
     raw = {name: table.values[name] for name in names if name in table.values}
     # A few samples at rest are too few before they are a rest.
     check_long_enough(path.name, max(values.size for values in table.values.values()))
@@ -251,7 +266,8 @@ def read_stretches(
                 role=role,
                 kind=kind,
                 amplitude=amplitude,
-                hold=hold,
+                hold="band_limited" if on_axis.is_filtered else hold,
+                clock_uncertainty=on_axis.clock_uncertainty,
                 source=path,
                 notes=(*before, *slow, *on_axis.notes, *found) if number == 1 else (*slow, *on_axis.notes),
                 constants=constants or {},
@@ -287,6 +303,12 @@ def _table(
     table = read_csv(path, own, optional=spare, **vars(dialect))
     if dt is None:
         return table
+    clocks = own_clocks(table.names)
+    if len({clocks.get(table.names.index(label)) for label in table.labels.values()}) > 1:
+        raise InputError(
+            f"{path.name}: dt = {dt:g} cannot hold for signals that have clocks of their own. Leave dt out, and name the time of "
+            'each where the file does not show it: { name = "...", time = "..." }.'
+        )
     stamps = dt * np.arange(table.lines.size, dtype=np.float64)
     notes = unread_time(path, dt, [TIME] if TIME in table.names else [])
     return replace(
@@ -314,17 +336,6 @@ def _refuse_dialect(path: Path, dialect: _Dialect) -> None:
             raise InputError(f"{path.name} is not delimited text, so {key} does not apply; remove {key}.")
 
 
-def _bases(path: Path, table: Columns) -> dict[str, TimeBase]:
-    """Return the even grid of every signal, in the unit of the stamps: one for all, or each its own."""
-    if not table.axes:
-        base = time_base(table.values[TIME], table.lines, path.name, table.row)
-        return dict.fromkeys(table.values, base)
-    return {
-        signal: time_base(stamps, table.lines, f"{path.name}, {signal}", table.row)
-        for signal, stamps in table.axes.items()
-    }
-
-
 def _on_one_axis(
     path: Path,
     table: Columns,
@@ -334,18 +345,51 @@ def _on_one_axis(
     holds: Mapping[str, Hold],
 ) -> Resampled:
     """Return the signals that are kept, not yet in SI, on the even axis [s] that they share or are to share."""
-    found = _bases(path, table)
-    bases = {signal: found[signal] for signal in kept}
-    raw = {signal: table.values[signal] for signal in kept}
     scale = 1.0 if time.scale is None else time.scale
     offset = 0.0 if time.offset is None else time.offset
-    mended = tuple(dict.fromkeys(note for base in bases.values() for note in base.notes))
-    if resample is None and not table.axes:
-        base = next(iter(bases.values()))
-        even = {signal: base.resample(samples, holds.get(signal)) for signal, samples in raw.items()}
-        return Resampled(base.t0 * scale + offset, base.dt * scale, even, mended)
-    timed = {signal: in_seconds(base, scale, offset) for signal, base in bases.items()}
-    if resample is None:
-        refuse_different_axes(path.name, timed, table.labels)
-    on_axis = resampled(path.name, raw, timed, resample, holds)
-    return replace(on_axis, notes=(*mended, *on_axis.notes))
+    if not table.axes:
+        base = time_base(table.values[TIME], table.lines, path.name, table.row).in_seconds(scale, offset)
+        bases = dict.fromkeys(kept, base)
+    else:
+        bases, found = {}, {}
+        for signal in kept:
+            stamps = table.axes[signal]
+            if id(stamps) not in found:
+                own = time_base(stamps, table.lines, f"{path.name}, {signal}", table.row)
+                found[id(stamps)] = own.in_seconds(scale, offset)
+            bases[signal] = found[id(stamps)]
+    raw = {signal: table.values[signal] for signal in kept}
+    return joined(path.name, raw, bases, table.clocks, resample, holds)
+
+
+def _joint_table(
+    path: Path,
+    columns: Mapping[str, ColumnMapping],
+    spare: Sequence[str],
+    dialect: _Dialect,
+    dt: float | None,
+    *,
+    time_is_mapped: bool,
+) -> Columns:
+    """Return the numbers of a record, of which signals may be in files of their own."""
+    elsewhere: dict[Path, dict[str, ColumnMapping]] = {}
+    for signal, column in columns.items():
+        if column.file is not None and column.file != path:
+            elsewhere.setdefault(column.file, {})[signal] = column
+    if not elsewhere:
+        return _table(path, columns, spare, dialect, dt, time_is_mapped=time_is_mapped)
+    if TIME in {signal for own in elsewhere.values() for signal in own}:
+        raise InputError(
+            f"{path.name}: {TIME} cannot be in another file; each file has the time of its own signals."
+        )
+    if dt is not None:
+        raise InputError(
+            f"{path.name}: dt = {dt:g} cannot hold for signals of several files; each needs its time."
+        )
+    files = {path: {s: c for s, c in columns.items() if c.file is None or c.file == path}, **elsewhere}
+    tables = {
+        file: _table(file, {TIME: columns[TIME], **own}, spare, dialect, None, time_is_mapped=time_is_mapped)
+        for file, own in files.items()
+        if len(own) > 1 or file != path
+    }
+    return side_by_side(path.name, TIME, tables)

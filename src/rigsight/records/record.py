@@ -55,6 +55,8 @@ class Record:
         Outputs whose sensor has its own offset in this record: a fit estimates it together with the initial state.
     window_of
         Name of the record that this is a window of; empty for a whole record.
+    clock_uncertainty
+        Time [s] by which signals may be late against each other, as far as the clocks that stamped them can tell.
 
     Raises
     ------
@@ -77,6 +79,7 @@ class Record:
     observed: Mapping[str, float] = field(default_factory=dict)
     free_offsets: tuple[str, ...] = ()
     window_of: str = ""
+    clock_uncertainty: float = 0.0
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.dt) and self.dt > 0.0):

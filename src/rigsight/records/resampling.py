@@ -1,10 +1,9 @@
-"""Resampling of signals with different rates to one time axis, if the campaign requests it."""
+"""How do signals with clocks of their own, or with stamps that wander, come onto one even clock, and what does it cost?"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import NoReturn
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +16,20 @@ from rigsight.records.stamps import written_stamp
 
 # Of the sample time: closer than this, a stamp lies on the grid.
 _ON_GRID = 1e-6
-# What a step may be coarser than the samples: sample times are not known better.
+# What a step may be coarser than the samples without a filter: sample times are not known better.
 _COARSER = 1.01
+# Of the mean step: closer stamps are averaged, or the spline through them would amplify the noise of the slope between them.
+_CLOSE = 0.3
+# Of the new Nyquist frequency: where the filter before decimation begins to close; it is closed at that frequency.
+_PASSBAND = 0.8
+# New samples to each side that this takes of a Kaiser window, and its shape: 60 dB each of forward and backward, and a gain of 1
+# before, unlike the filters with ripple of `scipy.signal.decimate`.
+_FILTER_LENGTH, _FILTER_SHAPE = 20, 6.0
 
 
 @dataclass(frozen=True, eq=False)
 class Resampled:
-    """Signals on one even axis.
+    """Signals on one even clock.
 
     Attributes
     ----------
@@ -32,45 +38,34 @@ class Resampled:
     samples
         Signal name -> samples, shape (n_samples,) each.
     notes
-        What was interpolated, and how.
+        What was interpolated, how, and at which cost.
+    is_filtered
+        Whether an input was filtered, so that it is held no more between the samples.
+    clock_uncertainty
+        Time [s] by which signals may be late against each other, as far as the clocks can tell.
     """
 
     t0: float
     dt: float
     samples: Mapping[str, NDArray[np.float64]]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    is_filtered: bool = False
+    clock_uncertainty: float = 0.0
 
 
-def refuse_different_axes(file: str, bases: Mapping[str, TimeBase], labels: Mapping[str, str]) -> NoReturn:
-    """Refuse signals that do not share one time axis.
-
-    Raises
-    ------
-    InputError
-        Always: with the sample times and lengths that were found, and the key that resamples.
-    """
-    listed = ", ".join(
-        f"{signal} ('{labels[signal]}') every {base.dt:.6g} s from {written_stamp(base.t0, base.dt, 6)} s"
-        for signal, base in bases.items()
-    )
-    finest = min(base.dt for base in bases.values())
-    raise InputError(
-        f"{file}: the signals do not share one time axis: {listed}. Records are resampled only on request: give the record "
-        f"resample = {finest:.6g} (sample time in seconds), or map signals of one rate."
-    )
-
-
-def resampled(
+def joined(
     file: str,
     samples: Mapping[str, NDArray[np.float64]],
     bases: Mapping[str, TimeBase],
-    step: float,
+    clocks: Mapping[str, str],
+    step: float | None,
     holds: Mapping[str, Hold],
 ) -> Resampled:
-    """Return the signals on the even axis that all of them cover.
+    """Return the signals on the even clock that all of them cover.
 
-    Inputs are interpolated according to their hold, outputs, which are smooth, by cubic splines. An axis coarser than the samples
-    is rejected, because content above its Nyquist frequency would alias.
+    A held input (``"zoh"``) becomes its mean over each sample, which keeps its impulse; outputs and other inputs are interpolated
+    by cubic splines, inputs of ``"foh"`` linearly where that predicts left out samples better. For a clock coarser than that of a
+    signal, the signal is low-pass filtered first, without delay.
 
     Parameters
     ----------
@@ -79,69 +74,222 @@ def resampled(
     samples
         Signal name -> samples, shape (n_samples,).
     bases
-        Signal name -> its own even grid [s].
+        Signal name -> its own clock [s]; the same object where signals share one.
+    clocks
+        Signal name -> how its time is called, where signals have clocks of their own.
     step
-        Sample time asked for [s].
+        Sample time asked for [s]; None for the finest of the signals.
     holds
         Hold of every input.
 
     Raises
     ------
     InputError
-        If the step is coarser than a signal's samples, or the signals overlap too little.
+        If the signals overlap too little, or are too many samples of this step.
     """
+    distinct = list({id(base): base for base in bases.values()}.values())
+    dt = min(base.dt for base in distinct) if step is None else step
+    start, n_samples = _common(file, bases, dt, _reference(bases, dt, holds), step)
+    grid = start + dt * np.arange(n_samples, dtype=np.float64)
+    is_filtered = any(dt > _COARSER * base.dt for base in distinct)
+    driven_finer = any(dt > _COARSER * base.dt for name, base in bases.items() if name in holds)
+    on_clock: dict[str, NDArray[np.float64]] = {}
+    how, costs = [], []
     for signal, base in bases.items():
-        if step > _COARSER * base.dt:
-            raise InputError(
-                f"{file}: resample = {step:g} is coarser than the samples of {signal}, {base.dt:.6g} s apart; faster signal "
-                f"content would alias. Give at most {min(b.dt for b in bases.values()):.6g}, or decimate it before."
-            )
-    start = max(base.t0 for base in bases.values())
-    stop = min(base.t0 + base.dt * (samples[signal].size - 1) for signal, base in bases.items())
-    asked = (stop - start) / step
+        position = (start - base.t0) / base.dt
+        same_rate = abs(dt / base.dt - 1.0) < _ON_GRID / n_samples
+        if base.stamps is None and same_rate and abs(position - round(position)) < _ON_GRID:
+            on_clock[signal] = samples[signal][round(position) : round(position) + n_samples]
+            continue
+        hold = holds.get(signal)
+        if dt > _COARSER * base.dt:
+            on_clock[signal] = _decimated(samples[signal], base, grid, dt, hold)
+            how.append(f"{signal} low-pass filtered, from {base.dt:.6g} s")
+            continue
+        hold = "band_limited" if driven_finer and hold is not None else hold
+        on_clock[signal], manner, cost = _interpolated(samples[signal], base, grid, dt, hold)
+        how.append(f"{signal} {manner}" + ("" if same_rate else f", from {base.dt:.6g} s"))
+        costs.append(f"{signal} {100.0 * cost:.2g} %")
+    notes = [note for base in distinct for note in base.notes]
+    jitter = max(base.jitter for base in distinct)
+    apart = len(distinct) > 1 and _differ(distinct)
+    if how or apart:
+        notes.append(_note(file, bases, clocks if apart else {}, dt, how, costs, jitter, step, is_filtered))
+    # Separate clocks agree no better than to a sample: a stamp tells when a device wrote it.
+    uncertainty = max(max(float(apart), base.jitter) * base.dt for base in distinct)
+    return Resampled(start, dt, on_clock, tuple(notes), driven_finer, uncertainty)
+
+
+def _reference(bases: Mapping[str, TimeBase], dt: float, holds: Mapping[str, Hold]) -> TimeBase:
+    """Return the clock whose stamps the common one keeps: that of a held input, which steps there, or else one of that rate."""
+    held = [base for signal, base in bases.items() if holds.get(signal) == "zoh"]
+    same = [base for base in bases.values() if abs(base.dt / dt - 1.0) < _ON_GRID]
+    return [*held, *same, max(bases.values(), key=lambda base: base.t0)][0]
+
+
+def _common(
+    file: str, bases: Mapping[str, TimeBase], dt: float, reference: TimeBase, step: float | None
+) -> tuple[float, int]:
+    """Return the first stamp and the number of samples of the clock that all signals cover."""
+    earliest = max(base.t0 for base in bases.values())
+    stop = min(base.end for base in bases.values())
+    start = reference.t0 + dt * max(0.0, np.ceil((earliest - reference.t0) / dt - _ON_GRID))
+    asked = (stop - start) / dt
     if not asked <= MOST_SAMPLES:
-        raise InputError(
-            f"{file}: resample = {step:g} makes {asked:.3g} samples, more than the limit of {MOST_SAMPLES}."
-        )
+        how = f"resample = {step:g}" if step is not None else f"the finest sample time, {dt:g} s,"
+        raise InputError(f"{file}: {how} makes {asked:.3g} samples, more than the limit of {MOST_SAMPLES}.")
     n_samples = int(np.floor(asked + _ON_GRID)) + 1
     if n_samples < FEWEST_SAMPLES:
-        span = " to ".join(f"{written_stamp(stamp, step, 6)} s" for stamp in (start, stop))
-        raise InputError(
-            f"{file}: the signals have {max(n_samples, 0)} samples of {step:g} s in common (from {span}); "
-            f"at least {FEWEST_SAMPLES} are needed for a record. Do their clocks start together?"
+        spans = "; ".join(
+            f"{signal} from {written_stamp(base.t0, dt, 6)} s to {written_stamp(base.end, dt, 6)} s"
+            for signal, base in bases.items()
         )
-    on_axis, how = {}, []
-    for signal, base in bases.items():
-        even = base.resample(samples[signal], holds.get(signal))
-        position = (start - base.t0) / base.dt
-        if abs(step / base.dt - 1.0) < _ON_GRID / n_samples and abs(position - round(position)) < _ON_GRID:
-            on_axis[signal] = even[round(position) : round(position) + n_samples]
-            continue
-        on_axis[signal], manner = _interpolated(even, base, start, step, n_samples, holds.get(signal))
-        how.append(f"{signal} from {base.dt:.6g} s ({manner})")
-    note = f"{file}: resampled to {step:g} s as requested in the campaign: {', '.join(how)}."
-    return Resampled(start, step, on_axis, (note,) if how else ())
+        raise InputError(
+            f"{file}: the signals have {max(n_samples, 0)} samples of {dt:g} s in common ({spans}); at least {FEWEST_SAMPLES} "
+            "are needed for a record. Do their clocks count from the same moment? If not, correct the time of one in the file."
+        )
+    return start, n_samples
 
 
 def _interpolated(
-    even: NDArray[np.float64], base: TimeBase, start: float, step: float, n_samples: int, hold: Hold | None
-) -> tuple[NDArray[np.float64], str]:
-    """Return samples of shape (n_samples,) on the new axis, and in which manner they were interpolated."""
-    # In samples of the old axis, so that a long record loses no digits.
-    position = (start - base.t0) / base.dt + (step / base.dt) * np.arange(n_samples, dtype=np.float64)
-    position = np.clip(position, 0.0, even.size - 1.0)
+    samples: NDArray[np.float64],
+    base: TimeBase,
+    grid: NDArray[np.float64],
+    dt: float,
+    hold: Hold | None,
+) -> tuple[NDArray[np.float64], str, float]:
+    """Return samples of shape (n_samples,) on the new clock, in which manner they were found, and the cost as a share of the RMS.
+
+    Of a held input the cost is what differs from it between the samples; of others the error with which every second sample is
+    found from its neighbors: the noise included, and at twice the distance that is interpolated here.
+    """
+    stamps, rms = base.times(), float(np.std(samples)) or 1.0
     if hold == "zoh":
-        return even[np.floor(position + _ON_GRID).astype(np.int64)], "held"
-    index = np.arange(even.size, dtype=np.float64)
+        means, spread = _means_of_held(samples, stamps, grid, dt)
+        return means, "held", spread / rms
+    kept, left = slice(None, None, 2), slice(1, -1, 2)
+    missed = _spline(stamps[kept], samples[kept], stamps[left], 2.0 * base.dt) - samples[left]
+    by_spline = float(np.sqrt(np.mean(missed**2))) / rms
     if hold == "foh":
-        return np.interp(position, index, even), "linearly"
+        missed = np.interp(stamps[left], stamps[kept], samples[kept]) - samples[left]
+        linearly = float(np.sqrt(np.mean(missed**2))) / rms
+        # A smooth input loses height on straight lines, one with corners overshoots on splines: its own samples tell which it is.
+        if linearly <= by_spline:
+            return np.interp(grid, stamps, samples), "linearly", linearly
+    return _spline(stamps, samples, grid, base.dt), "by cubic splines", by_spline
+
+
+def _means_of_held(
+    samples: NDArray[np.float64], stamps: NDArray[np.float64], grid: NDArray[np.float64], dt: float
+) -> tuple[NDArray[np.float64], float]:
+    """Return a signal that is held over each sample of the grid, and the RMS of what it differs from the one held at the stamps.
+
+    It is the mean over the sample, which alone would be late or early by the moment of what lies within; that moment is made up
+    for by the samples beside it.
+    """
+    edges = np.append(grid, grid[-1] + dt)
+    first = np.clip(np.searchsorted(stamps, grid + _ON_GRID * dt, "right") - 1, 0, None)
+    last = np.clip(np.searchsorted(stamps, edges[1:] - _ON_GRID * dt, "left") - 1, 0, None)
+    changes = np.concatenate([[0], np.cumsum(np.diff(samples) != 0.0)])
+    is_held = changes[first] == changes[last]
+    if is_held.all():
+        return samples[first], 0.0
+    center = float(np.mean(samples))
+    levels = samples - center
+    steps = np.diff(np.append(stamps, max(stamps[-1], edges[-1]) + dt))
+    at = np.clip(np.searchsorted(stamps, edges, "right") - 1, 0, None)
+    within = edges - stamps[at]
+
+    def integral(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        once = np.concatenate([[0.0], np.cumsum(values * steps)])
+        return once[at] + values[at] * within, once
+
+    area, once = integral(levels)
+    twice = np.concatenate([[0.0], np.cumsum((once[:-1] + 0.5 * levels * steps) * steps)])
+    area_of_area = twice[at] + (once[at] + 0.5 * levels[at] * within) * within
+    mean = np.where(is_held, levels[first], np.diff(area) / dt)
+    moment = 0.5 * dt * (area[1:] + area[:-1]) - np.diff(area_of_area)
+    moment[is_held] = 0.0
+    beside = np.pad(moment, 1)
+    mean_square = np.diff(integral(levels**2)[0]) / dt
+    spread = float(np.sqrt(np.mean(np.where(is_held, 0.0, np.maximum(mean_square - mean**2, 0.0)))))
+    # Exact where nothing changes near.
+    mean = np.where(is_held, samples[first], center + mean)
+    return mean + (beside[:-2] - beside[2:]) / (2.0 * dt**2), spread
+
+
+def _spline(
+    stamps: NDArray[np.float64], samples: NDArray[np.float64], grid: NDArray[np.float64], step: float
+) -> NDArray[np.float64]:
+    """Return smooth samples on another clock, shape of `grid`; samples much closer than `step` are averaged first."""
     # Slow to load, and every process that reads a file apart would wait for it.
     from scipy.interpolate import CubicSpline
 
-    return np.asarray(CubicSpline(index, even)(position), dtype=np.float64), "cubic spline"
+    # Counted from the first, so that stamps since 1970 lose no digits.
+    origin = stamps[0]
+    place, values = stamps - origin, samples
+    if place.size > 2 and float(np.min(np.diff(place))) < _CLOSE * step:
+        starts = [0]
+        for i in range(1, place.size):
+            if place[i] - place[starts[-1]] >= _CLOSE * step:
+                starts.append(i)
+        count = np.diff([*starts, place.size])
+        place, values = (np.add.reduceat(array, starts) / count for array in (place, values))
+    at = np.clip(grid - origin, place[0], place[-1])
+    return np.asarray(CubicSpline(place, values)(at), dtype=np.float64)
 
 
-def in_seconds(base: TimeBase, scale: float, offset: float) -> TimeBase:
-    """Return an even grid in seconds: stamp in seconds = scale * stamp + offset."""
-    stamps = None if base.stamps is None else scale * base.stamps + offset
-    return replace(base, t0=scale * base.t0 + offset, dt=scale * base.dt, stamps=stamps)
+def _decimated(
+    samples: NDArray[np.float64], base: TimeBase, grid: NDArray[np.float64], dt: float, hold: Hold | None
+) -> NDArray[np.float64]:
+    """Return samples of shape (n_samples,) on a coarser clock, low-pass filtered forward and backward."""
+    from scipy.signal import filtfilt, firwin
+
+    count = int((base.end - base.t0) / base.dt + _ON_GRID) + 1
+    own = base.t0 + base.dt * np.arange(count, dtype=np.float64)
+    even = samples if base.stamps is None else _interpolated(samples, base, own, base.dt, hold)[0]
+    n_taps = 2 * int(np.ceil(_FILTER_LENGTH * dt / base.dt)) + 1
+    taps = np.asarray(
+        firwin(n_taps, 0.5 * (1.0 + _PASSBAND) * base.dt / dt, window=("kaiser", _FILTER_SHAPE))
+    )
+    # A held sample stands for the time behind it: in the middle, half a sample later.
+    late = 0.5 * base.dt if hold == "zoh" else 0.0
+    smooth = filtfilt(taps, [1.0], np.asarray(even, dtype=np.float64), padlen=min(even.size - 1, n_taps))
+    return _spline(own + late, np.asarray(smooth, dtype=np.float64), grid, base.dt)
+
+
+def _differ(distinct: Sequence[TimeBase]) -> bool:
+    """Return True if clocks are more than copies of one."""
+    first = distinct[0]
+    return any(
+        base.n_samples != first.n_samples or not np.array_equal(base.times(), first.times())
+        for base in distinct[1:]
+    )
+
+
+def _note(
+    file: str,
+    bases: Mapping[str, TimeBase],
+    clocks: Mapping[str, str],
+    dt: float,
+    how: Sequence[str],
+    costs: Sequence[str],
+    jitter: float,
+    step: float | None,
+    is_filtered: bool,
+) -> str:
+    why = []
+    if clocks:
+        listed = ", ".join(
+            f"{signal} by '{clocks[signal]}' every {base.dt:.6g} s from {written_stamp(base.t0, base.dt, 6)} s"
+            for signal, base in bases.items()
+        )
+        why.append(f"the signals have clocks of their own ({listed})")
+    if jitter > 0.0:
+        why.append(f"time stamps jitter by up to {100.0 * jitter:.2g} % of the sample time")
+    if step is not None:
+        why.append(f"resample = {step:g} is asked for")
+    cost = f" Error at most about {', '.join(costs)} of the RMS, noise included." if costs else ""
+    lost = f" What is faster than {0.5 * _PASSBAND / dt:.4g} Hz is lost." if is_filtered else ""
+    done = f"Resampled to {dt:.6g} s: {'; '.join(how)}" if how else "Joined by whole samples"
+    return f"{file}: {'; '.join(why)}. {done}.{lost}{cost}"

@@ -5,17 +5,17 @@ The motion in a gap is unknown, so nothing is interpolated: each stretch has its
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.column_mapping import Columns
+from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.conditioning import (
     COARSEST_STAMPS,
+    FEWEST_KEPT,
     FEWEST_SAMPLES,
     LARGEST_ROUNDING,
     missing_behind,
@@ -24,9 +24,7 @@ from rigsight.records.conditioning import (
     told_stamp,
 )
 from rigsight.records.plausibility import is_constant
-
-_FEWEST_KEPT = 0.5
-"""Share of the samples that must lie in stretches that are long enough: with fewer the file is no record of anything."""
+from rigsight.records.stamps import written_span
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +43,59 @@ class Stretches:
     notes: tuple[str, ...] = ()
 
 
-def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ()) -> Stretches:
-    """Return the stretches of a table between the gaps of its time axis.
+def between(
+    file: str, time: str, table: Columns, scale: ColumnMapping, start: float | None, end: float | None
+) -> Columns:
+    """Return the rows of a table from `start` to `end`.
 
     Parameters
     ----------
     file
         Name for messages.
     time
-        Name of the time in the table; signals with axes of their own are left as they are.
+        Name of time in the table.
+    table
+        What was read.
+    scale
+        From stamps to seconds.
+    start, end
+        Time [s], as the clock of the file counts; None for its first or last stamp.
+
+    Raises
+    ------
+    InputError
+        If no clock of the table runs there.
+    """
+    begin, stop = (-np.inf if start is None else start), (np.inf if end is None else end)
+    clocks = table.axes or {time: table.values[time]}
+    seconds = {signal: scale.to_si(stamps) for signal, stamps in clocks.items()}
+    first, last = min(float(t.min()) for t in seconds.values()), max(float(t.max()) for t in seconds.values())
+    if not begin < stop or begin > last or stop < first:
+        asked = f"start = {begin:g}, end = {stop:g}"
+        raise InputError(
+            f"{file}: {asked} is no stretch of the record, whose time runs from {written_span(first, last)}."
+        )
+    rows = {id(clocks[s]): np.flatnonzero((t >= begin) & (t <= stop)) for s, t in seconds.items()}
+    if not table.axes:
+        kept = rows[id(clocks[time])]
+        return replace(table, values={s: v[kept] for s, v in table.values.items()}, lines=table.lines[kept])
+    axes = {id(stamps): stamps[rows[id(stamps)]] for stamps in table.axes.values()}
+    return replace(
+        table,
+        values={signal: v[rows[id(table.axes[signal])]] for signal, v in table.values.items()},
+        axes={signal: axes[id(stamps)] for signal, stamps in table.axes.items()},
+    )
+
+
+def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ()) -> Stretches:
+    """Return the stretches of a table between the gaps of its clocks.
+
+    Parameters
+    ----------
+    file
+        Name for messages.
+    time
+        Name of the time in the table.
     table
         What was read.
     outputs
@@ -64,34 +106,52 @@ def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ())
     InputError
         If there is a gap, and too few samples are in stretches that are long enough.
     """
-    stamps = table.values.get(time)
-    if stamps is None or stamps.size < FEWEST_SAMPLES:
+    clocks = table.axes or {time: table.values[time]}
+    gaps = {signal: found for signal, stamps in clocks.items() if (found := _gaps(stamps)).size}
+    if not gaps:
         return Stretches((table,))
-    ends = pauses(stamps)
-    if ends.size == 0 or _may_be_rounding(stamps):
-        return Stretches((table,))
-    edges = [0, *(int(end) + 1 for end in ends), stamps.size]
-    long = [(start, stop) for start, stop in pairwise(edges) if stop - start >= FEWEST_SAMPLES]
-    spans = [(start, stop) for start, stop in long if _moves(table, outputs, start, stop)]
+    # The clock with the most gaps is the one that is told; all others end there as well.
+    worst = max(gaps, key=lambda signal: gaps[signal].size)
+    stamps, ends = clocks[worst], gaps[worst]
+    pauses_of_all = [(clocks[s][end], clocks[s][end + 1]) for s, found in gaps.items() for end in found]
+    edges = sorted({(float(before), float(after)) for before, after in pauses_of_all})
+    spans, latest = [], -np.inf
+    for before, after in edges:
+        spans.append((latest, before))
+        latest = max(latest, after)
+    spans = [(begin, stop) for begin, stop in [*spans, (latest, np.inf)] if begin < stop]
+    parts = [part for begin, stop in spans if (part := _part(table, time, begin, stop)) is not None]
+    long = [part for part in parts if part.lines.size >= FEWEST_SAMPLES]
+    moving = [part for part in long if _moves(part, outputs)]
     where = _where(stamps, table, ends)
-    kept = sum(stop - start for start, stop in spans)
-    if kept < _FEWEST_KEPT * stamps.size:
+    n_samples = max(stamps.size for stamps in clocks.values())
+    kept = sum(part.lines.size for part in moving)
+    if kept < FEWEST_KEPT * n_samples:
         raise InputError(
-            f"{file}: samples are missing {where}. Only {kept} of {stamps.size} samples lie in stretches of {FEWEST_SAMPLES} or "
+            f"{file}: samples are missing {where}. Only {kept} of {n_samples} samples lie in stretches of {FEWEST_SAMPLES} or "
             "more in which an output changes. Record without dropouts, or fill them before reading if you know what was there."
         )
-    dropped = stamps.size - kept
+    dropped = n_samples - kept
     why = (
         "shorter stretches"
-        if len(spans) == len(long)
+        if len(moving) == len(long)
         else "stretches that are shorter, or in which no output changes,"
     )
-    left = f" {dropped} samples in {why} were left out." if dropped else ""
+    left = f" {dropped} samples in {why} were left out." if dropped > 0 else ""
     note = (
-        f"{file}: samples are missing {where}. It was read as {len(spans)} record{'s' if len(spans) > 1 else ''}, each with its "
-        f"own initial state; nothing was interpolated.{left}"
+        f"{file}: samples are missing {where}. It was read as {len(moving)} record{'s' if len(moving) > 1 else ''}, each with "
+        f"its own initial state; nothing was interpolated.{left}"
     )
-    return Stretches(tuple(_part(table, start, stop) for start, stop in spans), (note,))
+    return Stretches(tuple(moving), (note,))
+
+
+def _gaps(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the samples after which others are missing, see `pauses`; none where a jump may be rounding."""
+    none = np.zeros(0, dtype=np.intp)
+    if stamps.size < FEWEST_SAMPLES:
+        return none
+    found = pauses(stamps)
+    return none if found.size == 0 or _may_be_rounding(stamps) else found
 
 
 def _may_be_rounding(stamps: NDArray[np.float64]) -> bool:
@@ -130,10 +190,29 @@ def _where(stamps: NDArray[np.float64], table: Columns, ends: NDArray[np.intp]) 
     )
 
 
-def _moves(table: Columns, outputs: Sequence[str], start: int, stop: int) -> bool:
-    return not outputs or any(not is_constant(table.values[name][start:stop]) for name in outputs)
+def _moves(part: Columns, outputs: Sequence[str]) -> bool:
+    return not outputs or any(not is_constant(part.values[name]) for name in outputs)
 
 
-def _part(table: Columns, start: int, stop: int) -> Columns:
-    values: Mapping[str, NDArray[np.float64]] = {name: v[start:stop] for name, v in table.values.items()}
-    return replace(table, values=values, lines=table.lines[start:stop])
+def _part(table: Columns, time: str, begin: float, stop: float) -> Columns | None:
+    """Return the rows with stamps from `begin` to `stop`; None where a clock has none there."""
+
+    def rows(stamps: NDArray[np.float64]) -> slice:
+        return slice(int(np.searchsorted(stamps, begin)), int(np.searchsorted(stamps, stop, "right")))
+
+    if not table.axes:
+        own = rows(table.values[time])
+        values = {name: v[own] for name, v in table.values.items()}
+        return replace(table, values=values, lines=table.lines[own])
+    axes = {id(stamps): stamps[rows(stamps)] for stamps in table.axes.values()}
+    values = {name: v[rows(table.axes[name])] for name, v in table.values.items()}
+    fewest = min(v.size for v in values.values())
+    if fewest < 2:
+        return None
+    longest = max((rows(stamps) for stamps in table.axes.values()), key=lambda own: own.stop - own.start)
+    return replace(
+        table,
+        values=values,
+        axes={name: axes[id(stamps)] for name, stamps in table.axes.items()},
+        lines=table.lines[longest],
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,8 +12,10 @@ import pytest
 from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.verdict import verdict_notes as notes
+from rigsight.effects import effect_named
 from rigsight.records import Record
 from rigsight.rigs import AXIS
+from rigsight.simulate import compose
 
 
 def basis(
@@ -49,7 +52,7 @@ def growth(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
 def test_where_nothing_is_odd_no_rule_tells_anything() -> None:
     plain = basis()
-    assert [rule(plain) for rule in (*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN)] == [None] * 6
+    assert [rule(plain) for rule in (*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN)] == [None] * 7
     expected = ("of the campaign", "of a record", "of the quality", "the reason", "a doubt")
     assert notes.verdict_notes(plain) == expected
 
@@ -120,3 +123,22 @@ def test_all_are_read_in_order_and_none_holds_a_brace(growth: SimpleNamespace) -
 def test_every_rule_is_called() -> None:
     declared = {value for name, value in vars(notes).items() if name.endswith("_note")}
     assert declared == {*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN}
+
+
+@pytest.mark.parametrize("effect", ["input_delay", "sensor_delay", "time_shift"])
+@pytest.mark.parametrize(
+    ("delay", "uncertainty", "told"), [(1e-3, 2e-3, True), (3e-3, 2e-3, False), (1e-3, 0.0, False)]
+)
+def test_a_delay_shorter_than_the_clocks_can_tell_is_said(
+    effect: str, delay: float, uncertainty: float, told: bool
+) -> None:
+    late = effect_named(effect)
+    structure = compose(AXIS, (late,))
+    name = structure.parameter_name(late, late.parameters[0].name)
+    model = SimpleNamespace(effects=(late,), fit=SimpleNamespace(values={name: delay}, structure=structure))
+    found = basis(judgement=SimpleNamespace(verdict="effect", reason="", model=model))
+    record = replace(found.campaign.records[0], clock_uncertainty=uncertainty)
+    found = replace(found, campaign=SimpleNamespace(records=(record,)))
+    note = notes.clocks_note(found)
+    assert (note is not None) == told
+    assert note is None or f"{effect} of 0.001 s" in note

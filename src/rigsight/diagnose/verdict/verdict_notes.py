@@ -155,6 +155,26 @@ def imitations_note(basis: Basis) -> str | None:
     )
 
 
+def clocks_note(basis: Basis) -> str | None:
+    """Tell that a delay is shorter than the clocks of the records can tell."""
+    model, told = basis.found.judgement.model, []
+    least = max((record.clock_uncertainty for record in basis.campaign.records), default=0.0)
+    for effect in model.effects if model is not None and least > 0.0 else ():
+        late = [expression for expression in (effect.delay, effect.reading_delay) if expression is not None]
+        symbols = {str(symbol) for expression in late for symbol in expression.free_symbols}
+        for parameter in effect.parameters:
+            value = model.fit.values[model.fit.structure.parameter_name(effect, parameter.name)]
+            if parameter.name in symbols and abs(value) < least:
+                told.append(f"{effect.name} of {abs(value):.2g} s")
+    if not told:
+        return None
+    return (
+        f"{' and '.join(told)}: shorter than the {least:.2g} s by which time stamps of the records may be wrong (they jitter, or "
+        "signals have clocks of their own), so it may come from the clocks, not from the rig. Record all signals with one clock "
+        "to find out."
+    )
+
+
 ON_THE_COMPARISON: tuple[Rule, ...] = (
     open_factor_note,
     moving_at_rest_note,
@@ -163,5 +183,5 @@ ON_THE_COMPARISON: tuple[Rule, ...] = (
     sensitive_motion_note,
 )
 """How models were compared; read before the reason of the verdict."""
-ON_WHAT_STAYS_OPEN: tuple[Rule, ...] = (imitations_note,)
+ON_WHAT_STAYS_OPEN: tuple[Rule, ...] = (imitations_note, clocks_note)
 """Read after the reason of the verdict and the doubts about parameters."""

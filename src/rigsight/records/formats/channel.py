@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -46,6 +46,8 @@ class TimeAxis:
         Reads stored stamps; None for an even axis.
     unit
         Of dt, t0 and stamps.
+    origin
+        Moment from which they count, the same for all channels of a file; None where the file does not say.
     """
 
     n_samples: int
@@ -53,6 +55,7 @@ class TimeAxis:
     t0: float = 0.0
     load: Load | None = None
     unit: str = "s"
+    origin: np.datetime64 | None = None
 
     def stamps(self) -> NDArray[np.float64]:
         """Return the time stamps, shape (n_samples,)."""
@@ -79,6 +82,8 @@ class Channel:
         Its own time; None where time is a channel like any other.
     stored
         How stored numbers become quantities.
+    origin
+        Of a channel of dates, the moment from which its seconds count.
     """
 
     name: str
@@ -87,6 +92,7 @@ class Channel:
     unit: str | None = None
     axis: TimeAxis | None = None
     stored: Stored = AS_STORED
+    origin: np.datetime64 | None = None
 
     @property
     def short_name(self) -> str:
@@ -268,14 +274,20 @@ def stated_unit(text: object) -> str | None:
 
 def with_distinct_names(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     """Return the channels with printable names, with a number behind each that is not the first of its name."""
-    channels = tuple(replace(channel, name=printable(channel.name)) for channel in channels)
-    taken, used, named = {channel.name for channel in channels}, Counter[str](), []
-    for channel in channels:
-        used[channel.name] += 1
-        name = channel.name
-        while used[channel.name] > 1 and name in taken:
-            name = f"{channel.name}_{used[channel.name]}"
-            used[channel.name] += name in taken
+    channels = tuple(channels)
+    names = distinct_names([printable(channel.name) for channel in channels])
+    return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
+
+
+def distinct_names(names: Sequence[str]) -> list[str]:
+    """Return the names with a number behind each that is not the first of its kind."""
+    taken, used, distinct = set(names), Counter[str](), []
+    for own in names:
+        used[own] += 1
+        name = own
+        while used[own] > 1 and name in taken:
+            name = f"{own}_{used[own]}"
+            used[own] += name in taken
         taken.add(name)
-        named.append(channel if name == channel.name else replace(channel, name=name))
-    return tuple(named)
+        distinct.append(name)
+    return distinct

@@ -55,9 +55,8 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
         if np.isnan(table[:, i]).all():
             refused.append(Refused(name, "holds text"))
             continue
-        # Columns without a name of their own are told apart by their number, also in a campaign.
-        called = name if name and layout.names.count(name) == 1 else str(i + 1)
-        channels.append(Channel(called, table.shape[0], _load(table, i), layout.unit(i)))
+        # A column without a name is called by its number, also in a campaign.
+        channels.append(Channel(name or str(i + 1), table.shape[0], _load(table, i), layout.unit(i)))
     yield ChannelFile(with_distinct_names(channels), tuple(refused), "delimited text")
 
 

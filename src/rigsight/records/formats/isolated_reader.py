@@ -43,8 +43,8 @@ def open_isolated(kind: str, path: Path) -> Iterator[ChannelFile]:
     with _Process(kind, path) as process:
         contents = process.answer()[0]
         axes = [
-            TimeAxis(n_samples, load=process.load("axis", i), unit=unit)
-            for i, (n_samples, unit) in enumerate(contents["axes"])
+            TimeAxis(n_samples, load=process.load("axis", i), unit=unit, origin=_moment(origin))
+            for i, (n_samples, unit, origin) in enumerate(contents["axes"])
         ]
         channels = tuple(
             Channel(
@@ -54,10 +54,15 @@ def open_isolated(kind: str, path: Path) -> Iterator[ChannelFile]:
                 unit,
                 None if axis is None else axes[axis],
                 Stored.of_json(stored),
+                _moment(origin),
             )
-            for i, (name, n_samples, unit, axis, stored) in enumerate(contents["channels"])
+            for i, (name, n_samples, unit, axis, stored, origin) in enumerate(contents["channels"])
         )
         yield ChannelFile(channels, tuple(Refused(*one) for one in contents["refused"]))
+
+
+def _moment(text: str | None) -> np.datetime64 | None:
+    return None if text is None else np.datetime64(text, "ns")
 
 
 class _Process:

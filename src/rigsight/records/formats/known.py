@@ -6,6 +6,7 @@ imported when a file of that format is opened.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
@@ -85,6 +86,11 @@ def _is_uff(head: bytes) -> bool:
     return len(lines) > 1 and lines[0].rstrip() == b"    -1" and lines[1][:6].strip().isdigit()
 
 
+def _is_json(head: bytes) -> bool:
+    # A line in brackets may also be the head of a section in a text.
+    return re.match(rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*[\[{]|\{\s*\")", head) is not None
+
+
 FORMATS = (
     Format(
         "matlab",
@@ -101,6 +107,7 @@ FORMATS = (
     Format("tdms", "TDMS", (".tdms",), _is_tdms, "nptdms"),
     Format("parquet", "Parquet", (".parquet",), _is_parquet, "pyarrow", isolated=True),
     Format("uff", "UFF", (".uff", ".unv"), _is_uff, "pyuff"),
+    Format("json", "JSON", (".json", ".jsonl", ".ndjson"), _is_json),
 )
 BY_SUFFIX = {suffix: known for known in FORMATS for suffix in known.suffixes}
 PACKAGES = {known.key: known.package for known in FORMATS if known.isolated and known.package}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import UTC
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,9 @@ def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int
     if master is None or _conversion(group.channels[master]) == _ALGEBRAIC:
         return None
     unit = stated_unit(group.channels[master].unit) or "s"
-    return TimeAxis(n_samples, load=lambda: file.get_master(number), unit=unit)
+    # The times of all groups count from the start of the measurement.
+    start = np.datetime64(file.header.start_time.astimezone(UTC).replace(tzinfo=None), "ns")
+    return TimeAxis(n_samples, load=lambda: file.get_master(number), unit=unit, origin=start)
 
 
 def _load(file: Any, number: int, index: int) -> Load:

@@ -18,7 +18,7 @@ from rigsight.records.formats.channel import (
     stated_unit,
 )
 from rigsight.records.formats.stored_numbers import stored_by
-from rigsight.records.formats.time_stamps import seconds_since_first
+from rigsight.records.formats.time_stamps import earliest, seconds_since
 
 UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
 
@@ -34,6 +34,8 @@ def open_parquet(path: Path) -> Iterator[ChannelFile]:
         schema = file.schema_arrow
         check_count(path.name, len(schema))
         n_rows = file.metadata.num_rows
+        dated = [column.name for column in schema if _is_date(column.type)]
+        origin = _origin(file, dated) if n_rows and len(set(schema.names)) == len(schema.names) else None
         channels: list[Channel] = []
         refused: list[Refused] = []
         for column in schema:
@@ -45,16 +47,26 @@ def open_parquet(path: Path) -> Iterator[ChannelFile]:
                 refused.append(Refused(column.name, "holds a single number" if n_rows else "is empty"))
             else:
                 unit = "s" if _is_time(column.type) else _unit(column.metadata)
+                own = origin if _is_date(column.type) else None
                 stored = stored_by(_texts(column.metadata))
-                channels.append(Channel(column.name, n_rows, _load(file, column.name), unit, stored=stored))
+                load = _load(file, column.name, own)
+                channels.append(Channel(column.name, n_rows, load, unit, stored=stored, origin=own))
         yield ChannelFile(tuple(channels), tuple(refused))
 
 
-def _load(file: Any, name: str) -> Load:
+def _origin(file: Any, dated: list[str]) -> np.datetime64 | None:
+    """Return the earliest of the first dates of the columns."""
+    if not dated:
+        return None
+    (first,) = [next(file.iter_batches(batch_size=1, columns=dated))]
+    return earliest(np.datetime64(first.column(name).to_numpy(zero_copy_only=False)[0]) for name in dated)
+
+
+def _load(file: Any, name: str, origin: np.datetime64 | None) -> Load:
     def samples() -> NDArray[Any]:
         column = file.read(columns=[name]).column(name)
         if _is_time(column.type):
-            return seconds_since_first(column.to_numpy())
+            return seconds_since(column.to_numpy(), origin)
         # Missing cells of whole numbers become NaN, and are told as such.
         return np.asarray(column.to_numpy())
 
@@ -65,6 +77,12 @@ def _is_numeric(kind: Any) -> bool:
     from pyarrow import types
 
     return bool(types.is_integer(kind) or types.is_floating(kind)) or _is_time(kind)
+
+
+def _is_date(kind: Any) -> bool:
+    from pyarrow import types
+
+    return bool(types.is_timestamp(kind))
 
 
 def _is_time(kind: Any) -> bool:

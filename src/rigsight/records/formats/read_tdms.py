@@ -19,7 +19,7 @@ from rigsight.records.formats.channel import (
     stated_unit,
 )
 from rigsight.records.formats.stored_numbers import stored_by
-from rigsight.records.formats.time_stamps import seconds_since_first
+from rigsight.records.formats.time_stamps import earliest, seconds_since
 
 SCALES = (
     "Polynomial",
@@ -41,8 +41,8 @@ UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription", "unit", "Unit")
 def open_tdms(path: Path) -> Iterator[ChannelFile]:
     """Yield the channels of a TDMS file, named ``group/channel``.
 
-    A waveform's own axis comes from ``wf_increment`` and ``wf_start_offset``, its unit from ``unit_string``. A channel of time
-    stamps counts in seconds from its first.
+    A waveform's own axis comes from ``wf_increment``, ``wf_start_time`` and ``wf_start_offset``, its unit from ``unit_string``.
+    Start times and channels of dates count in seconds from the earliest of the file.
     """
     from nptdms import TdmsFile
 
@@ -51,6 +51,8 @@ def open_tdms(path: Path) -> Iterator[ChannelFile]:
             raise ValueError("the last segment is incomplete")
         channels: list[Channel] = []
         refused: list[Refused] = []
+        every = [channel for group in file.groups() for channel in group.channels()]
+        origin = earliest(moment for channel in every if (moment := _start(channel)) is not None)
         for group in file.groups():
             for channel in group.channels():
                 name = f"{group.name}/{channel.name}"
@@ -69,11 +71,11 @@ def open_tdms(path: Path) -> Iterator[ChannelFile]:
                         )
                     )
                 else:
+                    dated = origin if kind == "M" else None
                     unit = "s" if kind == "M" else _unit(channel.properties)
                     stored = stored_by(_of_users(channel.properties))
-                    channels.append(
-                        Channel(name, len(channel), _load(channel, kind), unit, _axis(channel), stored)
-                    )
+                    axis, load = _axis(channel, origin), _load(channel, dated)
+                    channels.append(Channel(name, len(channel), load, unit, axis, stored, dated))
         yield ChannelFile(tuple(channels), tuple(refused))
 
 
@@ -95,24 +97,35 @@ def _of_users(properties: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in properties.items() if not name.startswith(("NI_", "wf_"))}
 
 
-def _load(channel: Any, kind: str) -> Load:
+def _load(channel: Any, origin: np.datetime64 | None) -> Load:
     def samples() -> NDArray[Any]:
         read: NDArray[Any] = channel[:]
-        return seconds_since_first(read) if kind == "M" else read
+        return seconds_since(read, origin) if read.dtype.kind in "mM" else read
 
     return samples
 
 
-def _axis(channel: Any) -> TimeAxis | None:
+def _start(channel: Any) -> np.datetime64 | None:
+    """Return the moment of a channel's first sample: the first date of a channel of dates, or the start of a waveform."""
+    if np.dtype(channel.dtype).kind == "M":
+        return np.datetime64(channel[0]) if len(channel) else None
+    start = channel.properties.get("wf_start_time")
+    return start if isinstance(start, np.datetime64) and "wf_increment" in channel.properties else None
+
+
+def _axis(channel: Any, origin: np.datetime64 | None) -> TimeAxis | None:
     properties = channel.properties
     increment = properties.get("wf_increment")
     if not isinstance(increment, int | float) or not increment > 0.0:
         return None
-    start = properties.get("wf_start_offset", 0.0)
+    offset = properties.get("wf_start_offset", 0.0)
     unit = stated_unit(properties.get("wf_xunit_string")) or "s"
-    return TimeAxis(
-        len(channel), float(increment), float(start) if isinstance(start, int | float) else 0.0, unit=unit
-    )
+    first = float(offset) if isinstance(offset, int | float) else 0.0
+    start = _start(channel)
+    is_dated = start is not None and not np.isnat(start) and origin is not None and unit == "s"
+    if is_dated:
+        first += float(seconds_since(np.array([start]), origin)[0])
+    return TimeAxis(len(channel), float(increment), first, unit=unit, origin=origin if is_dated else None)
 
 
 def _unit(properties: Any) -> str | None:

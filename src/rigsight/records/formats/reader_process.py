@@ -101,10 +101,13 @@ def _contents(file: ChannelFile, axes: list[TimeAxis]) -> dict[str, Any]:
                 one.unit,
                 None if one.axis is None else axes.index(one.axis),
                 asdict(one.stored),
+                None if one.origin is None else str(one.origin),
             ]
             for one in file.channels
         ],
-        "axes": [[axis.n_samples, axis.unit] for axis in axes],
+        "axes": [
+            [axis.n_samples, axis.unit, None if axis.origin is None else str(axis.origin)] for axis in axes
+        ],
         "refused": [[one.name, one.reason] for one in file.refused],
     }
 

@@ -36,6 +36,7 @@ class ColumnTable(FileTable):
     """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset; or ``unit = "mA"`` instead.
 
     ``unwrap = true`` for an angle that begins again after a full turn, or the period of a counter.
+    ``time`` names the column of its time, ``file`` the file that holds both, where they are not those of the record.
     """
 
     name: str | int
@@ -43,6 +44,8 @@ class ColumnTable(FileTable):
     offset: Number | None = None
     unit: Annotated[str, Field(min_length=1)] | None = None
     unwrap: bool | Annotated[float, Field(allow_inf_nan=False, gt=0.0)] | None = None
+    time: str | int | None = None
+    file: Annotated[str, Field(min_length=1)] | None = None
 
 
 class RigTable(FileTable):
@@ -67,6 +70,8 @@ class RecordTable(FileTable):
     hold: Hold = "foh"
     dt: Seconds | None = None
     resample: Seconds | None = None
+    start: Number | None = None
+    end: Number | None = None
     columns: dict[str, str | int | ColumnTable] = {}
     separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
     decimal: Annotated[str, Field(pattern=r"^[.,]$")] | None = None

@@ -112,7 +112,7 @@ def read_listed_record(
     """
     where = where or Where(path.name, {"records": [None] * (number - 1) + [{"file": record.file}]})
     own = ("records", number - 1)
-    columns = _columns(where, own, rig, record)
+    columns = _columns(path, where, own, rig, record)
     constants = checked_numbers(where, (*own, "constants"), rig, rig.constants, record.constants)
     _check_inputs(where, own, rig, record)
     try:
@@ -132,6 +132,8 @@ def read_listed_record(
             hold=record.hold,
             dt=record.dt,
             resample=record.resample,
+            start=record.start,
+            end=record.end,
             separator=record.separator,
             decimal=record.decimal,
             header=record.header,
@@ -151,7 +153,9 @@ def _own(rig: Rig) -> list[str]:
     return [signal.name for signal in (*rig.inputs, *rig.outputs)]
 
 
-def _columns(where: Where, own: Location, rig: Rig, record: RecordTable) -> dict[str, ColumnMapping]:
+def _columns(
+    path: Path, where: Where, own: Location, rig: Rig, record: RecordTable
+) -> dict[str, ColumnMapping]:
     known = [TIME, *_own(rig), *signals_beside(_own(rig))]
     columns = {}
     for signal, column in record.columns.items():
@@ -165,10 +169,13 @@ def _columns(where: Where, own: Location, rig: Rig, record: RecordTable) -> dict
                 columns[signal] = ColumnMapping(column)
             else:
                 columns[signal] = ColumnMapping(
-                    column.name, column.scale, column.offset, column.unit, column.unwrap
+                    column.name, column.scale, column.offset, column.unit, column.unwrap, column.time
                 )
         except InputError as error:
             raise InputError(f"{here}: {error}") from None
+        if not isinstance(column, str | int) and column.file is not None:
+            file = inside(path, replace(where, data={}).at(*own, "columns", signal, "file"), column.file)
+            columns[signal] = replace(columns[signal], file=file)
     return columns
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from rigsight.errors import InputError
 from rigsight.records import Kind, Role
 from rigsight.records.channel_summary import step_and_gaps
 from rigsight.records.channel_units import has_si, in_drive_unit, is_a
+from rigsight.records.clocks import increases, is_time
 from rigsight.records.excitation_kind import guess_amplitude, guess_kind
 from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
 from rigsight.records.read_record import TIME
@@ -90,7 +91,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     InputError
         If a channel cannot be read.
     """
-    guess = guess_file(file.channels, rigs)
+    guess = guess_file(file.channels, rigs, _rising(file.channels))
     no_time = ""
     if guess.time.channel is not None and not _rises(guess.time.channel):
         no_time = f"{quoted(guess.time.channel.name)} does not increase"
@@ -145,24 +146,22 @@ def _rises(time: Channel) -> bool:
 def _timing(guess: FileGuess, no_time: str) -> tuple[list[str], int]:
     """Return the keys of timing other than the time column, and the number of blanks."""
     found = [one.channel for one in guess.signals if one.channel is not None]
-    if guess.time.is_clear or guess.time.candidates:
+    if guess.time.is_clear or guess.time.candidates or guess.times:
         return [], 0
     if not found or any(channel.axis is None for channel in found):
         why = no_time or "no channel of time was found"
         return [f"dt = {BLANK}  # sample time [s]: {why}"], 1
-    steps = []
-    for channel in found:
-        with suppress(InputError):
-            assert channel.axis is not None
-            steps.append((channel.n_samples, step_and_gaps(channel.axis.stamps())[0]))
-    if len(set(steps)) <= 1:
-        return [], 0
-    finest = min((step for _, step in steps if step), default=None)
-    if finest is None:
-        return [], 0
-    return [
-        f"resample = {finest:.9g}  # [s]: the signals have different sample rates and are resampled; check"
-    ], 0
+    return [], 0
+
+
+def _rising(channels: Sequence[Channel]) -> Channel | None:
+    """Return the first channel if it rises throughout; none where a channel is called like time or has its own."""
+    if not channels or any(channel.axis is not None or is_time(channel.name) for channel in channels):
+        return None
+    with suppress(InputError):
+        if increases(as_floats(channels[0].load())):
+            return channels[0]
+    return None
 
 
 def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], int]:
@@ -172,11 +171,12 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     left = _left(guess, channels)
     for one in (guess.time, *guess.signals):
         if one.channel is not None and one.is_alone:
-            (line,) = _column(one)
+            (line,) = _column(one, guess.clocks)
             mark = "; " if "  # " in line else "  # "
-            lines.append(f"{line}{mark}guessed: the only remaining channel; check")
+            why = "it rises throughout" if one.signal == TIME else "the only remaining channel"
+            lines.append(f"{line}{mark}guessed: {why}; check")
         elif one.channel is not None:
-            lines += _column(one)
+            lines += _column(one, guess.clocks)
         elif one.candidates:
             lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {_listed(one.candidates)}")
             blanks += 1
@@ -216,6 +216,7 @@ def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
     """Return the channels that belong to no signal yet; empty if there are none."""
     known = (guess.time, guess.reference, *guess.signals)
     taken = {one.channel.name for one in known if one.channel is not None}
+    taken |= guess.times
     free = [channel.name for channel in channels if channel.name not in taken]
     return f"one of: {_listed(free)}" if free else ""
 
@@ -235,14 +236,27 @@ def _coarse_step(time: Channel) -> float | None:
     return None
 
 
+def _with_time(line: str, guess: Guess, name: str, clocks: Mapping[str, str]) -> str:
+    """Return the line that maps a signal with the time that is its own."""
+    own = f"{{ name = {name}, time = {quoted(clocks[guess.signal])}"
+    if f"{{ name = {name}" in line:
+        return line.replace(f"{{ name = {name}", own, 1)
+    return line.replace(f"{guess.signal} = {name}", f"{guess.signal} = {own} }}", 1)
+
+
 def _unit_of(guess: Guess) -> str:
     return f"[{guess.si}], " if has_si(guess.si) else ""
 
 
-def _column(guess: Guess) -> list[str]:
+def _column(guess: Guess, clocks: Mapping[str, str]) -> list[str]:
     """Return the line that maps a signal; empty if its channel has the name of the signal."""
     assert guess.channel is not None
     name = quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)
+    if guess.signal in clocks:
+        return [
+            _with_time(line, guess, name, clocks)
+            for line in _column(guess, {}) or [f"{guess.signal} = {name}"]
+        ]
     if guess.unit is None:
         needed = guess.channel.name != guess.signal
         if guess.signal == TIME and (step := _coarse_step(guess.channel)):

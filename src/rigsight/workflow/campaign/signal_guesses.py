@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rigsight.records.channel_names import closeness, split_unit
 from rigsight.records.channel_units import DRIVES, has_si, is_a
+from rigsight.records.clocks import own_clocks
 from rigsight.records.formats.channel import Channel
 from rigsight.records.read_record import TIME
 from rigsight.records.reference import REFERENCE
@@ -15,6 +16,8 @@ from rigsight.rigs import Rig
 _FITTING_UNIT = 0.5
 _CLEAR = 2.0
 _REGRESSION = ("x", "y")
+_MOVING, _TURNING = "x", "angle"
+"""The position of one moving mass, and what it is called where it turns."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +56,18 @@ class Guess:
 
 @dataclass(frozen=True)
 class FileGuess:
-    """What the channels of a file probably are, for one rig."""
+    """What the channels of a file probably are, for one rig.
+
+    Where signals have clocks of their own, `times` are their names, and `clocks` those of the signals that are known.
+    """
 
     rig: Rig
     time: Guess
     signals: tuple[Guess, ...] = field(default=())
     score: float = 0.0
     reference: Guess = field(default=Guess(REFERENCE, ""))
+    clocks: Mapping[str, str] = field(default_factory=dict)
+    times: frozenset[str] = frozenset()
 
     @property
     def open_questions(self) -> int:
@@ -73,7 +81,7 @@ def telling(rig: Rig) -> tuple[str, ...]:
     return (*(signal.name for signal in rig.inputs), *outputs)
 
 
-def guess_file(channels: Sequence[Channel], rigs: Iterable[Rig]) -> FileGuess:
+def guess_file(channels: Sequence[Channel], rigs: Iterable[Rig], rising: Channel | None = None) -> FileGuess:
     """Return the rig that matches the channels best, with the channel of each signal.
 
     Parameters
@@ -82,11 +90,40 @@ def guess_file(channels: Sequence[Channel], rigs: Iterable[Rig]) -> FileGuess:
         Of an open file; none is read.
     rigs
         Those that come into question.
+    rising
+        Channel that is the time if none is called like it.
     """
-    guesses = [_guess_rig(rig, channels) for rig in rigs]
+    own = own_clocks([channel.name for channel in channels])
+    times = [channels[number] for number in set(own.values())]
+    guesses = [_guess_rig(rig, channels, rising, times) for rig in rigs]
     found = min(guesses, key=_unlikely)
     found = replace(found, reference=_guess_reference(found, channels))
-    return replace(found, signals=_completed_by_unit(found, channels))
+    found = replace(found, signals=_completed_by_unit(found, channels, times))
+    return _with_clocks(found, channels, own)
+
+
+def _with_clocks(found: FileGuess, channels: Sequence[Channel], own: Mapping[int, int]) -> FileGuess:
+    """Return the guess with the time of each signal, where the file shows that they have several."""
+    numbers = {channel.name: number for number, channel in enumerate(channels)}
+    clocks = {
+        one.signal: channels[own[numbers[one.channel.name]]]
+        for one in found.signals
+        if one.channel is not None and numbers[one.channel.name] in own
+    }
+    # A channel that is yet to be filled in has the time of its own as well.
+    mapped = [one for one in found.signals if one.channel is not None]
+    free = [
+        c for n, c in enumerate(channels) if n not in own and c not in (channels[i] for i in own.values())
+    ]
+    if not own or len(clocks) < len(mapped) or (not mapped and free):
+        return found
+    if len(mapped) == len(found.signals) and len({id(clock) for clock in clocks.values()}) == 1:
+        clock = next(iter(clocks.values()))
+        return replace(found, time=Guess(TIME, "s", clock, _unit_of(clock), clock.unit is not None))
+    named = {signal: clock.name for signal, clock in clocks.items()}
+    return replace(
+        found, time=Guess(TIME, "s"), clocks=named, times=frozenset(channels[i].name for i in own.values())
+    )
 
 
 def _guess_reference(found: FileGuess, channels: Sequence[Channel]) -> Guess:
@@ -125,16 +162,24 @@ def _is_spoken_of(guess: FileGuess) -> bool:
     )
 
 
-def _completed_by_unit(found: FileGuess, channels: Sequence[Channel]) -> tuple[Guess, ...]:
+def _completed_by_unit(
+    found: FileGuess, channels: Sequence[Channel], times: Sequence[Channel]
+) -> tuple[Guess, ...]:
     """Return the guesses; a signal without a match takes the only remaining channel with its unit, whatever its name.
 
     The only output without a channel also takes the only remaining channel without a unit; an input may have no channel.
     """
     guesses = list(found.signals)
     for i, guess in enumerate(guesses):
+        taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]
+        angles = [c for c in channels if c not in taken and closeness(c.name, _TURNING) >= _CLEAR]
+        # One moving mass may turn as well; only once its rig is chosen, because rigs of several motions have angles beside x.
+        if found.rig.has_one_motion and guess.signal == _MOVING and not guess.is_clear and len(angles) == 1:
+            guesses[i] = _of_channel(guess, angles[0])
+    for i, guess in enumerate(guesses):
         if guess.is_clear or guess.candidates:
             continue
-        taken = [found.time.channel, found.reference.channel, *(own.channel for own in guesses)]
+        taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]
         # The input of a drive has the unit of its amplifier.
         units = [guess.si] if has_si(guess.si) else DRIVES
         fitting = [c for c in channels if c not in taken and any(is_a(_unit_of(c) or "", u) for u in units)]
@@ -143,7 +188,7 @@ def _completed_by_unit(found: FileGuess, channels: Sequence[Channel]) -> tuple[G
             guesses[i] = _of_channel(guess, fitting[0])
     needed = (*(signal.name for signal in found.rig.inputs), *found.rig.required_outputs)
     lacking = [i for i, own in enumerate(guesses) if own.signal in needed and own.channel is None]
-    taken = [found.time.channel, found.reference.channel, *(own.channel for own in guesses)]
+    taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]
     left = [c for c in channels if c not in taken]
     if len(lacking) == len(left) == 1 and guesses[lacking[0]].signal in found.rig.required_outputs:
         own, alone = guesses[lacking[0]], left[0]
@@ -161,9 +206,13 @@ def _unit_of(channel: Channel) -> str | None:
     return channel.unit or split_unit(channel.name)[1]
 
 
-def _guess_rig(rig: Rig, channels: Sequence[Channel]) -> FileGuess:
+def _guess_rig(
+    rig: Rig, channels: Sequence[Channel], rising: Channel | None, times: Sequence[Channel]
+) -> FileGuess:
     time, _ = _guess(TIME, "s", channels, ())
-    taken = [time.channel] if time.channel is not None else []
+    if rising is not None and not time.is_clear and not time.candidates:
+        time = replace(_of_channel(time, rising), is_alone=True)
+    taken = [*times, *([time.channel] if time.channel is not None else [])]
     signals = (*rig.inputs, *rig.outputs)
     found, score = {}, 0.0
     # Signals with a clear name come first, so that no other signal takes their channel.

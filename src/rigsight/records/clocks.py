@@ -1,0 +1,266 @@
+"""Which clock does each signal of a record have: which channel of time is its own, and do signals share one?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.records.channel_names import NAMES_OF, closeness, plain_words
+from rigsight.records.column_mapping import Columns
+from rigsight.records.formats.time_stamps import seconds_since
+
+TIME = "t"
+_NAMED = 2.0
+_WORDS_OF_TIME = tuple(sorted(NAMES_OF[TIME], key=len, reverse=True))
+
+
+def is_time(name: str) -> bool:
+    """Return True if a channel is called like time, whatever its group."""
+    return closeness(name, TIME) >= _NAMED
+
+
+def own_clocks(names: Sequence[str]) -> Mapping[int, int]:
+    """Return the number of each channel -> the number of the time that is its own, where a file shows that; else without it.
+
+    A file shows it by names (``Time Force`` beside ``Force``), by groups (a time in the group of a channel, or in the nearest one
+    around it), or by order (columns of time of one name, each in front of its signals). One time alone belongs to no one in
+    particular.
+
+    Parameters
+    ----------
+    names
+        Of all channels, in the order of the file; ``group/channel`` where it has groups.
+    """
+    times = [number for number, name in enumerate(names) if is_time(name)]
+    named = _by_name(names)
+    if len(set(times) | set(named.values())) < 2:
+        return {}
+    clocks = {}
+    for number, name in enumerate(names):
+        if number in times or number in named.values():
+            continue
+        own = named.get(number, _nearest(names, times, number, name))
+        if own is not None:
+            clocks[number] = own
+    return clocks
+
+
+def _by_name(names: Sequence[str]) -> dict[int, int]:
+    """Return the times that are called like another channel and a word of time."""
+    found: dict[int, int] = {}
+    by_words: dict[tuple[str, str], int] = {}
+    for number, name in enumerate(names):
+        by_words.setdefault(_parts(name), number)
+    for number, name in enumerate(names):
+        group, words = _parts(name)
+        for word in _WORDS_OF_TIME:
+            for rest in (words.removeprefix(f"{word} "), words.removesuffix(f" {word}")):
+                other = by_words.get((group, rest))
+                if rest != words and other is not None and other != number:
+                    found.setdefault(other, number)
+    return found
+
+
+def _parts(name: str) -> tuple[str, str]:
+    group, _, short = name.rpartition("/")
+    return group, plain_words(short)
+
+
+def _nearest(names: Sequence[str], times: Sequence[int], number: int, name: str) -> int | None:
+    """Return the only time in the group of a channel or the nearest around it; of several of one name the one in front."""
+    group = name.rpartition("/")[0]
+    while True:
+        inside = [time for time in times if names[time].rpartition("/")[0] == group]
+        if len(inside) == 1:
+            return inside[0]
+        if inside:
+            return _in_front(names, inside, number)
+        if not group:
+            return None
+        group = group.rpartition("/")[0]
+
+
+def _in_front(names: Sequence[str], times: Sequence[int], number: int) -> int | None:
+    called = {_parts(names[time])[1].rstrip("0123456789 ") for time in times}
+    apart = all(after - before > 1 for before, after in zip(times, [*times[1:], len(names)], strict=True))
+    if len(called) > 1 or not apart or number < times[0]:
+        return None
+    return max(time for time in times if time < number)
+
+
+def possible_clocks(
+    names: Sequence[str],
+    signals: Mapping[str, int],
+    given: Mapping[str, int],
+    declared: int | None,
+) -> dict[str, list[int]]:
+    """Return the numbers of the times by which each signal may go, the first that increases is its own.
+
+    Parameters
+    ----------
+    names
+        Of all channels of the file.
+    signals
+        Signal -> number of its channel.
+    given
+        Signal -> number of the time that the campaign gives to it alone; it is the only one then.
+    declared
+        Number of the time that the campaign gives to all; a clock of its own that the file shows comes before it, because signals
+        on a foreign clock would be shifted in silence.
+    """
+    own = own_clocks(names)
+    return {
+        signal: [given[signal]]
+        if signal in given
+        else list(dict.fromkeys(one for one in (own.get(number), declared) if one is not None))
+        for signal, number in signals.items()
+    }
+
+
+def increases(stamps: NDArray[np.float64]) -> bool:
+    """Return True if numbers can be the stamps of a clock, shape (n_samples,)."""
+    return stamps.size > 1 and bool(np.all(np.diff(stamps) > 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """The time of a signal.
+
+    Attributes
+    ----------
+    label
+        How it is called.
+    stamps
+        Time stamps, shape (n_samples,).
+    unit
+        Stated by the file; None where it is that of the campaign.
+    origin
+        Moment from which they count; None where the file does not say.
+    """
+
+    label: str
+    stamps: NDArray[np.float64]
+    unit: str | None = None
+    origin: np.datetime64 | None = None
+
+
+def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock]) -> Columns:
+    """Return a table with the time of its signals: one for all where they share it, else the stamps of each.
+
+    Parameters
+    ----------
+    file
+        Name for messages.
+    time
+        Name of time among the signals.
+    table
+        What was read.
+    clocks
+        Signal -> its clock.
+
+    Raises
+    ------
+    InputError
+        If clocks differ, and do not count from the same moment or in the same unit.
+    """
+    chosen = list(clocks.values())
+    shared = shared_clock(chosen)
+    known = {signal: clock.origin for signal, clock in clocks.items() if clock.origin is not None}
+    if shared is not None:
+        labels = {**table.labels, time: shared.label}
+        units = table.units if shared.unit is None else {**table.units, time: shared.unit}
+        lines = table.lines if table.lines.size else np.arange(1, shared.stamps.size + 1, dtype=np.int64)
+        return replace(
+            table,
+            values={**table.values, time: shared.stamps},
+            labels=labels,
+            units=units,
+            lines=lines,
+            origins=known,
+        )
+    if len({clock.unit or "s" for clock in chosen}) > 1:
+        raise InputError(f"{file}: its signals have times in different units; export them in seconds.")
+    if 0 < len(known) < len(clocks):
+        dated = ", ".join(f"{signal} ({clocks[signal].label})" for signal in known)
+        raise InputError(
+            f"{file}: the clocks of the signals cannot be compared: only the time of {dated} has a date. Export all with a start "
+            "time, or all without."
+        )
+    first = min(known.values(), default=None)
+    axes: dict[str, NDArray[np.float64]] = {}
+    for signal, clock in clocks.items():
+        alike = next((s for s in axes if shared_clock([clocks[s], clock])), None)
+        if alike is not None:
+            axes[signal] = axes[alike]
+        elif first is None or clock.origin is None:
+            axes[signal] = clock.stamps
+        else:
+            axes[signal] = clock.stamps + float(seconds_since(np.array([clock.origin]), first)[0])
+    unit = next((clock.unit for clock in chosen if clock.unit is not None), None)
+    return replace(
+        table,
+        labels={**table.labels, time: chosen[0].label},
+        units=table.units if unit is None else {**table.units, time: unit},
+        axes=axes,
+        clocks={signal: clock.label for signal, clock in clocks.items()},
+        origins=dict.fromkeys(clocks, first) if first is not None else {},
+    )
+
+
+def side_by_side(file: str, time: str, tables: Mapping[Path, Columns]) -> Columns:
+    """Return the signals of several files as those of one record, each with the time of its file.
+
+    Parameters
+    ----------
+    file
+        Name of the record for messages.
+    time
+        Name of time among the signals.
+    tables
+        File -> what was read from it.
+
+    Raises
+    ------
+    InputError
+        As `with_clocks`.
+    """
+    values, labels, units, clocks = {}, {}, {}, {}
+    for path, table in tables.items():
+        for signal, samples in table.values.items():
+            if signal == time:
+                continue
+            values[signal] = samples
+            labels[signal] = f"{table.labels[signal]} of {path.name}"
+            label = table.clocks.get(signal, table.labels[time])
+            stamps = table.axes[signal] if table.axes else table.values[time]
+            clocks[signal] = Clock(
+                f"{label} of {path.name}", stamps, table.units.get(time), table.origins.get(signal)
+            )
+            if signal in table.units:
+                units[signal] = table.units[signal]
+    longest = max(tables.values(), key=lambda table: table.lines.size)
+    joint = Columns(
+        values,
+        labels,
+        longest.lines,
+        tuple(note for table in tables.values() for note in table.notes),
+        units,
+        row=longest.row,
+        names=tuple(name for table in tables.values() for name in table.names),
+    )
+    return with_clocks(file, time, joint, clocks)
+
+
+def shared_clock(clocks: Iterable[Clock]) -> Clock | None:
+    """Return the clock that all signals have, None if they differ."""
+    first, *others = clocks
+    alike = all(
+        other is first or (other.origin == first.origin and np.array_equal(other.stamps, first.stamps))
+        for other in others
+    )
+    return first if alike else None
