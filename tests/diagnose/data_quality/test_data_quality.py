@@ -306,17 +306,18 @@ def test_a_constant_start_is_not_stuck():
 
 def test_an_encoder_that_toggles_by_one_count_does_not_jump():
     record = sweeps()[0]
-    count = np.ptp(record["x"]) / 300
-    resting = count * np.round(record["x"] / count)
-    resting[2000:3000] = resting[2000]
-    resting[2400:2600:40] += count
-    assert not [f for f in sensor_faults(AXIS, record.with_signals(x=resting)) if f.kind == "jump"]
-    resting[2500] += 90 * count
-    assert [f for f in sensor_faults(AXIS, record.with_signals(x=resting)) if f.kind == "jump"]
+    size = np.ptp(record["u"]) / 20
+    given, resting = size * np.round(record["u"] / size), np.zeros(record.n_samples)
+    # Of fewer levels than the input, so that it is not called coarse.
+    resting[300::397] = 1e-3
+    assert sensor_faults(AXIS, record.with_signals(u=given, x=resting)) == []
+    resting[2100:] += 5e-3
+    (found,) = sensor_faults(AXIS, record.with_signals(u=given, x=resting))
+    assert found.kind == "jump"
 
 
 def test_steps_of_several_heights_are_not_said_to_be_one_amplitude():
-    record = replace(sweeps()[0], kind="step")
+    record = replace(sweeps()[0], kind="step", amplitude=None)
     steps = [replace(record.with_signals(u=h * record["u"]), name=f"s{h}") for h in (1.0, 2.0, 3.0)]
     (told,) = amplitude_dependences(AXIS, steps)
     assert (told.answer, "3 heights" in told.sentence) == ("cannot tell", True)

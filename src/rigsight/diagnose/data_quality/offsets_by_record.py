@@ -14,7 +14,7 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import Finding
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
 from rigsight.records.record import Record
@@ -22,9 +22,6 @@ from rigsight.rigs import Rig
 from rigsight.simulate.drift import can_drift
 
 _TOLERANCE = 1e-5
-_PER_DRIVE = 4.0
-"""Levels of a sensor, in units of its motion, up to which those of an input in units of its own explain them: runs forward
-and backward. A rig moves less fast than slowly, so its levels differ by more than its motion shows; by how much is assumed."""
 _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in every command.'
 
 
@@ -95,7 +92,7 @@ def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding
         moves, lowest, highest = _apart(holding, signal.name)
         pair = [record for record in holding if record.name in (lowest, highest)]
         driven = max((_apart(pair, one.name)[0] for one in rig.inputs), default=0.0)
-        if moves > max(1.0, _PER_DRIVE * driven):
+        if moves > max(1.0, NOTES.per_drive * driven):
             found.append(
                 Finding(
                     "offset",

@@ -119,6 +119,14 @@ class NoteNumbers:
         "convention",
         "Number of smallest increments of a channel up to which a change counts as quantization.",
     )
+    per_drive: float = number(
+        4.0,
+        "assumption",
+        (
+            "Ratio of levels of a sensor to those of an input, each in its own motion, up to which the input explains them (runs "
+            "forward and backward): a rig moves less fast than slowly."
+        ),
+    )
     rounding: float = number(
         1e-9,
         "convention",
