@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.records.clocks import is_time
 from rigsight.records.formats.channel import Channel, ChannelFile, Refused, with_distinct_names
 from rigsight.records.formats.channel_file import file_format, open_channels
 from rigsight.records.formats.read_csv import Layout, find_layout, kept_lines, refuse_thousands
@@ -55,8 +56,9 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
         if np.isnan(table[:, i]).all():
             refused.append(Refused(name, "holds text"))
             continue
-        # A column without a name is called by its number, also in a campaign.
-        channels.append(Channel(name or str(i + 1), table.shape[0], _load(table, i), layout.unit(i)))
+        # Columns without a name of their own are called by their number, also in a campaign; several times belong to their signals.
+        own = bool(name) and (layout.names.count(name) == 1 or is_time(name))
+        channels.append(Channel(name if own else str(i + 1), table.shape[0], _load(table, i), layout.unit(i)))
     yield ChannelFile(with_distinct_names(channels), tuple(refused), "delimited text")
 
 
