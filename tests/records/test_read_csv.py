@@ -120,7 +120,7 @@ BROKEN: list[tuple[str, str | bytes, dict[str, object], list[str]]] = [
     ("decimal comma told wrong", text(";", ","), {"decimal": "."}, ["line 2", 'decimal = ","']),
     ("decimal point told wrong", text(";"), {"decimal": ","}, ["line 2", 'decimal = "."']),
     ("separator is decimal", text(), {"separator": ",", "decimal": ","}, ["both ','"]),
-    ("wrong separator", text(), {"separator": ";"}, ["no column 't'", "'t,u,x'", "separator"]),
+    ("wrong separator", text(), {"separator": ";"}, ["no column 'u'", "'t,u,x'", "separator"]),
     ("column missing", text().replace("u", "curent"), {}, ["no column 'u'", "'t', 'curent', 'x'"]),
     ("column twice", text().replace("x", "u", 1), {}, ["2 columns are called 'u'", "number"]),
     ("no header", text(header=""), {}, ["no header", "1 to 3"]),

@@ -25,7 +25,7 @@ from rigsight.workflow.simulate import simulate_model
 Tables = dict[str, Any]
 Change = Callable[[Tables, Path], None]
 
-DT, N_SAMPLES = 0.01, 200
+DT, N_SAMPLES = 0.01, 240
 TRUTH = {"m": 2.0, "d": 12.0, "k": 800.0}
 BASE: Tables = {
     "title": "keys",
@@ -120,6 +120,22 @@ def in_text(old: str, new: str) -> Change:
     return change
 
 
+def with_later_times(_: Tables, folder: Path) -> None:
+    """Add a column of times that are a tenth of a sample later to the fitted record."""
+    rewritten(folder, "t,u,x,later", lambda t, u, x: (t, u, x, t + 0.1 * DT))
+
+
+def with_a_counter(_: Tables, folder: Path) -> None:
+    """Let the displacement of the fitted record begin again at 0 beyond 10 mm."""
+    rewritten(folder, "t,u,x", lambda t, u, x: (t, u, x % 0.01))
+
+
+def rewritten(folder: Path, header: str, row: Callable[[float, float, float], tuple[float, ...]]) -> None:
+    numbers = np.loadtxt(folder / "fit.csv", delimiter=",", skiprows=1)
+    lines = [",".join(f"{value:.9g}" for value in row(*own)) for own in numbers.tolist()]
+    (folder / "fit.csv").write_text("\n".join([header, *lines]) + "\n")
+
+
 def with_friction(tables: Tables, _: Path) -> None:
     tables["rig"]["effects"] = ["coulomb_friction"]
     tables["rig"]["parameters"]["T_c"] = 0.1
@@ -152,6 +168,8 @@ CHANGES: dict[str, tuple[Change, Change]] = {
     "records.hold": (nothing, of_fitted(hold="zoh")),
     "records.dt": (in_text("t,u,x", "n,u,x"), of_fitted(dt=DT)),
     "records.resample": (nothing, of_fitted(resample=0.5 * DT)),
+    "records.start": (nothing, of_fitted(start=0.3)),
+    "records.end": (nothing, of_fitted(end=2.1)),
     "records.columns": (in_text("t,u,x", "t,u,travel"), of_fitted(columns={"x": "travel"})),
     "records.separator": (in_text(",", "~"), of_fitted(separator="~")),
     "records.decimal": (nothing, of_fitted(decimal=",")),
@@ -163,6 +181,9 @@ CHANGES: dict[str, tuple[Change, Change]] = {
     "columns.scale": (nothing, of_x(scale=2.0)),
     "columns.offset": (nothing, of_x(offset=1.0)),
     "columns.unit": (nothing, of_x(unit="mm")),
+    "columns.unwrap": (with_a_counter, of_x(unwrap=0.01)),
+    "columns.time": (with_later_times, of_x(time="later")),
+    "columns.file": (nothing, of_x(file="other.csv")),
 }
 """By key: the campaign in which it matters, and how it is given there."""
 TOLD = {

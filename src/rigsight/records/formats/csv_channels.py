@@ -56,7 +56,7 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
         if np.isnan(table[:, i]).all():
             refused.append(Refused(name, "holds text"))
             continue
-        # Columns without a name of their own are called by their number, also in a campaign; several times belong to their signals.
+        # Columns without a name of their own are called by their number, also in a campaign; times belong to their signals.
         own = bool(name) and (layout.names.count(name) == 1 or is_time(name))
         channels.append(Channel(name if own else str(i + 1), table.shape[0], _load(table, i), layout.unit(i)))
     yield ChannelFile(with_distinct_names(channels), tuple(refused), "delimited text")
