@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from rigsight.workflow.inspect import Inspection
 
 
+_NAME_WIDTH = 16
+"""Of the columns of names, at least, where they are as long."""
+
+
 def inspect(
     file: Annotated[
         Path,
@@ -84,16 +88,19 @@ def _table(found: Inspection) -> Table:
                 rate,
                 *ends,
                 *("" if number is None else f"{number:.5g}" for number in (channel.minimum, channel.maximum)),
-                "" if channel.n_gaps is None else str(channel.n_gaps),
+                str(channel.n_gaps or ""),
                 str(channel.n_not_finite or ""),
             )
         )
     # A column that is empty for all channels is left out.
     told_of = [i for i in range(len(headings)) if i == 0 or any(row[i] for row in rows)]
-    table = Table(title=escape(f"{found.file} ({found.format})"), box=box.SIMPLE, title_justify="left")
+    title = escape(f"{found.file} ({found.format})")
+    table = Table(title=title, box=box.SIMPLE, title_justify="left", collapse_padding=True)
     for i in told_of:
         if i < 2:
-            table.add_column(headings[i], overflow="fold")
+            # Without a least width, numbers would leave a narrow terminal no room for the names.
+            longest = max(len(row[i]) for row in rows)
+            table.add_column(headings[i], overflow="fold", min_width=min(longest, _NAME_WIDTH))
         else:
             table.add_column(headings[i], justify="right", no_wrap=True)
     for row in rows:
