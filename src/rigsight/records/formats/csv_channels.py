@@ -14,7 +14,7 @@ from rigsight.errors import InputError
 from rigsight.records.clocks import is_time
 from rigsight.records.formats.channel import Channel, ChannelFile, Refused, with_distinct_names
 from rigsight.records.formats.channel_file import file_format, open_channels
-from rigsight.records.formats.read_csv import Layout, find_layout, kept_lines, refuse_thousands
+from rigsight.records.formats.layout import Layout, find_layout, kept_lines
 from rigsight.records.formats.text_file import read_text
 
 
@@ -49,7 +49,7 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
     table = _numbers(rows, layout)
     for i in range(len(layout.names)):
         if np.isfinite(table[:, i]).any():
-            refuse_thousands(path, layout, i, lines, kept[layout.n_above :], table[:, i])
+            layout.refuse_thousands(path, i, lines, kept[layout.n_above :], table[:, i])
     channels: list[Channel] = []
     refused: list[Refused] = []
     for i, name in enumerate(layout.names):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,52 +11,10 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError, nearest
 from rigsight.records.clocks import TIME, increases, possible_clocks
 from rigsight.records.column_mapping import ColumnMapping, Columns
-from rigsight.records.formats.channel import check_count, distinct_names, printable, stated_unit
-from rigsight.records.formats.dialect import Dialect, is_comment, looks_like_names, sniff
-from rigsight.records.formats.table_head import (
-    LAST_LINES,
-    MOST_HEAD,
-    UnclearHeadError,
-    find_head,
-    without_comment,
-)
+from rigsight.records.formats.channel import distinct_names
+from rigsight.records.formats.dialect import Dialect
+from rigsight.records.formats.layout import Layout, find_layout, kept_lines
 from rigsight.records.formats.text_file import read_text
-
-_FEWEST_GROUPED = 10
-"""Numbers with three digits behind their sign: one in ten decimals without zeros at the end has less, so that in ten numbers one
-shows with a probability of 0.65, in the hundreds of a record for certain."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How the columns of a text file are laid out.
-
-    Attributes
-    ----------
-    dialect
-        How cells and numbers are written.
-    names
-        Of the columns; their numbers where the file has no header.
-    n_above
-        How many of the kept lines stand above the first row of numbers.
-    has_names
-        Whether the file has a header.
-    notes
-        What was assumed.
-    units
-        Cells of a units row, empty where there is none.
-    """
-
-    dialect: Dialect
-    names: tuple[str, ...]
-    n_above: int
-    has_names: bool
-    notes: tuple[str, ...]
-    units: tuple[str, ...] = ()
-
-    def unit(self, position: int) -> str | None:
-        """Return the unit that the row of units states for a column, None if it states none."""
-        return stated_unit(self.units[position]) if position < len(self.units) else None
 
 
 def read_csv(
@@ -126,7 +82,7 @@ def read_csv(
     needed = found | {f"time {one}": one for possible in clocks.values() for one in possible}
     table = _numbers(path, lines, rows, layout, needed, blank=several) if needed else np.empty((len(rows), 0))
     for i, position in enumerate(needed.values()):
-        refuse_thousands(path, layout, position, lines, rows, table[:, i])
+        layout.refuse_thousands(path, position, lines, rows, table[:, i])
     cells = {position: np.ascontiguousarray(table[:, i]) for i, position in enumerate(needed.values())}
     values, axes, called, distinct = {}, {}, {}, distinct_names(layout.names)
     units = {signal: layout.unit(position) for signal, position in found.items()}
@@ -166,61 +122,6 @@ def read_csv(
     )
 
 
-def refuse_thousands(
-    path: Path,
-    layout: Layout,
-    position: int,
-    lines: Sequence[str],
-    rows: Sequence[int],
-    numbers: NDArray[np.float64],
-) -> None:
-    """Refuse a column whose decimal sign separates thousands: ``39,998`` beside ``998``.
-
-    Decimals are written with as many places in all cells, or without zeros at their end, so that some have less than three.
-
-    Parameters
-    ----------
-    path, lines
-        The file and its lines.
-    layout
-        How they are laid out.
-    position
-        Index of the column.
-    rows
-        Numbers of the lines with numbers.
-    numbers
-        The column as it was read, shape (n_rows,).
-
-    Raises
-    ------
-    InputError
-        Naming the file, the first line with such a number, and the column.
-    """
-    finite = numbers[np.isfinite(numbers)]
-    whole = finite == np.round(finite)
-    # Cheap questions first: of three decimals at most, and numbers with and without.
-    if whole.all() or not whole.any() or np.max(np.abs(finite)) >= 1000.0:
-        return
-    if np.min(np.abs(finite[~whole])) < 1.0 or np.max(np.abs(1e3 * finite - np.round(1e3 * finite))) > 1e-6:
-        return
-    sign, grouped, plain = layout.dialect.decimal, [], False
-    for number in rows:
-        cell = layout.dialect.cells(lines[number - 1])[position]
-        if sign not in cell:
-            plain = True
-        elif re.fullmatch(rf"[+-]?[1-9]\d{{0,2}}{re.escape(sign)}\d{{3}}", cell):
-            grouped.append((number, cell))
-        else:
-            return
-    if plain and len(grouped) >= _FEWEST_GROUPED:
-        number, cell = grouped[0]
-        raise InputError(
-            f"{path.name}, line {number}, column '{layout.names[position]}': '{cell}' has a '{sign}' between thousands: in all "
-            f"{len(grouped)} numbers with a '{sign}' three digits follow, and others have none. Export the column without signs "
-            "between thousands."
-        )
-
-
 def _clocks(
     path: Path, columns: Mapping[str, ColumnMapping], layout: Layout, found: Mapping[str, int]
 ) -> dict[str, list[int]]:
@@ -248,90 +149,6 @@ def _filled(stamps: NDArray[np.float64], column: NDArray[np.float64]) -> int:
     """Return the number of rows up to the last in which a signal or its time is given."""
     filled = np.flatnonzero(~(np.isnan(stamps) & np.isnan(column)))
     return int(filled[-1]) + 1 if filled.size else 0
-
-
-def kept_lines(lines: Sequence[str], comment: str | None = None) -> list[int]:
-    """Return the numbers, from 1, of the lines that are neither blank nor comments."""
-    return [
-        number
-        for number, line in enumerate(lines, 1)
-        if line and not line.isspace() and not is_comment(line, comment)
-    ]
-
-
-def find_layout(
-    path: Path,
-    lines: Sequence[str],
-    kept: Sequence[int],
-    separator: str | None,
-    decimal: str | None,
-    header: bool | int | None,
-    comment: str | None,
-    wanted: Collection[str] = (),
-) -> Layout:
-    """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out.
-
-    Parameters
-    ----------
-    path
-        For messages.
-    lines
-        All lines.
-    kept
-        Numbers, from 1, of those that are neither blank nor comments.
-    separator, decimal, header, comment
-        As of `read_csv`.
-    wanted
-        Names that are asked for.
-
-    Raises
-    ------
-    InputError
-        If there are too many columns, or the line with their names cannot be determined.
-    """
-    looked_at = [lines[number - 1] for number in kept[:MOST_HEAD]]
-    last = [lines[number - 1] for number in kept[MOST_HEAD:][-LAST_LINES:]]
-    dialect = sniff([*looked_at, *last], separator, decimal)
-    try:
-        head = find_head(dialect, [*looked_at, *last], wanted, header, lambda i: kept[i])
-    except UnclearHeadError as error:
-        raise InputError(f"{path.name}: {error}") from None
-    first_row = kept[min(head.first_row, len(kept) - 1)]
-    widest = lines[(first_row if head.names is None else kept[head.names]) - 1]
-    width = len(dialect.cells(lines[first_row - 1]))
-    first = [printable(cell) for cell in without_comment(dialect.cells(widest), width)]
-    check_count(path.name, len(first))
-    notes = []
-    if head.n_passed > 0:
-        notes.append(
-            f"{path.name}: {head.n_passed} line{'s' if head.n_passed > 1 else ''} above the "
-            f"{'numbers' if head.names is None else f'names in line {kept[head.names]}'} are not part of the table and were "
-            f"skipped."
-        )
-    if head.names is None:
-        names = _names_in_comment(lines, first_row, dialect, len(first), comment)
-        numbers = tuple(str(i + 1) for i in range(len(first)))
-        return Layout(dialect, names or numbers, head.first_row, bool(names), tuple(notes))
-    units: tuple[str, ...] = ()
-    if head.units is not None:
-        units = tuple(printable(cell) for cell in dialect.cells(lines[kept[head.units] - 1]))
-        notes.append(f"{path.name}, line {kept[head.units]}: taken as a row of units ({', '.join(units)}).")
-    return Layout(dialect, tuple(first), head.first_row, True, tuple(notes), units)
-
-
-def _names_in_comment(
-    lines: Sequence[str], first_row: int, dialect: Dialect, width: int, comment: str | None
-) -> tuple[str, ...] | None:
-    """Return the names in a commented header right above the first row, where there is one."""
-    if first_row < 2 or not is_comment(lines[first_row - 2], comment):
-        return None
-    above = lines[first_row - 2].strip()
-    names = [
-        printable(name)
-        for name in dialect.cells(above.removeprefix(comment) if comment else above.lstrip("#%/"))
-    ]
-    names = [name for name in names if name] if dialect.separator == " " else names
-    return tuple(names) if len(names) == width and looks_like_names(dialect, names) else None
 
 
 def _position(path: Path, signal: str, mapping: ColumnMapping, layout: Layout, optional: bool) -> int | None:

@@ -1,0 +1,150 @@
+"""How is a delimited text laid out: its signs, the names and units of its columns, the first row of numbers?"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.records.formats.channel import check_count, printable, stated_unit
+from rigsight.records.formats.dialect import Dialect, is_comment, looks_like_names, sniff
+from rigsight.records.formats.table_head import (
+    LAST_LINES,
+    MOST_HEAD,
+    UnclearHeadError,
+    find_head,
+    without_comment,
+)
+from rigsight.records.formats.thousands import refuse_thousands
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the columns of a text file are laid out.
+
+    Attributes
+    ----------
+    dialect
+        How cells and numbers are written.
+    names
+        Of the columns; their numbers where the file has no header.
+    n_above
+        How many of the kept lines stand above the first row of numbers.
+    has_names
+        Whether the file has a header.
+    notes
+        What was assumed.
+    units
+        Cells of a units row, empty where there is none.
+    """
+
+    dialect: Dialect
+    names: tuple[str, ...]
+    n_above: int
+    has_names: bool
+    notes: tuple[str, ...]
+    units: tuple[str, ...] = ()
+
+    def unit(self, position: int) -> str | None:
+        """Return the unit that the row of units states for a column, None if it states none."""
+        return stated_unit(self.units[position]) if position < len(self.units) else None
+
+    def refuse_thousands(
+        self,
+        path: Path,
+        position: int,
+        lines: Sequence[str],
+        rows: Sequence[int],
+        numbers: NDArray[np.float64],
+    ) -> None:
+        """Refuse a column of numbers, shape (n_rows,), whose decimal sign separates thousands."""
+        cells = ((number, self.dialect.cells(lines[number - 1])[position]) for number in rows)
+        refuse_thousands(path, self.names[position], self.dialect.decimal, cells, numbers)
+
+
+def kept_lines(lines: Sequence[str], comment: str | None = None) -> list[int]:
+    """Return the numbers, from 1, of the lines that are neither blank nor comments."""
+    return [
+        number
+        for number, line in enumerate(lines, 1)
+        if line and not line.isspace() and not is_comment(line, comment)
+    ]
+
+
+def find_layout(
+    path: Path,
+    lines: Sequence[str],
+    kept: Sequence[int],
+    separator: str | None,
+    decimal: str | None,
+    header: bool | int | None,
+    comment: str | None,
+    wanted: Collection[str] = (),
+) -> Layout:
+    """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out.
+
+    Parameters
+    ----------
+    path
+        For messages.
+    lines
+        All lines.
+    kept
+        Numbers, from 1, of those that are neither blank nor comments.
+    separator, decimal, header, comment
+        As of `read_csv`.
+    wanted
+        Names that are asked for.
+
+    Raises
+    ------
+    InputError
+        If there are too many columns, or the line with their names cannot be determined.
+    """
+    looked_at = [lines[number - 1] for number in kept[:MOST_HEAD]]
+    last = [lines[number - 1] for number in kept[MOST_HEAD:][-LAST_LINES:]]
+    dialect = sniff([*looked_at, *last], separator, decimal)
+    try:
+        head = find_head(dialect, [*looked_at, *last], wanted, header, lambda i: kept[i])
+    except UnclearHeadError as error:
+        raise InputError(f"{path.name}: {error}") from None
+    first_row = kept[min(head.first_row, len(kept) - 1)]
+    widest = lines[(first_row if head.names is None else kept[head.names]) - 1]
+    width = len(dialect.cells(lines[first_row - 1]))
+    first = [printable(cell) for cell in without_comment(dialect.cells(widest), width)]
+    check_count(path.name, len(first))
+    notes = []
+    if head.n_passed > 0:
+        notes.append(
+            f"{path.name}: {head.n_passed} line{'s' if head.n_passed > 1 else ''} above the "
+            f"{'numbers' if head.names is None else f'names in line {kept[head.names]}'} are not part of the table and were "
+            f"skipped."
+        )
+    if head.names is None:
+        names = _names_in_comment(lines, first_row, dialect, len(first), comment)
+        numbers = tuple(str(i + 1) for i in range(len(first)))
+        return Layout(dialect, names or numbers, head.first_row, bool(names), tuple(notes))
+    units: tuple[str, ...] = ()
+    if head.units is not None:
+        units = tuple(printable(cell) for cell in dialect.cells(lines[kept[head.units] - 1]))
+        notes.append(f"{path.name}, line {kept[head.units]}: taken as a row of units ({', '.join(units)}).")
+    return Layout(dialect, tuple(first), head.first_row, True, tuple(notes), units)
+
+
+def _names_in_comment(
+    lines: Sequence[str], first_row: int, dialect: Dialect, width: int, comment: str | None
+) -> tuple[str, ...] | None:
+    """Return the names in a commented header right above the first row, where there is one."""
+    if first_row < 2 or not is_comment(lines[first_row - 2], comment):
+        return None
+    above = lines[first_row - 2].strip()
+    names = [
+        printable(name)
+        for name in dialect.cells(above.removeprefix(comment) if comment else above.lstrip("#%/"))
+    ]
+    names = [name for name in names if name] if dialect.separator == " " else names
+    return tuple(names) if len(names) == width and looks_like_names(dialect, names) else None
