@@ -16,7 +16,7 @@ from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.transfer.axis_parameters import axis_parameters
 from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
 from rigsight.identify.transfer.driven_offsets import driven_offsets
-from rigsight.identify.transfer.record_response import MISFIT, Method, RecordResponse, record_response
+from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
 from rigsight.identify.transfer.relative_fit import fit_with_relative_error
 from rigsight.identify.transfer.running_gear_parameters import (
     PhysicalEstimates,
@@ -26,7 +26,7 @@ from rigsight.identify.transfer.running_gear_parameters import (
 )
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order
-from rigsight.identify.transfer.transfer_function import fit_frequency_response
+from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.identify.transfer.transfer_step import fit_step, input_at_rest
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record

@@ -23,7 +23,7 @@ from rigsight.frequency.signal_pair import excited, line_frequencies
 from rigsight.identify.transfer.relative_fit import fit_with_relative_error
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order
-from rigsight.identify.transfer.transfer_function import fit_frequency_response
+from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.records.periods import mean_period
 from rigsight.records.record import Hold, Record
 
@@ -43,8 +43,6 @@ _PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thes
 _CLEAR = 100.0
 """Power over variance (20 dB) above which a local model of a noisy response can be trusted."""
 _MOSTLY, _LEAST_SHARE = 0.8, 0.05
-MISFIT = 3.0
-"""Residuals in units of the noise above which the order of a model is too low."""
 _THESIS_CUTS = {"pt2": 80.0, "pt1": 30.0}
 _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 

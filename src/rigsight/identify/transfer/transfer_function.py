@@ -37,7 +37,8 @@ _DAMPING_RANGE = (1e-4, 1e3)
 _STANDS_OUT = 4.0
 """Power of a line over its variance above which it is informative (two standard deviations)."""
 _COHERENT = 0.05
-_MISFIT = 3.0
+MISFIT = 3.0
+"""Residuals in units of the noise above which the order of a model is too low."""
 _DIFFERENCE = 1e-5
 
 
@@ -375,7 +376,7 @@ def _reading_notes(magnitude_only: bool, misfit: float) -> list[str]:
     notes = []
     if magnitude_only:
         notes.append("Magnitudes show neither the sign of the gain (taken as positive) nor a dead time.")
-    if misfit > _MISFIT:
+    if misfit > MISFIT:
         notes.append(
             f"The residuals are {misfit:.1f} times larger than the variances explain: the model order is too low."
         )

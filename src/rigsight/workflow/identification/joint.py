@@ -18,8 +18,8 @@ from rigsight.identify.information import information
 from rigsight.identify.joint import JointFit
 from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.reached_bounds import ReachedBound, reached_bounds
-from rigsight.identify.record_identification import MISFIT
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
+from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.periods import roughness
