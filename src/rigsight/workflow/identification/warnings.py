@@ -15,7 +15,8 @@ from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.identification import JointIdentification, RecordIdentification
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.measured_amplitude import measured_amplitude
-from rigsight.identify.transfer.record_response import MISFIT, driven_band
+from rigsight.identify.transfer.record_response import driven_band
+from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.records import Record
 from rigsight.rigs import evaluated
 
