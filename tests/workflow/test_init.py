@@ -45,6 +45,15 @@ def test_units_in_names_are_written_and_applied(tmp_path: Path) -> None:
     assert (first.dt, second.role) == (pytest.approx(0.01, rel=1e-12), "validation")
 
 
+def test_an_element_that_turns_is_drafted_as_one(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "Winkel [deg]": SWEEP, "Torque [kN m]": ANSWER}, {})
+    run_init(tmp_path, model="element")
+    (record,) = read_campaign(tmp_path).records
+    np.testing.assert_allclose(record["x"], np.radians(SWEEP), rtol=1e-12)
+    np.testing.assert_allclose(record["force"], 1e3 * ANSWER, rtol=1e-12)
+    assert "[N m s/rad]" in (tmp_path / "campaign.toml").read_text("utf-8")
+
+
 def test_a_drive_in_kilonewtons_is_converted(tmp_path: Path) -> None:
     write_text(tmp_path / "run.csv", {"t": T, "Drive Force [kN]": 0.02 * SWEEP, "Pos [mm]": ANSWER}, {})
     run_init(tmp_path, model="axis")

@@ -12,7 +12,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import Effect
 from rigsight.errors import InputError
 from rigsight.records import Record
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import RIGS, Rig, rotational
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.in_memory import make_campaign, rig_of
 from rigsight.workflow.campaign.read_campaign import read_campaign
@@ -130,7 +130,11 @@ def campaign_of(
         return make_campaign(found, campaign)
     own_rigs = () if found is None or found.name in RIGS else (found,)
     read = campaign if isinstance(campaign, Campaign) else read_campaign(campaign, own_effects, own_rigs)
-    if found is not None and read.rig.mechanism != found.mechanism:
+    if (
+        found is not None
+        and read.rig not in (found, rotational(found))
+        and read.rig.mechanism != found.mechanism
+    ):
         raise InputError(
             f"The campaign '{read.title}' is of the rig '{read.rig.name}', but the estimator has rig='{found.name}'. Leave rig "
             "out, or give records of that rig."

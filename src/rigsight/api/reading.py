@@ -8,7 +8,7 @@ from pathlib import Path
 from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
 from rigsight.records import read_record as read_file
 from rigsight.records.reference import signals_beside
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, rotational
 from rigsight.workflow.campaign.given_simulation import checked_numbers
 from rigsight.workflow.campaign.in_memory import rig_of
 from rigsight.workflow.campaign.where import Where
@@ -93,6 +93,7 @@ def read_record(
     ('push', 50, 0.01, 0.003)
     """
     found = rig_of(rig)
+    other = rotational(found)
     return read_file(
         Path(path),
         found.inputs,
@@ -115,4 +116,5 @@ def read_record(
             Where(Path(path).name), ("constants",), found, found.constants, constants or {}
         ),
         beside=signals_beside([signal.name for signal in (*found.inputs, *found.outputs)]),
+        other_units=() if other is None else (other.signal_units,),
     )

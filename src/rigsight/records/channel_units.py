@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
 
 from rigsight.errors import InputError
 from rigsight.records.channel_names import split_unit
-from rigsight.records.column_mapping import ColumnMapping
+from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.units import INPUT_UNIT
 
 DRIVES = ("A", "V", "N", "N m")
@@ -144,6 +145,67 @@ def is_unit(text: str) -> bool:
     except UnknownUnitError:
         return False
     return True
+
+
+def units_of_columns(
+    file: str,
+    units: Mapping[str, str],
+    others: Sequence[Mapping[str, str]],
+    table: Columns,
+    mappings: Mapping[str, ColumnMapping],
+) -> tuple[dict[str, str], list[str]]:
+    """Return the units of all signals, of several sets the one that the columns state, and notes on columns that state none.
+
+    Parameters
+    ----------
+    file
+        How messages call the file.
+    units
+        Signal -> its SI unit, where the columns state nothing else.
+    others
+        Sets of units that some of the signals may have instead.
+    table, mappings
+        The columns as the file has them, and how the campaign maps them. A column with a scale may be of any unit.
+
+    Raises
+    ------
+    InputError
+        If the columns state units of different sets.
+    """
+    sets = [dict(units), *({**units, **other} for other in others)]
+    open_ones = [
+        name for name in table.labels if len({one[name] for one in sets}) > 1 and mappings[name].scale is None
+    ]
+    said, is_stated = {}, set()
+    for name in open_ones:
+        label = table.labels[name]
+        named = split_unit(label)[1]
+        stated = mappings[name].unit or table.units.get(name)
+        unit = stated or named
+        if unit is not None and any(is_a(unit, one[name]) for one in sets):
+            said[name] = unit
+            # What only the last word of a name suggests chooses between sets, and contradicts nothing.
+            if stated or label.rstrip().endswith(tuple("])>")):
+                is_stated.add(name)
+
+    def unfit(one: Mapping[str, str]) -> set[str]:
+        return {name for name, unit in said.items() if not is_a(unit, one[name])}
+
+    best = next((one for one in sets if not unfit(one)), None) or min(sets, key=lambda one: len(unfit(one)))
+    if unfit(best) & is_stated:
+        got = ", ".join(f"{name} in {unit}" for name, unit in said.items())
+        allowed = "; or ".join(", ".join(f"{name} in {one[name]}" for name in open_ones) for one in sets)
+        raise InputError(
+            f"{file}: the units of its columns do not go together: {got}. Allowed, in any size such as mm: {allowed}. Correct "
+            "them under columns with unit, or write scale = 1.0 for a column to take its values without conversion."
+        )
+    because = ", ".join(f"{name} is in {unit}" for name, unit in said.items())
+    notes = [
+        f"{file}, column '{table.labels[name]}': taken in {best[name]}, because {because}."
+        for name in open_ones
+        if best is not sets[0] and name not in said
+    ]
+    return best, notes
 
 
 def si_mapping(

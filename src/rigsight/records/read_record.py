@@ -11,7 +11,7 @@ import numpy as np
 
 from rigsight.errors import InputError, readable
 from rigsight.records.channel_table import read_channels, unread_time
-from rigsight.records.channel_units import si_mapping
+from rigsight.records.channel_units import si_mapping, units_of_columns
 from rigsight.records.clocks import TIME as TIME
 from rigsight.records.clocks import own_clocks, side_by_side
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
@@ -59,6 +59,7 @@ class ReadingOptions(TypedDict, total=False):
     constants: Mapping[str, float] | None
     gain: str
     beside: Sequence[str]
+    other_units: Sequence[Mapping[str, str]]
 
 
 def read_record(
@@ -109,6 +110,7 @@ def read_stretches(
     constants: Mapping[str, float] | None = None,
     gain: str = "",
     beside: Sequence[str] = (),
+    other_units: Sequence[Mapping[str, str]] = (),
     at_pauses: Literal["split", "refuse"] = "split",
 ) -> tuple[Record, ...]:
     """Read, check and repair the stretches of a record between gaps in its time axis; usually there is only one.
@@ -146,8 +148,8 @@ def read_stretches(
         See `read_csv`; only delimited text has them.
     constants
         See `Record`.
-    gain
-        See `si_mapping`.
+    gain, other_units
+        See `si_mapping`, and `others` of `units_of_columns`.
     beside
         Names of signals that do not belong to the rig; they are read if the file has them, in any unit.
     at_pauses
@@ -197,7 +199,7 @@ def read_stretches(
     units = {TIME: "s"} | {signal.name: signal.unit for signal in (*inputs, *outputs)}
     # One that nothing is computed in has the unit that it was said to have.
     units |= {name: wanted[name].unit or "" for name in beside}
-    unit_notes: list[str] = []
+    units, unit_notes = units_of_columns(path.name, units, other_units, table, {TIME: time, **wanted})
     to_si: dict[str, ColumnMapping] = {}
     for signal, label in table.labels.items():
         mapping = time if signal == TIME else wanted[signal]

@@ -9,6 +9,7 @@ from rigsight.rigs.built_in import declared_rig as declared_rig
 from rigsight.rigs.built_in import has_built_in_parameters as has_built_in_parameters
 from rigsight.rigs.built_in import is_built_in_motion as is_built_in_motion
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
+from rigsight.rigs.built_in import rotational as rotational
 from rigsight.rigs.coupled_inertia import has_short_inverse as has_short_inverse
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.evaluation import relative_slopes as relative_slopes
@@ -56,4 +57,5 @@ __all__ = [
     "relative_slopes",
     "rig_file_text",
     "rig_of_tables",
+    "rotational",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
@@ -54,6 +55,9 @@ def declared_rig(name: str, declaration: Mapping[str, Any], source: str = "decla
     built_in = RIGS.get(name)
     if not declaration or (built_in is not None and built_in.declaration == declaration):
         return built_in
+    turning = None if built_in is None else rotational(built_in)
+    if turning is not None and turning.declaration == declaration:
+        return turning
     return rig_of_tables(declaration, source)
 
 
@@ -93,6 +97,34 @@ ROLLING = RUNNING_GEAR.follower
 """Its lateral displacement, which follows the yaw angle."""
 
 
+_TURNING = {"m": "rad", "N": "N m", "kg": "kg m^2"}
+"""Units of a motion along a line -> those of one about an axis."""
+
+
+def rotational(rig: Rig) -> Rig | None:
+    """Return `AXIS` or `ELEMENT` with an angle for its displacement and a torque for its force; None for any other rig.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    """
+    return _rotational(rig.name) if rig is AXIS or rig is ELEMENT else None
+
+
+@cache
+def _rotational(name: str) -> Rig:
+    def turned(unit: re.Match[str]) -> str:
+        return re.sub(r"\b(?:m|N|kg)\b", lambda base: _TURNING[base[0]], unit[0])
+
+    text = re.sub(r'(?<=unit = ")[^"]*', turned, rig_file_text(name))
+    return rig_of_text(text, f"{name}.toml", check_units=False)
+
+
+def _of_one_motion() -> tuple[Rig, ...]:
+    return AXIS, ELEMENT, RUNNING_GEAR, _rotational("axis"), _rotational("element")
+
+
 def is_built_in_motion(rig: Rig) -> bool:
     """Return True if a rig has the equations of a built-in one of one motion, in the same words, whatever it is called itself.
 
@@ -101,7 +133,7 @@ def is_built_in_motion(rig: Rig) -> bool:
     rig
         The rig.
     """
-    return any(rig.mechanism == own.mechanism for own in (AXIS, ELEMENT, RUNNING_GEAR))
+    return any(rig.mechanism == own.mechanism for own in _of_one_motion())
 
 
 def has_built_in_parameters(rig: Rig) -> bool:
@@ -115,5 +147,5 @@ def has_built_in_parameters(rig: Rig) -> bool:
     names = {parameter.name for parameter in rig.parameters}
     return any(
         rig.mechanism == own.mechanism and names == {parameter.name for parameter in own.parameters}
-        for own in (AXIS, ELEMENT, RUNNING_GEAR)
+        for own in _of_one_motion()
     )

@@ -79,6 +79,11 @@ class Rig:
         return tuple(Signal(sensor.name, sensor.unit, sensor.about) for sensor in self.mechanism.sensors)
 
     @property
+    def signal_units(self) -> dict[str, str]:
+        """Unit of every input and output by name."""
+        return {signal.name: signal.unit for signal in (*self.inputs, *self.outputs)}
+
+    @property
     def required_outputs(self) -> tuple[str, ...]:
         """Names of the outputs that every record holds: with one motion, the one that shows it."""
         return (self.outputs[0].name,) if self.has_one_motion else ()

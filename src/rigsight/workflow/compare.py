@@ -258,8 +258,8 @@ def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
     own, rig = model.structure.rig, campaign.rig
     if own.name == rig.name and own.mechanism != rig.mechanism:
         raise InputError(
-            f"Model '{name}' is of a rig '{own.name}' with other equations than the rig of {campaign.called}: only models of the "
-            "same rig can be compared. Leave it out, or make it again with this rig file."
+            f"Model '{name}' is of a rig '{own.name}' with other equations or units than the rig of {campaign.called}: only "
+            "models of the same rig can be compared. Leave it out, or make it again with this rig file."
         )
     if own.name != rig.name:
         raise InputError(

@@ -7,10 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.records.reference import instrument_of
 from rigsight.rigs import rig_file_text
+from rigsight.simulate import compose
+from rigsight.simulate.model import Model
+from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.campaign.read_campaign import read_campaign
 
 from .campaign_text import HEAD, RECORDS, Lines
@@ -51,6 +55,72 @@ def test_columns_and_dialect_come_from_the_record(tmp_path: Path, write_csv: Cal
     assert record.name == "bench"
     np.testing.assert_allclose(record["x"], np.sin(t), atol=1e-9)
     np.testing.assert_allclose(record["force"], np.cos(t), atol=1e-9)
+
+
+Bench = Callable[..., Path]
+
+
+@pytest.fixture
+def element(tmp_path: Path, write_csv: Callable[..., Path]) -> Bench:
+    """Write a campaign of an element: its files by their heads, and the columns of each."""
+    t = 0.01 * np.arange(80)
+    rows = np.column_stack([t, np.sin(t), np.cos(t)])
+
+    def write(*records: tuple[str, str]) -> Path:
+        text = '[rig]\nmodel = "element"\n'
+        for number, (head, columns) in enumerate(records):
+            write_csv(f"{number}.csv", rows, head)
+            text += f'[[records]]\nfile = "{number}.csv"\n[records.columns]\n{columns}\n'
+        (tmp_path / "campaign.toml").write_text(text)
+        return tmp_path
+
+    return write
+
+
+ROW = ("t,x,force\ns,deg,kN m", "")
+IN_BRACKETS = ("t,x [deg],force [kN m]", 'x = "x [deg]"\nforce = "force [kN m]"')
+BY_KEY = ("t,x,force", 'x = { name = "x", unit = "deg" }\nforce = { name = "force", unit = "kN m" }')
+IN_SI = ("t,x,force", "")
+ALONG_A_LINE = ("t,x,force\ns,mm,N", "")
+
+
+@pytest.mark.parametrize("stated", [ROW, IN_BRACKETS, BY_KEY])
+def test_an_element_turns_if_its_columns_say_so(element: Bench, stated: tuple[str, str]) -> None:
+    read = read_campaign(element(IN_SI, stated))
+    assert [record.units for record in read.records] == [{"t": "s", "x": "rad", "force": "N m"}] * 2
+    first, second = read.records
+    np.testing.assert_allclose(second["x"], np.radians(first["x"]), rtol=1e-8)
+    np.testing.assert_allclose(second["force"], 1e3 * first["force"], rtol=1e-8)
+    structure = compose(read.rig, [effect_named("cubic_stiffness")])
+    model = model_of(Model(structure, dict.fromkeys(structure.names, 1.0), "foh").to_json())
+    assert model.structure.rig is read.rig
+    assert [p.unit for p in model.structure.parameters] == ["N m s/rad", "N m/rad", "N m", "N m/rad^3"]
+
+
+def test_a_column_that_only_seems_to_be_an_angle_chooses_the_unit_and_is_not_converted(
+    element: Bench,
+) -> None:
+    (record,) = read_campaign(element(("t,x_deg,force", 'x = "x_deg"'))).records
+    assert (record.units["x"], record.units["force"]) == ("rad", "N m")
+    np.testing.assert_allclose(record["x"], np.sin(0.01 * np.arange(80)), atol=1e-9)
+    assert [("x_deg" in note, "'force'" in note) for note in record.notes] == [(False, True), (True, False)]
+
+
+@pytest.mark.parametrize(
+    ("records", "message"),
+    [
+        (
+            [("t,x,force\ns,rad,N", "")],
+            r"x in rad, force in N\. .*: x in m, force in N; or x in rad, force in N m\.",
+        ),
+        ([ROW, ALONG_A_LINE], r"1\.csv, column 'x': the unit 'mm'.* those of '0': x in rad, force in N m\."),
+    ],
+)
+def test_angles_and_lengths_do_not_go_together(
+    element: Bench, records: list[tuple[str, str]], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        read_campaign(element(*records))
 
 
 def test_constants_with_a_default_may_be_left_out(tmp_path: Path, write_csv: Callable[..., Path]) -> None:

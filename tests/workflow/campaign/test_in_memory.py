@@ -13,6 +13,7 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.records import Record, Role
+from rigsight.rigs import has_built_in_parameters, is_built_in_motion
 from rigsight.workflow.campaign.in_memory import make_campaign, make_model
 from rigsight.workflow.campaign.model_file import model_of, read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
@@ -77,9 +78,19 @@ def test_an_amplitude_is_converted_with_the_input() -> None:
 
 def test_a_unit_of_another_quantity_is_refused() -> None:
     with pytest.raises(
-        InputError, match=r"Record 'sweep': the unit 'deg' of x does not measure the same as m; x is in m"
+        InputError, match=r"Record 'sweep': the unit 'V' of x does not measure the same as m; x is in m"
     ):
-        make_campaign("axis", [record(units={"x": "deg"})])
+        make_campaign("axis", [record(units={"x": "V"})])
+
+
+def test_a_record_of_angles_turns_the_axis() -> None:
+    given = record(units={"u": "N m", "x": "deg"})
+    made = make_campaign("axis", [given])
+    assert made.rig.signal_units == {"u": "input", "x": "rad"}
+    assert [p.unit for p in made.rig.parameters] == ["kg m^2", "N m s/rad", "N m/rad", "rad", "N m"]
+    np.testing.assert_allclose(made.records[0]["x"], np.radians(given["x"]), rtol=1e-14)
+    assert is_built_in_motion(made.rig)
+    assert has_built_in_parameters(made.rig)
 
 
 def test_effects_are_named_or_declared() -> None:

@@ -18,7 +18,7 @@ from rigsight.workflow.campaign.campaign_file import Offsets
 from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation
 from rigsight.workflow.campaign.read_campaign import of_first_record
 from rigsight.workflow.campaign.record_notes import record_notes
-from rigsight.workflow.campaign.units_of_record import in_units_of
+from rigsight.workflow.campaign.units_of_record import in_units_of, rig_in_units_of
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_names import effects_on
 
@@ -69,7 +69,7 @@ def make_campaign(
     >>> campaign.rig.name, campaign.parameters, len(campaign.estimation)
     ('axis', {'k': 100.0}, 1)
     """
-    found = rig_of(rig)
+    found = rig_in_units_of(rig_of(rig), records)
     called = title or found.name
     by_record = set.intersection(*(set(record.constants) for record in records)) if records else set()
     modelled = effects_on(found, effects_of(effects), called)

@@ -87,6 +87,7 @@ def read_listed_record(
     file: Path,
     where: Where | None = None,
     given: Collection[str] = (),
+    other: Rig | None = None,
 ) -> tuple[Record, ...]:
     """Read a record as described in the file that lists it; it is split where its clock pauses.
 
@@ -104,6 +105,8 @@ def read_listed_record(
         See `file_inside`.
     given
         Names of the constants that hold for all records.
+    other
+        The same rig in other units, which its columns may state.
 
     Raises
     ------
@@ -143,6 +146,7 @@ def read_listed_record(
                 (c.name for c in rig.constants if INPUT_UNIT in c.unit and c.name in {*given, *constants}), ""
             ),
             beside=signals_beside(_own(rig)),
+            other_units=() if other is None else (other.signal_units,),
         )
     except InputError as error:
         # The error is in the record's file, which the message already names.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, readable
 from rigsight.records import Record
-from rigsight.rigs import Rig, read_rig_file
+from rigsight.rigs import Rig, read_rig_file, rotational
 from rigsight.workflow.campaign.campaign_file import (
     WHICH_RIG,
     RecordTable,
@@ -21,6 +21,7 @@ from rigsight.workflow.campaign.campaign_file import (
 from rigsight.workflow.campaign.given_simulation import checked_simulation, rig_named
 from rigsight.workflow.campaign.listed_records import file_inside, inside, read_listed_record
 from rigsight.workflow.campaign.record_notes import record_notes
+from rigsight.workflow.campaign.units_of_record import is_in_units_of
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_names import effect_on
 from rigsight.workflow.own.own_rigs import known_rigs
@@ -66,11 +67,9 @@ def read_campaign(
             f'{where.at("records")}: none has role = "estimation", so nothing can be fitted. Give at least one record this role.'
         )
     files = [file_inside(path, number, record, where) for number, record in enumerate(table.records, 1)]
-    read = [
-        (record, stretch)
-        for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
-        for stretch in read_listed_record(path, rig, number, record, file, where, table.rig.constants)
-    ]
+    # A rig file says itself in which units its signals are.
+    other = rotational(rig) if table.rig.model is not None else None
+    rig, read = _read_all(path, rig, other, table.records, files, where, table.rig.constants)
     if table.offsets == "per_record":
         outputs = [signal.name for signal in rig.outputs]
         read = [(asked, record.with_free_offsets(outputs)) for asked, record in read]
@@ -87,6 +86,35 @@ def read_campaign(
         path=path,
         notes=tuple(notes),
     )
+
+
+def _read_all(
+    path: Path,
+    rig: Rig,
+    other: Rig | None,
+    tables: Sequence[RecordTable],
+    files: Sequence[Path],
+    where: Where,
+    given: Collection[str],
+) -> tuple[Rig, list[tuple[RecordTable, Record]]]:
+    """Return the rig in the units that the columns of its records state, and all stretches of these records in them."""
+    listed = [*zip(tables, files, strict=True)]
+    found = [
+        read_listed_record(path, rig, number, table, file, where, given, other)
+        for number, (table, file) in enumerate(listed, 1)
+    ]
+    in_other = [parts[0] for parts in found if other is not None and is_in_units_of(other, parts[0])]
+    if other is not None and in_other:
+        rig = other
+        for number, (table, file) in enumerate(listed, 1):
+            if is_in_units_of(rig, found[number - 1][0]):
+                continue
+            try:
+                found[number - 1] = read_listed_record(path, rig, number, table, file, where, given)
+            except InputError as error:
+                units = ", ".join(f"{name} in {unit}" for name, unit in rig.signal_units.items())
+                raise InputError(f"{error} Units are those of '{in_other[0].name}': {units}.") from None
+    return rig, [(table, part) for (table, _), parts in zip(listed, found, strict=True) for part in parts]
 
 
 def listed_rig(path: Path, table: RigTable, where: Where, own_rigs: Iterable[Rig] = ()) -> Rig:

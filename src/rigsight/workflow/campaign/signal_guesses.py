@@ -11,7 +11,7 @@ from rigsight.records.clocks import own_clocks
 from rigsight.records.formats.channel import Channel
 from rigsight.records.read_record import TIME
 from rigsight.records.reference import REFERENCE
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, rotational
 
 _FITTING_UNIT = 0.5
 _CLEAR = 2.0
@@ -97,9 +97,18 @@ def guess_file(channels: Sequence[Channel], rigs: Iterable[Rig], rising: Channel
     times = [channels[number] for number in set(own.values())]
     guesses = [_guess_rig(rig, channels, rising, times) for rig in rigs]
     found = min(guesses, key=_unlikely)
-    found = replace(found, reference=_guess_reference(found, channels))
-    found = replace(found, signals=_completed_by_unit(found, channels, times))
+    other = rotational(found.rig)
+    in_units = [found] if other is None else [found, _guess_rig(other, channels, rising, times)]
+    in_units = [replace(one, reference=_guess_reference(one, channels)) for one in in_units]
+    in_units = [replace(one, signals=_completed_by_unit(one, channels, times)) for one in in_units]
+    found = min(in_units, key=_units_that_do_not_fit)
     return _with_clocks(found, channels, own)
+
+
+def _units_that_do_not_fit(guess: FileGuess) -> tuple[int, int]:
+    """Return the sort key of the same rig in several units."""
+    units = [(one.unit, one.si) for one in guess.signals if one.unit is not None and has_si(one.si)]
+    return guess.open_questions, sum(not is_a(unit, si) for unit, si in units)
 
 
 def _with_clocks(found: FileGuess, channels: Sequence[Channel], own: Mapping[int, int]) -> FileGuess:

@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from rigsight.errors import InputError
 from rigsight.records import Record
-from rigsight.records.channel_units import UnknownUnitError, conversion, has_si
-from rigsight.rigs import Rig
+from rigsight.records.channel_units import UnknownUnitError, conversion, has_si, is_a
+from rigsight.rigs import Rig, rotational
+
+
+def is_in_units_of(rig: Rig, record: Record) -> bool:
+    """Return True if all signals of a record have the units of a rig."""
+    return all(record.units.get(name) == unit for name, unit in rig.signal_units.items() if name in record)
+
+
+def rig_in_units_of(rig: Rig, records: Sequence[Record]) -> Rig:
+    """Return a built-in rig in the units that its records state; any other rig as it is."""
+    other = rotational(rig)
+    if other is None:
+        return rig
+    stated = [
+        (name, unit) for record in records for name, unit in record.units.items() if unit and name in record
+    ]
+    own, turned = rig.signal_units, other.signal_units
+    turns = any(
+        not is_a(unit, own[name]) and is_a(unit, turned[name])
+        for name, unit in stated
+        if name in own and own[name] != turned[name]
+    )
+    return other if turns else rig
 
 
 def in_units_of(rig: Rig, record: Record) -> Record:
