@@ -81,7 +81,7 @@ def test_amplitudes_of_the_linear_fits():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("k = 4.0", "k = -4.0"), "'k' must lie in"),
+        (("d = 0.1", "d = -0.1"), "'d' must lie in"),
         (("k = 4.0", "kk = 4.0"), "Unknown parameters: kk"),
         (("k = 4.0", ""), "Missing parameters: k"),
         (("k = 4.0", 'k = "soft"'), "must be a number"),
