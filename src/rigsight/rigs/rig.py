@@ -78,6 +78,12 @@ class Rig:
         """What is recorded of it; a record holds `required_outputs`, and one at least."""
         return tuple(Signal(sensor.name, sensor.unit, sensor.about) for sensor in self.mechanism.sensors)
 
+    @cached_property
+    def usually_positive(self) -> frozenset[str]:
+        """Parameters that are positive on rigs that return to rest: those that cannot be negative, and stiffnesses."""
+        stiffness = {str(s) for joint in self.mechanism.joints for s in joint.stiffness.free_symbols}
+        return frozenset(p.name for p in self.parameters if p.lower >= 0.0 or p.name in stiffness)
+
     @property
     def signal_units(self) -> dict[str, str]:
         """Unit of every input and output by name."""

@@ -201,9 +201,9 @@ class FitContext:
 
     def leaves_numbers_open(self, fit: FitResult) -> bool:
         """Return True if a fit leaves a mass, a stiffness or a damping undetermined: a missing effect may have distorted it."""
-        positive = {p.name for p in self.rig.parameters if p.lower >= 0.0}
         return any(
-            name in positive and not fit.standard_errors[name] < abs(fit.values[name]) for name in fit.free
+            name in self.rig.usually_positive and not fit.standard_errors[name] < abs(fit.values[name])
+            for name in fit.free
         )
 
     def releasable_parameters(self, structure: Structure) -> list[str]:

@@ -58,7 +58,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
             ):
                 found.append(Doubt(f"{name} = {value:.3g} is at the bound of its search range.", False))
         before = reidentified.fit.values.get(name, 0.0)
-        if name not in own and declared.lower >= 0.0 and before > 0.0 and value > 0.0:
+        if name in fit.structure.rig.usually_positive and before > 0.0 and value > 0.0:
             ratio = value / before
             if not 1.0 / NOTES.far_off < ratio < NOTES.far_off:
                 found.append(

@@ -16,7 +16,6 @@ from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.diagnose.policy import VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
-from rigsight.effects.symbols import derivative
 from rigsight.rigs import Rig
 
 
@@ -124,9 +123,8 @@ def is_linear(effect: Effect) -> bool:
 
 
 def _is_linear_in(law: sp.Expr, signals: Sequence[sp.Symbol]) -> bool:
-    own = [symbol for symbol in signals if symbol in law.free_symbols]
-    slopes = [derivative(law, symbol) for symbol in own]
-    return not any(slope.free_symbols & {*own, canonical.t} for slope in slopes)
+    own = [symbol for symbol in (*signals, canonical.t) if symbol in law.free_symbols]
+    return not own or (bool(law.is_polynomial(*own)) and sp.total_degree(law, *own) <= 1)
 
 
 def _is_of_the_spring(effect: Effect) -> bool:
