@@ -41,17 +41,3 @@ def test_what_the_response_leaves_is_a_free_motion(start: float) -> None:
     assert np.max(np.abs(rest - basis @ weights)) < 1e-9 * np.max(np.abs(ratio.values))
     alone = np.fft.rfft(ratio.free_motion(weights, POLES))[1 : ratio.omega.size + 1] / ratio.drive
     np.testing.assert_allclose(alone, basis @ weights, rtol=1e-6, atol=1e-12)
-
-
-def test_the_rate_has_the_free_motion_of_the_signal() -> None:
-    ratio, rest = left(5.0)
-    basis = ratio.free_motions(POLES)
-    np.testing.assert_allclose(ratio.rate().values, 1j * ratio.omega * ratio.values)
-    # One pole more, at zero: the basis of the signal is a part of that of its integral.
-    wider = ratio.rate().free_motions(POLES)
-    assert wider.shape[1] == basis.shape[1] + 1
-    moved = 1j * ratio.omega * rest
-    weights = np.linalg.lstsq(
-        np.vstack([wider.real, wider.imag]), np.concatenate([moved.real, moved.imag]), rcond=None
-    )[0]
-    assert np.max(np.abs(moved - wider @ weights)) < 1e-6 * np.max(np.abs(moved))

@@ -116,6 +116,7 @@ def _from_simpler_effect(context: FitContext, model: Scored, simpler: Scored) ->
         return model
     structure, (effect,), (special,) = model.fit.structure, model.effects, simpler.effects
     starts = list(start_values(context, structure, effect, simpler.fit, {special.name: simpler.fit}))
+    held = context.constant_forces_beside(structure.effects)
     known = simpler.fit.structure.values_of(special, simpler.fit.values)
     nulls = effect.null_values()
     if known.keys() & {p.name for p in effect.parameters}:
@@ -129,7 +130,8 @@ def _from_simpler_effect(context: FitContext, model: Scored, simpler: Scored) ->
         starts = [{**start, **named} for start in starts[:1]]
     problem = context.problem(structure, context.estimation)
     fits = [
-        problem.fit(start, model.fit.free, None, SEARCH.hopeless_evaluations, _TOLERANCE) for start in starts
+        problem.fit({**start, **held}, model.fit.free, None, SEARCH.hopeless_evaluations, _TOLERANCE)
+        for start in starts
     ]
     best = min(fits, key=lambda fit: fit.cost, default=model.fit)
     return context.score(model.effects, best, tolerance=_TOLERANCE) if best.cost < model.fit.cost else model

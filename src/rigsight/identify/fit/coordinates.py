@@ -88,7 +88,15 @@ class Coordinates:
         scale = np.array([characteristic_value(p.dimension, scales) for p in chosen])
         logarithmic = np.array([p.logarithmic for p in chosen], dtype=bool)
         bounds = [_bounds(p, s) for p, s in zip(chosen, scale, strict=True)]
-        lower = np.array([b[0] for b in bounds], dtype=np.float64)
+        # From negative stiffness, with which a simulation diverges, a search seldom returns: the start has the right sign.
+        returning = [name in structure.rig.usually_positive and values[name] > 0.0 for name in free]
+        lower = np.array(
+            [
+                max(b[0], 0.0) if keeps and not p.logarithmic else b[0]
+                for b, p, keeps in zip(bounds, chosen, returning, strict=True)
+            ],
+            dtype=np.float64,
+        )
         upper = np.array([b[1] for b in bounds], dtype=np.float64)
         pairs = []
         searched = [(effect, pair) for effect in structure.effects for pair in effect.searched_as]
