@@ -63,7 +63,7 @@ def test_a_command_that_is_constant_from_the_first_sample_is_a_step_with_which_t
 
 
 def test_a_record_that_is_too_short_is_told_what_would_help() -> None:
-    record = measured(log_sweep(DT * np.arange(600), 1e-4, 0.6, 60.0), "sweep")
+    record = measured(log_sweep(DT * np.arange(600), 3e-3, 0.6, 60.0), "sweep")
     motion = identify_record(record, RUNNING_GEAR, CONSTANTS, EstimationOptions()).paths[0]
     assert motion.fit is None
     assert motion.problem is not None

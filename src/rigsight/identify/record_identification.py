@@ -259,7 +259,13 @@ def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float
 
     if agreement(response.omega < _WELL_BELOW * break_frequency) >= _TURNED:
         return fit.values
-    if fit.form.order == "pt2" and agreement(response.omega > break_frequency / _WELL_BELOW) > -_TURNED:
+    fast = response.omega > break_frequency / _WELL_BELOW
+    if fit.form.order == "pt2" and not np.any(fast):
+        raise InputError(
+            "the response is opposite to the input at low frequencies, and no line is far enough above the break to tell "
+            "a negative stiffness from a signal of the wrong sign. Check both, or record over a wider band."
+        )
+    if fit.form.order == "pt2" and agreement(fast) > -_TURNED:
         raise InputError(
             "the response is opposite to the input at low frequencies and not at high ones, so no signal has the wrong sign: the "
             "stiffness is negative, and the rig is unstable without its control loop. Use a rig whose stiffness may be negative, "

@@ -211,7 +211,8 @@ class _Local:
             return found, None, None
         every = plain_ratio(self.record, found, self.hold)
         assert every.variance is not None
-        if np.mean(np.abs(every.values) ** 2 > _CLEAR * every.variance) < _LEAST_SHARE:
+        clear = np.count_nonzero(np.abs(every.values) ** 2 > _CLEAR * every.variance)
+        if order == "pt2" and clear < 2 * _BAND_LINES[self.method]:
             # Below the noise for which a local model can be trusted, its noise is too small, and so are errors by it.
             return found, None, None
         plain = _clear(every, _BAND_LINES[self.method], _CLEAR, _LEAST_SHARE)
