@@ -12,7 +12,7 @@ from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing, leading_output
 from rigsight.diagnose.noise.adequacy import Checks
-from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.nested_models import lowered_by_extensions
 from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
@@ -121,7 +121,7 @@ def single_models(
         context = _with_known_motion(campaign, context, reidentified)
         search, singles = _singles(context, reidentified, effects, say, prepare)
         lowered = lowered_by_extensions(context, reidentified, singles)
-        if lowered is reidentified:
+        if lowered.fit.cost > (1.0 - SEARCH.worth_restarting) * reidentified.fit.cost:
             break
         # What was compared with a local minimum of the equations was compared with a gap that does not exist.
         reidentified = lowered
