@@ -114,3 +114,15 @@ def test_what_is_unclear_is_told_with_its_lines(
 ) -> None:
     with pytest.raises(InputError, match=message):
         read(tmp_path, text, **options)  # type: ignore[arg-type]
+
+
+def test_rows_shorter_than_the_header_lack_numbers_that_end_no_command(tmp_path: Path) -> None:
+    # Found by the fuzzer: numbers with three decimals are looked at for signs between thousands, row by row.
+    path = tmp_path / "log.csv"
+    rows = [
+        f"{row}" if row % 3 == 0 else f"{row}\t{row if row % 3 == 1 else row + (0.125 if row < 9 else 0.5)}"
+        for row in range(1, 200)
+    ]
+    path.write_text("t\tu\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    with open_measurement(path) as file:
+        assert len(list(file.channels)) == 2

@@ -6,7 +6,7 @@ minimum: the larger model is fitted again from the smaller one, and the smaller 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from graphlib import TopologicalSorter
 
@@ -17,7 +17,7 @@ from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.basins import in_lowest_basin, is_lower, values_in
 from rigsight.diagnose.search.starts import sized, start_values
-from rigsight.identify import FitResult
+from rigsight.identify import FitResult, GreyBoxFit
 from rigsight.simulate import Structure
 
 _EQUAL = 1e-6
@@ -104,7 +104,7 @@ def at_least_as_good(context: FitContext, model: Scored, without: Scored) -> Sco
     }
     faint = {name: sized(start[name], null, _FAINT) for name, null in sizes.items()}
     problem = context.problem(structure, context.estimation)
-    found = problem.fit({**start, **faint}, model.fit.free, None, SEARCH.hopeless_evaluations, _TOLERANCE)
+    found = _lowest_from(problem, [{**start, **faint}], model.fit.free, _states(structure, without.fit))
     if found.residuals and not _is_worse(found, without.fit):
         return context.score(model.effects, found, tolerance=_TOLERANCE)
     return _at_null(model, without, {**start, **sizes})
@@ -128,13 +128,26 @@ def _from_simpler_effect(context: FitContext, model: Scored, simpler: Scored) ->
         equal |= {larger: max(equal[larger], equal[smaller]) for larger, smaller in effect.ordered}
         named = {structure.parameter_name(effect, name): value for name, value in equal.items()}
         starts = [{**start, **named} for start in starts[:1]]
-    problem = context.problem(structure, context.estimation)
-    fits = [
-        problem.fit({**start, **held}, model.fit.free, None, SEARCH.hopeless_evaluations, _TOLERANCE)
-        for start in starts
-    ]
-    best = min(fits, key=lambda fit: fit.cost, default=model.fit)
+    problem, states = context.problem(structure, context.estimation), _states(structure, simpler.fit)
+    best = _lowest_from(problem, [{**start, **held} for start in starts], model.fit.free, states)
     return context.score(model.effects, best, tolerance=_TOLERANCE) if best.cost < model.fit.cost else model
+
+
+def _lowest_from(
+    problem: GreyBoxFit,
+    starts: Iterable[Mapping[str, float]],
+    free: Sequence[str],
+    states: Sequence[NDArray[np.float64]],
+) -> FitResult:
+    """Return the best fit from given and from guessed initial states: the first begin in the minimum of the simpler model."""
+    return min(
+        (
+            problem.fit(start, free, initial, SEARCH.hopeless_evaluations, _TOLERANCE)
+            for start in starts
+            for initial in (states, None)
+        ),
+        key=lambda fit: fit.cost,
+    )
 
 
 def _is_worse(larger: FitResult, smaller: FitResult) -> bool:
@@ -163,13 +176,13 @@ def _at_null(model: Scored, without: Scored, values: Mapping[str, float]) -> Sco
     return replace(without, effects=model.effects, fit=at_null, held_out=held_out)
 
 
-def _states(structure: Structure, without: FitResult) -> tuple[NDArray[np.float64], ...]:
-    """Return initial states and offsets of equations for a structure that may have more states; those are zero."""
-    names = [str(equation.symbol) for equation in without.structure.equations]
+def _states(structure: Structure, simpler: FitResult) -> tuple[NDArray[np.float64], ...]:
+    """Return initial states and offsets of a simpler model for a structure that may have more states; those are zero."""
+    names = [str(equation.symbol) for equation in simpler.structure.equations]
 
     def of_record(own: NDArray[np.float64]) -> NDArray[np.float64]:
         known = dict(zip(names, own[: len(names)].tolist(), strict=True))
         states = [known.get(str(equation.symbol), 0.0) for equation in structure.equations]
         return np.concatenate([states, own[len(names) :]])
 
-    return tuple(map(of_record, without.initial_states))
+    return tuple(map(of_record, simpler.initial_states))

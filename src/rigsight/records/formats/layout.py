@@ -62,7 +62,9 @@ class Layout:
         numbers: NDArray[np.float64],
     ) -> None:
         """Refuse a column of numbers, shape (n_rows,), whose decimal sign separates thousands."""
-        cells = ((number, self.dialect.cells(lines[number - 1])[position]) for number in rows)
+        of_rows = ((number, self.dialect.cells(lines[number - 1])) for number in rows)
+        # Rows may be shorter than the header: what they lack is missing, not a number.
+        cells = ((number, row[position]) for number, row in of_rows if position < len(row))
         refuse_thousands(path, self.names[position], self.dialect.decimal, cells, numbers)
 
 
