@@ -34,13 +34,13 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rigsight.blind import Outcome
-from rigsight.cli import trial_process
-from rigsight.workflow.bench.execution import finished
-from rigsight.workflow.bench.files import BenchFolder, trial_name
-from rigsight.workflow.bench.scoring import score_trial
-from rigsight.workflow.bench.store import TrialStore
-from rigsight.workflow.bench.trial import diagnose_trial, make_trial
+from rigsight_bench import trial_process
+from rigsight_bench.running.execution import finished
+from rigsight_bench.running.files import BenchFolder, trial_name
+from rigsight_bench.running.scoring import score_trial
+from rigsight_bench.running.store import TrialStore
+from rigsight_bench.running.trial import diagnose_trial, make_trial
+from rigsight_bench.scoring import Outcome
 
 N_EMPTY = 2000
 N_ROWS = 200

@@ -16,7 +16,6 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
-from rigsight.blind import draw_trial
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing
@@ -26,6 +25,7 @@ from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.errors import RigsightError
 from rigsight.identify import IdleThreads
+from rigsight_bench.trials import draw_trial
 
 HERE = Path(__file__).parent
 LARGE = 2.0

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.blind import n_trials, subject_of
-from rigsight.workflow.bench.files import BenchFolder, trial_name
-from rigsight.workflow.bench.trial import make_trial
+from rigsight_bench.running.files import BenchFolder, trial_name
+from rigsight_bench.running.trial import make_trial
+from rigsight_bench.trials import n_trials, subject_of
 
 SEED = 6
 FIRST = 100

@@ -12,10 +12,10 @@ import numpy as np
 from campaigns import REST, SEED, Campaign
 from scipy.stats import chi2_contingency
 
-from rigsight.blind import draw, draw_trial, n_trials, subject_of
-from rigsight.blind.campaign import LinearRig, draw_rig
-from rigsight.blind.subjects import Subject, hidden_effects, needs_running_gear
 from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
+from rigsight_bench.trials import draw, draw_trial, n_trials, subject_of
+from rigsight_bench.trials.campaign import LinearRig, draw_rig
+from rigsight_bench.trials.subjects import Subject, hidden_effects, needs_running_gear
 
 SEEDS_OF_RIGS = range(10, 110)
 """Of the rigs that are drawn without being simulated."""

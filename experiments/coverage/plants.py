@@ -12,10 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.blind.any_rig_campaign import DT, DURATION, Run, draw_runs
-from rigsight.blind.any_rig_numbers import draw_numbers, draw_offsets
-from rigsight.blind.strength import draw_shape, sized
-from rigsight.blind.waveforms import Disturbance, low_pass_noise
 from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.diagnose.pushes.probes import push
 from rigsight.diagnose.uncertainty.replicates import with_forces
@@ -26,6 +22,10 @@ from rigsight.identify.typical_size import typical_size
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
+from rigsight_bench.trials.any_rig_campaign import DT, DURATION, Run, draw_runs
+from rigsight_bench.trials.any_rig_numbers import draw_numbers, draw_offsets
+from rigsight_bench.trials.strength import draw_shape, sized
+from rigsight_bench.trials.waveforms import Disturbance, low_pass_noise
 
 Floats = NDArray[np.float64]
 

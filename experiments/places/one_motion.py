@@ -11,8 +11,6 @@ import argparse
 import time
 from pathlib import Path
 
-from rigsight.blind import draw_trial
-from rigsight.blind.subjects import subject_of
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing
@@ -21,6 +19,8 @@ from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import CATALOGUE
 from rigsight.identify import IdleThreads
+from rigsight_bench.trials import draw_trial
+from rigsight_bench.trials.subjects import subject_of
 
 DESIGN = "small"
 HEAD = """# On a rig with one motion: is the true effect looked at first?

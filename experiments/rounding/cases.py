@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigsight.blind import draw_trial
 from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
+from rigsight_bench.trials import draw_trial
 
 DT, NOISE = 0.01, 2e-5
 RIG = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
