@@ -18,8 +18,8 @@ import pytest
 
 from rigsight.errors import InputError, MachineError, RigsightError
 from rigsight.records import Record
-from rigsight.workflow import blind
 from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight_bench import benches
 from rigsight_bench.benches import rescore, run_blind
 from rigsight_bench.running.files import RUN_FILE, STORE_FILE, BenchFolder, read_json, trial_name
 from rigsight_bench.running.scoring import score_trial
@@ -180,7 +180,7 @@ class Steps:
         self.done: Counter[tuple[str, str]] = Counter()
         self.dies: set[tuple[str, str]] = set()
         for step in ("make", "diagnose", "score"):
-            patch.setattr(blind, f"{step}_trial", getattr(self, step))
+            patch.setattr(benches, f"{step}_trial", getattr(self, step))
 
     def _count(self, step: str, name: str) -> None:
         if (step, name) in self.dies:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.workflow import blind
+from rigsight_bench import benches
 from rigsight_bench.benches import run_blind, run_external
 from rigsight_bench.running.external import ExternalBench
 from rigsight_bench.running.files import RUN_FILE, read_json
@@ -148,7 +148,7 @@ def test_a_campaign_is_done_once_and_again_when_it_has_changed(
         file = folder.result(name) / RUN_FILE
         file.write_text(json.dumps({**read_json(file), "fingerprint": folder.fingerprint(name)}))
 
-    monkeypatch.setattr(blind, "diagnose_trial", diagnose)
+    monkeypatch.setattr(benches, "diagnose_trial", diagnose)
     content = run(lab)
     assert [t["trial"] for t in content["trials"]] == [NAME]
     assert run(lab)["n_trials"] == 1
