@@ -26,7 +26,7 @@ NOW := date +%s
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check bench dist docs fuzz calibrate blind blind-small clean
+.PHONY: help demo test check bench dist docs fuzz calibrate blind clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 20
@@ -65,10 +65,7 @@ fuzz: $(DEVELOPMENT) $(FUZZER_INSTALLED)  ## fuzz everything that reads a file, 
 calibrate: $(DEVELOPMENT)  ## fit the calibration of probabilities again to its table of training trials
 	@$(BIN)/python experiments/calibration/fit.py
 
-blind-small: $(RUNNABLE) $(COMPILER)  ## run the small blind bench; takes hours, continues where it was stopped
-	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
-
-blind: $(RUNNABLE) $(COMPILER)  ## run the standard blind bench; takes hours, continues where it was stopped; writes docs/blind.md
+blind: $(RUNNABLE) $(COMPILER)  ## run the blind bench; takes hours, continues where it was stopped; writes docs/blind.md
 	@$(BIN)/rigsight blind --design standard --seed $(SEED) --out out/blind --markdown docs/blind.md
 
 clean:  ## remove results and caches; the environment is kept (remove .venv to start from scratch)

@@ -2,7 +2,7 @@
 
     python experiments/adequacy/run.py --seed 2 --trials 80
 
-Each trial of the small blind bench (disturbed, noisy, one mass) gives two models: the hidden effects fitted from their true
+Each trial of the standard blind bench (disturbed, noisy, one mass) gives two models: the hidden effects fitted from their true
 numbers, and the re-identified equations without them. Writes results.md beside this file and docs/images/p_values.png.
 """
 
@@ -52,11 +52,11 @@ class Row:
 
 def row(seed: int, trial: int) -> Row | None:
     """Return what one trial gives; None for an effect from outside and for wrong parameters."""
-    drawn = draw_trial("small", seed, trial)
+    drawn = draw_trial("standard", seed, trial)
     if drawn.key["kind"] in ("outside", "parameters"):
         return None
-    rig, records = drawn.linear.rig, drawn.records
-    constants = {p.name: drawn.linear.values[p.name] for p in rig.constants}
+    rig, records = drawn.rig, drawn.records
+    constants = {p.name: drawn.values[p.name] for p in rig.constants}
     campaign = Campaign(str(trial), rig, constants, {}, tuple(records))
     noise = {floor.output: floor.std for floor in noise_floors(rig, records)}
     bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1))

@@ -1,4 +1,4 @@
-"""The diagnoses that are repeated: hysteresis by sliders, recovery on an axis, trials of the small blind bench."""
+"""The diagnoses that are repeated: hysteresis by sliders, recovery on an axis, trials of the standard blind bench."""
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ def cases(draws: int, trials: tuple[int, ...]) -> list[Case]:
     rivals = tuple(name for name, _ in _OTHERS)
     found += [_axis(name, name, own, 0, rivals) for name, own in _OTHERS]
     for number in trials:
-        trial = draw_trial("small", 9, number)
-        rig = trial.linear.rig
-        constants = {p.name: trial.linear.values[p.name] for p in rig.constants}
+        trial = draw_trial("standard", 9, number)
+        rig = trial.rig
+        constants = {p.name: trial.values[p.name] for p in rig.constants}
         campaign = Campaign(f"trial {number}", rig, constants, trial.given, trial.records)
         noise = min(float(value) for value in trial.key["noise_floor"].values())
-        found.append(Case(f"small 9, trial {number}", campaign, CATALOGUE, noise))
+        found.append(Case(f"standard 9, trial {number}", campaign, CATALOGUE, noise))
     return found
 
 

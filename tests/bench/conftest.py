@@ -16,7 +16,7 @@ from rigsight_bench.trials import Trial, draw_trial
 
 @pytest.fixture(scope="session")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, int], Trial]:
-    """Return a trial of the small bench by seed and number, drawn once for all processes that test: it takes ten seconds."""
+    """Return a trial of the standard design by seed and number, drawn once for all processes that test: it takes ten seconds."""
     own = tmp_path_factory.getbasetemp()
     shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
 
@@ -30,7 +30,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, int], Tria
                 fcntl.flock(lock, fcntl.LOCK_EX)
             if not file.exists():
                 part = file.with_suffix(f".{os.getpid()}")
-                part.write_bytes(pickle.dumps(draw_trial("small", seed, number)))
+                part.write_bytes(pickle.dumps(draw_trial("standard", seed, number)))
                 part.replace(file)
         trial: Trial = pickle.loads(file.read_bytes())
         return trial
@@ -44,7 +44,7 @@ def outcome_like() -> Callable[..., Outcome]:
 
     def like(**changes: Any) -> Outcome:
         content: dict[str, Any] = {
-            "design": "small", "seed": 1, "trial": "000", "fingerprint": "", "version": "1.0",
+            "design": "standard", "seed": 1, "trial": "000", "fingerprint": "", "version": "1.0",
             "kind": "single", "effects": ("backlash",), "places": ("dynamics",),
             "rig": "axis", "noise": "low", "gap": 12.0, "tier": "clear",
             "verdict": "effect", "named": ("backlash",), "named_places": ("dynamics",), "right": True, "effect_right": True,

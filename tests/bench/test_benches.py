@@ -26,7 +26,8 @@ from rigsight_bench.running.scoring import score_trial
 from rigsight_bench.running.trial import _environment, diagnose_trial
 from rigsight_bench.scoring import Outcome
 from rigsight_bench.trial_process import START
-from rigsight_bench.trials import Trial, n_trials, subject_of
+from rigsight_bench.trials import Trial, n_trials
+from rigsight_bench.trials.standard.subjects import standard_subject_of
 
 SEED = 4711
 NAME = "617"
@@ -54,14 +55,14 @@ json.dump(seen, open("results/seen.json", "w"))
 @pytest.fixture(scope="module")
 def trial(drawn: Callable[[int, int], Trial]) -> Trial:
     return drawn(
-        SEED, next(t for t in range(n_trials("small")) if subject_of("small", SEED, t).kind == "none")
+        SEED, next(t for t in range(n_trials("standard")) if standard_subject_of(SEED, t).kind == "none")
     )
 
 
 @pytest.fixture
 def bench(tmp_path: Path, trial: Trial) -> BenchFolder:
     folder = BenchFolder(tmp_path / "secret_bench")
-    folder.settle("small", SEED)
+    folder.settle("standard", SEED)
     folder.write_trial(NAME, trial)
     return folder
 
@@ -88,7 +89,7 @@ def test_a_process_that_diagnoses_is_told_nothing_but_the_campaign(bench: BenchF
     diagnose_trial(bench, NAME, start=("-c", TELLS_ALL))
     seen = read_json(bench.result(NAME) / "seen.json")
     text = json.dumps(seen)
-    for secret in (str(SEED), NAME, "secret_bench", "keys", "small"):
+    for secret in (str(SEED), NAME, "secret_bench", "keys", "standard"):
         assert secret not in text
     assert [Path(file).name for file in seen["files"]] == [
         "campaign.toml",
@@ -134,7 +135,7 @@ def test_a_campaign_reads_as_it_was_drawn_and_withheld_records_stay_with_the_key
         assert np.allclose(read["u"], drawn["u"], rtol=1e-9, atol=0.0)
     campaign_files = {file.name for file in bench.campaign(NAME).iterdir()}
     assert not any("withheld" in name for name in campaign_files)
-    for read, drawn in zip(bench.withheld_records(NAME, trial.linear.rig), trial.withheld, strict=True):
+    for read, drawn in zip(bench.withheld_records(NAME, trial.rig), trial.withheld, strict=True):
         assert (read.name, read.kind, read.amplitude, read.hold) == (
             drawn.name,
             drawn.kind,
@@ -168,7 +169,7 @@ def test_files_of_two_trials_differ_in_numbers_only(tmp_path: Path, trial: Trial
 
 
 KEY: dict[str, Any] = {
-    "design": "small", "seed": 1, "kind": "none", "effects": [], "where": [], "rig": "axis", "noise": "low", "gap": 1.0,
+    "design": "standard", "seed": 1, "kind": "none", "effects": [], "where": [], "rig": "axis", "noise": "low", "gap": 1.0,
     "values": {}, "noise_floor": {}, "withheld": [],
 }  # fmt: skip
 
@@ -215,8 +216,8 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> Steps:
 def test_a_bench_goes_on_where_it_was_stopped(tmp_path: Path, steps: Steps, step: str) -> None:
     steps.dies.add((step, "002"))
     with pytest.raises(RigsightError, match="killed"):
-        run_blind(tmp_path, start=START, design="small", trials=4, seed=1, n_jobs=1)
-    content = run_blind(tmp_path, start=START, design="small", trials=4, seed=1, n_jobs=1)
+        run_blind(tmp_path, start=START, design="standard", trials=4, seed=1, n_jobs=1)
+    content = run_blind(tmp_path, start=START, design="standard", trials=4, seed=1, n_jobs=1)
     names = ["000", "001", "002", "003"]
     assert [t["trial"] for t in content["trials"]] == names
     assert steps.done == {(step, name): 1 for step in ("make", "diagnose", "score") for name in names}
@@ -225,7 +226,7 @@ def test_a_bench_goes_on_where_it_was_stopped(tmp_path: Path, steps: Steps, step
 
 
 def test_a_trial_with_a_row_is_left_alone(tmp_path: Path, steps: Steps) -> None:
-    run_blind(tmp_path, start=START, design="small", trials=2, seed=1, n_jobs=1)
+    run_blind(tmp_path, start=START, design="standard", trials=2, seed=1, n_jobs=1)
     before = steps.done.copy()
     # Neither key nor results are needed any more.
     shutil.rmtree(tmp_path / "results")
@@ -233,7 +234,7 @@ def test_a_trial_with_a_row_is_left_alone(tmp_path: Path, steps: Steps) -> None:
     content = run_blind(
         tmp_path,
         start=START,
-        design="small",
+        design="standard",
         trials=3,
         seed=1,
         n_jobs=1,
@@ -245,15 +246,15 @@ def test_a_trial_with_a_row_is_left_alone(tmp_path: Path, steps: Steps) -> None:
 
 
 def test_one_trial_alone_is_added_to_the_score(tmp_path: Path, steps: Steps) -> None:
-    run_blind(tmp_path, start=START, design="small", seed=1, only=[7], n_jobs=1)
-    content = run_blind(tmp_path, start=START, design="small", seed=1, only=[5], n_jobs=1)
+    run_blind(tmp_path, start=START, design="standard", seed=1, only=[7], n_jobs=1)
+    content = run_blind(tmp_path, start=START, design="standard", seed=1, only=[5], n_jobs=1)
     assert [t["trial"] for t in content["trials"]] == ["005", "007"]
-    assert content["wrong"][1]["again"] == "rigsight blind --design small --seed 1 --trial 7 --out DIR"
+    assert content["wrong"][1]["again"] == "rigsight blind --design standard --seed 1 --trial 7 --out DIR"
     assert steps.done["diagnose", "007"] == 1
 
 
 def test_rescoring_scores_what_is_diagnosed_and_runs_nothing(tmp_path: Path, steps: Steps) -> None:
-    run_blind(tmp_path, start=START, design="small", trials=2, seed=1, n_jobs=1)
+    run_blind(tmp_path, start=START, design="standard", trials=2, seed=1, n_jobs=1)
     (tmp_path / "keys" / "001.json").write_text(json.dumps({**KEY, "noise": "high"}))
     (tmp_path / STORE_FILE).unlink()
     content = rescore(tmp_path, n_jobs=1)
@@ -265,11 +266,11 @@ def test_rescoring_scores_what_is_diagnosed_and_runs_nothing(tmp_path: Path, ste
 
 
 def test_a_folder_of_another_bench_and_a_number_out_of_range_are_told(tmp_path: Path) -> None:
-    BenchFolder(tmp_path).settle("small", 1)
+    BenchFolder(tmp_path).settle("standard", 1)
     with pytest.raises(InputError, match="seed 1"):
-        run_blind(tmp_path, start=START, design="small", seed=2)
+        run_blind(tmp_path, start=START, design="standard", seed=2)
     with pytest.raises(InputError, match="numbered"):
-        run_blind(tmp_path / "other", start=START, design="small", trials=3, only=[3])
+        run_blind(tmp_path / "other", start=START, design="standard", trials=3, only=[3])
 
 
 def test_a_failed_diagnosis_is_kept_with_its_reason(bench: BenchFolder) -> None:

@@ -33,13 +33,13 @@ def part(tmp_path: Path, outcome_like: Callable[..., Outcome]) -> Path:
         (["--rescore", "--trial", "3"], ["--rescore runs no trial"]),
         (["--campaigns", "a", "--keys", "b", "--seed", "0"], ["--campaigns draws no rigs, so --seed"]),
         (
-            ["--campaigns", "a", "--keys", "b", "--trials", "3", "--design", "small"],
+            ["--campaigns", "a", "--keys", "b", "--trials", "3", "--design", "standard"],
             ["so --trials and --design would"],
         ),
-        (["--rescore", "--design", "small"], ["--rescore draws no rigs, so --design"]),
+        (["--rescore", "--design", "standard"], ["--rescore draws no rigs, so --design"]),
         (["--merge", "a", "--trials", "3"], ["--merge draws no rigs, so --trials"]),
         (["--trial", "three"], ["--trial must be a number", "'three'", "--campaigns"]),
-        (["--trial", "9999", "--design", "small"], ["numbered from 0", "9999"]),
+        (["--trial", "9999", "--design", "standard"], ["numbered from 0", "9999"]),
         (["--trial", "60", "--design", "laboratory"], ["numbered from 0 to 59", "60"]),
         (["--campaigns", "gone", "--keys", "gone"], ["not a folder", "--campaigns"]),
         (["--rescore"], ["does not contain a blind bench", "--out"]),
@@ -60,7 +60,7 @@ def test_parts_are_merged_into_json_page_and_text(run: Run, tmp_path: Path, part
     text = tmp_path / "docs" / "blind.md"
     code, out, _ = run("blind", "--merge", part, "--out", tmp_path / "all", "--markdown", text)
     assert code == 0
-    assert "1 of design small, seed 1" in out
+    assert "1 of design standard, seed 1" in out
     assert sorted(file.name for file in (tmp_path / "all").iterdir()) == ["blind.html", "blind.json"]
     assert f"`rigsight blind --merge {part}" in text.read_text()
     assert str(text) in out

@@ -87,7 +87,7 @@ GIVEN: dict[str, list[str]] = {
     "--output": ["x"],
     "--trials": ["3"],
     "--trial": ["0"],
-    "--design": ["small"],
+    "--design": ["laboratory"],
     "--campaigns": ["a", "--keys", "b"],
     "--keys": ["b", "--campaigns", "a"],
     "--merge": ["a"],

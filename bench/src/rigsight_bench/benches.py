@@ -47,9 +47,8 @@ def run_blind(
     start
         Arguments with which Python starts the command line of a trial: ``rigsight_bench.trial_process.START``.
     design
-        List of cells to draw from: ``"small"``, ``"standard"``, ``"joints"`` for the effects of servo and robot joints,
-        ``"rigs"`` for effects at all places of every built-in rig, ``"laboratory"`` for records as laboratories take them, or
-        ``"handwritten"`` for plants that are composed from no declaration.
+        List of cells to draw from: ``"standard"``, ``"laboratory"`` for records as laboratories take them, or ``"handwritten"``
+        for plants that are composed from no declaration.
     trials
         Number of trials; None for one of every cell.
     seed

@@ -32,12 +32,11 @@ def blind(
         ),
     ] = None,
     design: Annotated[
-        Literal["small", "standard", "joints", "several", "rigs", "laboratory", "handwritten"],
+        Literal["standard", "laboratory", "handwritten"],
         typer.Option(
-            help="Kinds of trials to draw. joints: effects of servo and robot joints; several: two and three effects at once; "
-            "rigs: every built-in rig with effects at all its places; laboratory: records with the imperfections of laboratory "
-            "measurements (filters, feedback, stiction, ...); handwritten: plants with equations written by hand, independent of "
-            "the catalogue."
+            help="Kinds of trials to draw. standard: effects of the catalogue on a running gear or an axis; laboratory: records "
+            "with the imperfections of laboratory measurements (filters, feedback, stiction, ...), on several rigs; handwritten: "
+            "plants with equations written by hand, independent of the catalogue."
         ),
     ] = "standard",
     seed: Seed = 0,

@@ -14,7 +14,7 @@ def content_of(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     benches = Counter((o.design, o.seed) for o in outcomes)
     return {
         "made": "2026-11-21T18:30:00+00:00",
-        "command": "rigsight blind --design small --seed 1",
+        "command": "rigsight blind --design standard --seed 1",
         "versions": {"rigsight": "1.0", "numpy": "2.0"},
         "n_trials": len(outcomes),
         "benches": [{"design": d, "seed": s, "n_trials": n} for (d, s), n in benches.items()],

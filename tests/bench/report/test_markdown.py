@@ -44,7 +44,7 @@ def test_a_laboratory_has_a_table_by_condition(outcome_like: Like, wrong_outcome
 def test_date_version_command_and_intervals_are_there(outcome_like: Like, wrong_outcome: Like) -> None:
     text = blind_markdown(content_of([outcome_like()] * 3 + [wrong_outcome(trial="017")]))
     assert "- Date: 2026-11-21 18:30:00 UTC" in text
-    assert "- Command: `rigsight blind --design small --seed 1`" in text
+    assert "- Command: `rigsight blind --design standard --seed 1`" in text
     assert "rigsight 1.0, numpy 2.0" in text
     assert "| Single effects named | 98 % | 75 % | 3 of 4 | 30 to 95 % | no |" in text
     assert "| backlash | 4 | 3 | free play (1) |" in text

@@ -48,7 +48,7 @@ def test_wrong_trials_are_listed_with_what_was_named_instead(outcome_like: Like,
 def test_trials_of_several_benches_go_with_their_seed(wrong_outcome: Like) -> None:
     text = shown([wrong_outcome(trial="017"), wrong_outcome(trial="017", seed=2)])
     assert [line.split()[0] for line in text.splitlines() if "free play" in line] == ["1/017", "2/017"]
-    assert "1 of design small, seed 1 and 1 of design small, seed 2" in text
+    assert "1 of design standard, seed 1 and 1 of design standard, seed 2" in text
 
 
 def test_a_laboratory_is_shown_by_condition(outcome_like: Like, wrong_outcome: Like) -> None:

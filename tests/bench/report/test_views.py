@@ -61,7 +61,7 @@ def test_groups_are_in_the_order_of_their_gaps(outcome_like: Like) -> None:
 @pytest.mark.parametrize(
     ("benches", "words"),
     [
-        ([("small", 1)], "1 of design small, seed 1"),
+        ([("standard", 1)], "1 of design standard, seed 1"),
         ([("external", 0)], "1 campaign from an external source"),
     ],
 )

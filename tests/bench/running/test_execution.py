@@ -19,6 +19,7 @@ from typing import Any, overload
 import pytest
 
 import rigsight
+import rigsight_bench
 from rigsight.errors import InputError, RigsightError
 from rigsight_bench.running import execution
 from rigsight_bench.running.execution import finished
@@ -233,7 +234,9 @@ def test_a_worker_that_does_not_see_the_folder_is_named(address: str, tmp_path: 
 @on_a_cluster
 def test_a_worker_with_another_rigsight_is_named(address: str, tmp_path: Path, files: Path) -> None:
     other = tmp_path / "other"
-    shutil.copytree(Path(rigsight.__file__).parent, other / "rigsight")
+    for package in (rigsight, rigsight_bench):
+        source = Path(str(package.__file__)).parent
+        shutil.copytree(source, other / source.name)
     (other / "rigsight" / "units.py").open("a").write("# another state\n")
     with (
         worker(address, tmp_path, PYTHONPATH=str(other)),

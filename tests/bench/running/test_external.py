@@ -280,10 +280,10 @@ def test_a_drawn_bench_and_one_of_a_lab_do_not_share_a_folder(lab: ExternalBench
     lab.settle_here()
     lab.settle_here()
     with pytest.raises(InputError, match="existing campaigns"):
-        run_blind(lab.path, start=START, design="small", trials=1)
+        run_blind(lab.path, start=START, design="standard", trials=1)
     other = replace(lab, path=lab.path.parent / "drawn")
     (other.path / "keys").mkdir(parents=True)
-    other.settings.write_text(json.dumps({"design": "small", "seed": 3}))
+    other.settings.write_text(json.dumps({"design": "standard", "seed": 3}))
     with pytest.raises(InputError, match="seed 3"):
         other.settle_here()
 

@@ -33,8 +33,8 @@ def test_parts_add_up_and_no_trial_counts_twice(
     other = bench(tmp_path / "c", outcome_like(trial="000", seed=2))
     content = merge([first, second, other], tmp_path / "all", "rigsight blind --merge ...")
     assert content["benches"] == [
-        {"design": "small", "seed": 1, "n_trials": 3},
-        {"design": "small", "seed": 2, "n_trials": 1},
+        {"design": "standard", "seed": 1, "n_trials": 3},
+        {"design": "standard", "seed": 2, "n_trials": 1},
     ]
     # Where two hold the same trial, the first has the word.
     assert [(w["seed"], w["trial"]) for w in content["wrong"]] == [(1, "001")]

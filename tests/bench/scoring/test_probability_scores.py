@@ -79,7 +79,7 @@ def test_strata_are_verdicts_kinds_designs_and_rigs_with_several_places(outcome_
     )
     assert list(scores) == [
         "all",
-        "design: small",
+        "design: standard",
         "kind: pair",
         "kind: single",
         "one place",

@@ -13,7 +13,7 @@ def key(
     kind: str, *effects: str, gap: float | None = 10.0, where: tuple[str, ...] = ("yaw_dynamics",)
 ) -> dict[str, Any]:
     return {
-        "design": "small", "seed": 1, "trial": "003",
+        "design": "standard", "seed": 1, "trial": "003",
         "kind": kind, "effects": list(effects), "where": list(where) if effects else [],
         "rig": "running_gear", "noise": "low", "gap": gap, "values": {"g": 1e-3, "k_c": 80.0},
     }  # fmt: skip

@@ -37,7 +37,7 @@ def diagnosis(verdict: str = "effect", *named: str) -> dict:
 def key(kind: str = "single", *effects: str) -> dict:
     return {
         "schema_version": 2,
-        "design": "small",
+        "design": "standard",
         "seed": 1,
         "trial": "003",
         "kind": kind,

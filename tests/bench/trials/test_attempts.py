@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from rigsight.errors import SimulationError
@@ -9,16 +10,21 @@ from rigsight_bench.trials.attempts import first_that_succeeds
 
 
 def draws_after(failures: int):  # type: ignore[no-untyped-def]
-    def draw(attempt: int) -> int:
-        if attempt < failures:
-            raise SimulationError(f"attempt {attempt} leaves no gap")
-        return attempt
+    seen: list[float] = []
+
+    def draw(streams: list[np.random.Generator]) -> list[float]:
+        seen.append(streams[0].random())
+        if len(seen) <= failures:
+            raise SimulationError(f"attempt {len(seen)} leaves no gap")
+        return seen
 
     return draw
 
 
 def test_the_first_usable_draw_counts() -> None:
-    assert first_that_succeeds(draws_after(30), seed=4, trial=13) == 30
+    seen = first_that_succeeds(draws_after(30), seed=4, trial=13)
+    assert len(set(seen)) == 31
+    assert seen == first_that_succeeds(draws_after(30), seed=4, trial=13)
 
 
 def test_a_trial_that_never_works_is_named_with_the_last_reason() -> None:

@@ -12,47 +12,38 @@ import numpy as np
 import pytest
 
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.rigs import RIGS
 from rigsight_bench.trials import Design, n_trials
-from rigsight_bench.trials.any_rig_subjects import draw_effects, placed_subject_of
-from rigsight_bench.trials.counted import COUNTED_EFFECTS, COUNTED_RIGS
+from rigsight_bench.trials.counted import COUNTED_EFFECTS
 from rigsight_bench.trials.handwritten.cells import handwritten_cell_of
 from rigsight_bench.trials.laboratory.subjects import draw_laboratory_effects, laboratory_subject_of
-from rigsight_bench.trials.subjects import hidden_effects, subject_of
+from rigsight_bench.trials.standard.subjects import hidden_effects, standard_subject_of
 
 SEED = 1
 COUNTED: dict[str, tuple[int, str]] = {
-    "small": (205, "dba7aeed483c6dcc"),
     "standard": (248, "c35f154a57fb0742"),
-    "joints": (67, "170ad7be7b853229"),
-    "rigs": (76, "d573271337b8f019"),
     "laboratory": (60, "7f94995c624573fd"),
     "handwritten": (96, "4bc82b384ab675e0"),
-    "several": (48, "5a839a7f07559e46"),
 }
 """Trials of one pass, and the hash of what those of seed 1 hide.
 
-Cells and drawn effects of seeds 1, 2 and 7 over two passes were the same before and after the lists of `blind/counted.py`; the
+Cells and drawn effects of seeds 1, 2 and 7 over two passes were the same before and after the lists of `counted.py`; the
 handwritten design has always had a list of its own.
 """
 WHAT_TO_DO = (
-    "Trials that were counted would become others. A new effect or rig belongs in no existing design: leave blind/counted.py, "
-    "OF_JOINTS and FAMILIES as they are. To hide it, add a design of its own (as 'joints' was) and its line here."
+    "Trials that were counted would become others. A new effect or rig belongs in no existing design: leave counted.py, "
+    "ELSEWHERE and FAMILIES as they are. To hide it, add a design of its own and its line here."
 )
 
 
 def hidden(design: Design, number: int) -> tuple[Any, tuple[Effect, ...]]:
     """Return what a trial hides: its cell, and the effects that are drawn for it."""
     rng = np.random.default_rng([SEED, number])
-    if design == "rigs":
-        placed = placed_subject_of(SEED, number)
-        return placed, draw_effects(RIGS[placed.rig], placed, rng)
     if design == "laboratory":
         taken = laboratory_subject_of(SEED, number)
         return taken, draw_laboratory_effects(taken, rng)
     if design == "handwritten":
         return handwritten_cell_of(SEED, number), ()
-    subject = subject_of(design, SEED, number)
+    subject = standard_subject_of(SEED, number)
     return subject, hidden_effects(subject)
 
 
@@ -71,7 +62,6 @@ def test_the_trials_are_those_that_were_counted(design: Design) -> None:
 
 
 def test_what_was_counted_is_still_there() -> None:
-    gone = {*COUNTED_EFFECTS} - {effect.name for effect in CATALOGUE}, {*COUNTED_RIGS} - {*RIGS}
-    assert gone == (set(), set()), f"Counted trials hide these effects, or stand on these rigs: {gone}."
+    gone = {*COUNTED_EFFECTS} - {effect.name for effect in CATALOGUE}
+    assert gone == set(), f"Counted trials hide these effects: {gone}."
     assert len(set(COUNTED_EFFECTS)) == len(COUNTED_EFFECTS)
-    assert len(set(COUNTED_RIGS)) == len(COUNTED_RIGS)

@@ -296,7 +296,7 @@ def test_a_trial_is_the_same_for_the_same_seed_and_its_campaign_holds_nothing_of
     folder = BenchFolder(tmp_path / "bench")
     folder.settle("laboratory", SEED)
     folder.write_trial("000", trial)
-    assert folder.withheld_records("000", trial.linear.rig) == []
+    assert folder.withheld_records("000", trial.rig) == []
     campaign = read_campaign(folder.campaign("000"))
     assert campaign.parameters == trial.given
     assert campaign.parameters["k"] == 0.0

@@ -47,7 +47,7 @@ from rigsight_bench.running.files import (
     described,
     read_json,
 )
-from rigsight_bench.trials.subjects import Kind
+from rigsight_bench.trials.kinds import Kind
 
 _CAMPAIGN = "campaign.toml"
 _NOT_STATED = "not stated"

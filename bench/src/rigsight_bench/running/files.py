@@ -200,7 +200,7 @@ def read_json(file: Path) -> dict[str, Any]:
 
 
 def _csv_text(trial: Trial, record: Record) -> str:
-    signals = (*trial.linear.rig.inputs, *trial.linear.rig.outputs)
+    signals = (*trial.rig.inputs, *trial.rig.outputs)
     names = [signal.name for signal in signals if signal.name in record]
     rows = np.column_stack([record.t, *(record[name] for name in names)])
     lines = [",".join(("t", *names)), *(",".join(f"{value:.9e}" for value in row) for row in rows)]
@@ -214,8 +214,8 @@ def _amplitude_line(record: Record) -> str:
 
 def _campaign_toml(trial: Trial) -> str:
     """Return the text of campaign.toml; for trials on one rig only the values differ."""
-    rig = trial.linear.rig
-    constants = "\n".join(f"{p.name} = {trial.linear.values[p.name]!r}" for p in rig.constants)
+    rig = trial.rig
+    constants = "\n".join(f"{p.name} = {trial.values[p.name]!r}" for p in rig.constants)
     parameters = "\n".join(f"{p.name} = {trial.given[p.name]!r}" for p in rig.parameters)
     records = "\n".join(
         f'''

@@ -10,7 +10,7 @@ from typing import Any
 from rigsight_bench.scoring.probability_scores import log_score
 from rigsight_bench.scoring.score import Outcome
 from rigsight_bench.scoring.shares import mean, mean_interval, median, median_interval, share_of
-from rigsight_bench.trials.subjects import TIERS
+from rigsight_bench.trials.kinds import TIERS
 
 _LARGE_GAP = TIERS["clear"][0]
 _GAP_OF_SEVERAL = 2.0 * _LARGE_GAP

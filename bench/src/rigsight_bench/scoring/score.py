@@ -12,7 +12,7 @@ from rigsight.effects import AT
 from rigsight.errors import InputError
 from rigsight.rigs import Rig, declared_rig
 from rigsight_bench.scoring.parameter_errors import ParameterError, parameter_errors
-from rigsight_bench.trials.subjects import SEVERAL, TIERS
+from rigsight_bench.trials.kinds import SEVERAL, TIERS
 
 BY_PLACE_SCHEMA = 2
 """Schema of keys from which on `where` holds the place of each effect; before, it was the set of places."""

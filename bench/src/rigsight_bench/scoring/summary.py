@@ -15,8 +15,8 @@ from rigsight_bench.scoring.parameter_errors import OF_RIG, ParameterError
 from rigsight_bench.scoring.probability_scores import log_score, probability_scores
 from rigsight_bench.scoring.score import FAILED, Outcome, WithheldError
 from rigsight_bench.scoring.shares import mean, median, quantile, share_of
+from rigsight_bench.trials.kinds import SEVERAL, Kind
 from rigsight_bench.trials.laboratory.subjects import CONDITIONS
-from rigsight_bench.trials.subjects import SEVERAL, Kind
 
 ALL = "all"
 """Of the conditions together."""

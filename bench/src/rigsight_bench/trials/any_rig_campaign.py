@@ -1,6 +1,6 @@
-"""Experiments on a rig of any shape: all inputs move at once, each with a different waveform.
+"""How far and how fast the inputs of a rig of any shape move: all at once, each with a different waveform.
 
-Their amplitudes follow from the equations: the motion has a random size, smaller where a control law saturates or the motion is
+Amplitudes follow from the equations: the motion has a random size, smaller where a control law saturates or the motion is
 far from linear.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,18 +16,17 @@ from numpy.typing import NDArray
 from rigsight.errors import SimulationError
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.start.rig_motion import simulated_motion
-from rigsight.records import Hold, Kind, Record, Role
+from rigsight.records import Kind
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, simulate
 from rigsight.simulate.linearization import linearize
-from rigsight_bench.trials.waveforms import Disturbance, Doublet, Multisine, Sweep, Waveform, samples
+from rigsight_bench.trials.runs import DT, Run
+from rigsight_bench.trials.waveforms import Doublet, Multisine, Sweep, Waveform
 
 Floats = NDArray[np.float64]
 
-DT = 5e-3
-"""Sample time of all records [s]."""
 DURATION = 20.0
-"""Of every record [s]."""
+"""Of a record [s]."""
 _BAND = (0.25, 2.0)
 """Ends of a sweep in units of the lowest and of the highest natural frequency."""
 _WHERE_NOTHING_MOVES = (3.0, 45.0)
@@ -45,54 +44,10 @@ _LESS = 0.7
 _TRIES = 16
 
 
-@dataclass(frozen=True)
-class Run:
-    """One record to be measured; `role` is None for one that no diagnosis sees."""
-
-    name: str
-    role: Role | None
-    kind: Kind
-    hold: Hold
-    waveforms: Mapping[str, Waveform]
-    duration: float = DURATION
-
-    def record(
-        self,
-        outputs: Mapping[str, Floats] | None = None,
-        dt: float = DT,
-        disturbances: Mapping[str, Disturbance] | None = None,
-    ) -> Record:
-        """Return the record of the inputs' samples and these outputs.
-
-        Parameters
-        ----------
-        outputs
-            Samples of sensors.
-        dt
-            Sample time [s].
-        disturbances
-            What is added to inputs.
-        """
-        t = dt * np.arange(round(self.duration / dt), dtype=np.float64)
-        inputs = {name: samples(waveform, t) for name, waveform in self.waveforms.items()}
-        first = next(iter(inputs.values()), np.zeros(1))
-        signals = {
-            name: u + (disturbances[name].spline(t) if disturbances else 0.0) for name, u in inputs.items()
-        }
-        return Record(
-            name=self.name,
-            dt=dt,
-            signals={**signals, **(outputs or {})},
-            units={},
-            role=self.role or "validation",
-            kind=self.kind,
-            amplitude=float(f"{np.max(np.abs(first)):.4g}"),
-            hold=self.hold,
-        )
-
-
-def draw_runs(rig: Rig, values: Mapping[str, float], rng: np.random.Generator) -> tuple[Run, ...]:
-    """Draw the records of a campaign, and behind them two that stay withheld from every diagnosis.
+def draw_amplitudes(
+    rig: Rig, values: Mapping[str, float], rng: np.random.Generator
+) -> tuple[dict[str, float], tuple[float, float]]:
+    """Draw how far a rig moves, and return the amplitude of each input and the ends of the band [rad/s] in which they move.
 
     Parameters
     ----------
@@ -108,31 +63,12 @@ def draw_runs(rig: Rig, values: Mapping[str, float], rng: np.random.Generator) -
     SimulationError
         If the rig cannot be simulated with inputs of any size.
     """
-    amplitudes, band = draw_amplitudes(rig, values, rng)
-    return _campaign(rig, amplitudes, band, rng)
-
-
-def draw_amplitudes(
-    rig: Rig, values: Mapping[str, float], rng: np.random.Generator
-) -> tuple[dict[str, float], tuple[float, float]]:
-    """Draw how far a rig moves, and return the amplitude of each input and the ends of the band [rad/s] in which they move.
-
-    Parameters
-    ----------
-    rig, values, rng
-        As of `draw_runs`.
-
-    Raises
-    ------
-    SimulationError
-        As `draw_runs`.
-    """
     structure, band = compose(rig), _band(rig, values)
     shares = {name: _unit(rig, structure, values, name, band) for name in rig.mechanism.inputs}
     size = draw_motion(rng)
     amplitudes = {name: size / max(share, 1e-300) for name, share in shares.items()}
-    largest = [Run("trial", "estimation", "multisine", "band_limited", multisines(amplitudes, band, rng))]
-    largest.append(Run("trial", "estimation", "sweep", "band_limited", sweeps(amplitudes, band, rng)))
+    largest = [_trial("multisine", multisines(amplitudes, band, rng))]
+    largest.append(_trial("sweep", sweeps(amplitudes, band, rng)))
     for _ in range(_TRIES):
         if all(_bent(structure, values, run) <= _MOST_BENT for run in largest):
             break
@@ -146,35 +82,8 @@ def draw_motion(rng: np.random.Generator) -> float:
     return math.exp(rng.uniform(*np.log(_MOTION)))
 
 
-def _campaign(
-    rig: Rig, amplitudes: Mapping[str, float], band: tuple[float, float], rng: np.random.Generator
-) -> tuple[Run, ...]:
-    prescribing = {c.prescribed_by for c in rig.mechanism.prescribed}
-
-    def sweep(name: str, role: Role | None, share: float) -> Run:
-        return Run(name, role, "sweep", "band_limited", in_proportion(sweeps(amplitudes, band, rng), share))
-
-    def multisine(name: str, role: Role | None, share: float) -> Run:
-        return Run(
-            name, role, "multisine", "band_limited", in_proportion(multisines(amplitudes, band, rng), share)
-        )
-
-    def step(name: str, role: Role | None, share: float) -> Run:
-        # A prescribed motion cannot jump.
-        if prescribing & set(rig.mechanism.inputs):
-            return multisine(name, role, share)
-        return Run(name, role, "step", "zoh", in_proportion(doublets(amplitudes, band, rng), share))
-
-    return (
-        sweep("record_1", "estimation", 0.4),
-        sweep("record_2", "estimation", 1.0),
-        step("record_3", "estimation", 0.6),
-        multisine("record_4", "estimation", 0.8),
-        multisine("record_5", "validation", 0.7),
-        sweep("record_6", "validation", 0.75),
-        multisine("withheld_1", None, 0.65),
-        step("withheld_2", None, 0.85),
-    )
+def _trial(kind: Kind, waveforms: Mapping[str, Waveform]) -> Run:
+    return Run("trial", "estimation", kind, "band_limited", waveforms, round(DURATION / DT))
 
 
 def _band(rig: Rig, values: Mapping[str, float]) -> tuple[float, float]:
@@ -193,7 +102,7 @@ def _unit(
     small = 1e-3
     waves: dict[str, Waveform] = {other: Sweep(0.0, *band, DURATION) for other in rig.mechanism.inputs}
     waves[name] = Sweep(small, *band, DURATION)
-    record = Run("unit", "estimation", "sweep", "band_limited", waves).record()
+    record = _trial("sweep", waves).record()
     shown = simulate(structure, values, record)
     equations = equations_of(rig)
     motion = simulated_motion(equations, shown, values)

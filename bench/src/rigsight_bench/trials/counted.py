@@ -1,6 +1,6 @@
-"""Which effects and rigs do the designs draw from? Those they had when their trials were counted; a new one changes no trial.
+"""Which effects do the designs draw from? Those they had when their trials were counted; a new one changes no trial.
 
-An effect that the catalogue gets later, and a rig file that is added, are in no design unless somebody makes a design of them.
+An effect that the catalogue gets later is in no design unless somebody makes a design of it.
 """
 
 from __future__ import annotations
@@ -18,18 +18,6 @@ COUNTED_EFFECTS: tuple[str, ...] = (
     "time_shift", "encoder_eccentricity",
 )  # fmt: skip
 """In the order in which they are drawn, whatever the order of the catalogue."""
-RELATED: frozenset[frozenset[str]] = frozenset({
-    frozenset({"bouc_wen_hysteresis", "iwan_hysteresis"}), frozenset({"bouc_wen_hysteresis", "coulomb_friction"}),
-    frozenset({"coulomb_friction", "stribeck_friction"}), frozenset({"cubic_stiffness", "gravity_pendulum"}),
-    frozenset({"coulomb_friction", "load_dependent_friction"}), frozenset({"coulomb_friction", "presliding_friction"}),
-    frozenset({"bouc_wen_hysteresis", "presliding_friction"}), frozenset({"iwan_hysteresis", "presliding_friction"}),
-    frozenset({"cubic_stiffness", "power_law_stiffness"}), frozenset({"input_saturation", "speed_limit"}),
-    frozenset({"input_delay", "time_shift"}),
-})  # fmt: skip
-"""Effects that are not hidden together, because one contains the other, or their readings are the same."""
-COUNTED_RIGS: tuple[str, ...] = (
-    "axis", "cart_pendulum", "drive_train", "element", "quarter_car", "running_gear", "servo", "two_link_arm",
-)  # fmt: skip
 
 
 @cache

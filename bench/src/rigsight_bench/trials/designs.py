@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, get_args
 
 from rigsight.errors import check_option
-from rigsight_bench.trials import draw, subjects
-from rigsight_bench.trials.any_rig_subjects import placed_cells
-from rigsight_bench.trials.any_rig_trial import draw_placed_trial
-from rigsight_bench.trials.draw import Trial
 from rigsight_bench.trials.handwritten.cells import handwritten_cells
 from rigsight_bench.trials.handwritten.trial import draw_handwritten_trial
 from rigsight_bench.trials.laboratory.subjects import laboratory_cells
 from rigsight_bench.trials.laboratory.trial import draw_laboratory_trial
+from rigsight_bench.trials.standard.subjects import standard_cells
+from rigsight_bench.trials.standard.trial import draw_standard_trial
+from rigsight_bench.trials.trial import Trial
 
-Design = Literal["small", "standard", "joints", "several", "rigs", "laboratory", "handwritten"]
-"""Four on the running gear or an axis (`joints`: effects of servo and robot joints; `several`: two and three effects at once),
-one at all places of every counted rig, one with records as laboratories take them, one with plants whose equations are written
-by hand."""
+Design = Literal["standard", "laboratory", "handwritten"]
+"""One on the running gear or an axis with effects as the catalogue declares them, one with records as laboratories take them, one
+with plants whose equations are written by hand."""
+_DESIGNS: dict[Design, tuple[Callable[[], Sequence[Any]], Callable[[int, int], Trial]]] = {
+    "standard": (standard_cells, draw_standard_trial),
+    "laboratory": (laboratory_cells, draw_laboratory_trial),
+    "handwritten": (handwritten_cells, draw_handwritten_trial),
+}
 
 
 def n_trials(design: Design) -> int:
@@ -28,12 +32,8 @@ def n_trials(design: Design) -> int:
     InputError
         If there is no such design.
     """
-    check_option("The design", design, get_args(Design))
-    if design == "rigs":
-        return len(placed_cells())
-    if design == "handwritten":
-        return len(handwritten_cells())
-    return len(laboratory_cells()) if design == "laboratory" else subjects.n_trials(design)
+    cells, _ = _DESIGNS[check_option("The design", design, get_args(Design))]  # type: ignore[index]
+    return len(cells())
 
 
 def draw_trial(design: Design, seed: int, trial: int) -> Trial:
@@ -55,11 +55,5 @@ def draw_trial(design: Design, seed: int, trial: int) -> Trial:
     SimulationError
         If no rig that was drawn can be integrated and re-identified.
     """
-    check_option("The design", design, get_args(Design))
-    if design == "rigs":
-        return draw_placed_trial(seed, trial)
-    if design == "laboratory":
-        return draw_laboratory_trial(seed, trial)
-    if design == "handwritten":
-        return draw_handwritten_trial(seed, trial)
-    return draw.draw_trial(design, seed, trial)
+    _, draw = _DESIGNS[check_option("The design", design, get_args(Design))]  # type: ignore[index]
+    return draw(seed, trial)

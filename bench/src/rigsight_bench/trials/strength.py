@@ -18,6 +18,10 @@ from rigsight.errors import SimulationError
 from rigsight.parameters import Parameter
 from rigsight.units import characteristic_value
 
+GAPS = (5.0, 100.0)
+"""Gap of the re-identified equations in noise floors: from just visible in a plot to a wrong model."""
+_MOST_OF_MOTION = 0.5
+"""Gap in units of the reading's size that is not exceeded: whoever measures knows the rig better than that."""
 _STRONGEST = 1.5
 """Most that a strength may exceed the strongest start value of the effect's declaration."""
 _BEYOND_STARTS = 2.0
@@ -145,6 +149,29 @@ def strength_for(gap: Callable[[float], float], wished: float) -> float:
     return best[1]
 
 
+def draw_gap(sizes: Mapping[str, float], floor: Mapping[str, float], rng: np.random.Generator) -> float:
+    """Draw the gap of an effect in units of the floor.
+
+    Parameters
+    ----------
+    sizes
+        Of each reading.
+    floor
+        What is left of each without effects.
+    rng
+        Source of randomness.
+
+    Raises
+    ------
+    SimulationError
+        If the floor is too large for a visible gap.
+    """
+    most = min(GAPS[1], max(_MOST_OF_MOTION * sizes[name] / own for name, own in floor.items()))
+    if most <= GAPS[0]:
+        raise SimulationError("Noise and disturbance are too large for a visible gap.")
+    return math.exp(rng.uniform(math.log(GAPS[0]), math.log(most)))
+
+
 @dataclass(frozen=True)
 class Sized:
     """An effect of a requested size: its strength, the gap that it causes alone, and its parameters by their own names."""
@@ -155,9 +182,8 @@ class Sized:
 
 
 def sized(
-    effect: Effect,
-    shape: Mapping[str, float],
-    scales: Mapping[str, float],
+    name: str,
+    values_at: Callable[[float], dict[str, float]],
     gap_of: Callable[[dict[str, float]], float],
     wished: float,
     least: float | None = None,
@@ -166,8 +192,10 @@ def sized(
 
     Parameters
     ----------
-    effect, shape, scales
-        As of `scaled`.
+    name
+        Of the effect.
+    values_at
+        Its parameters over its strength, as `scaled` returns them.
     gap_of
         Gap, in units of the noise, over the parameters of the effect.
     wished
@@ -183,11 +211,11 @@ def sized(
     reached: dict[float, float] = {}
 
     def gap(strength: float) -> float:
-        reached[strength] = gap_of(scaled(effect, shape, strength, scales))
+        reached[strength] = gap_of(values_at(strength))
         return reached[strength]
 
     strength = strength_for(gap, math.sqrt(wished**2 - 1.0))
     most = reached.get(strength, 0.0)
     if most < (_LEAST_OF_WISHED * wished if least is None else least):
-        raise SimulationError(f"{effect.name} causes a gap of at most {most:.2g} noise floors.")
-    return Sized(strength, most, scaled(effect, shape, strength, scales))
+        raise SimulationError(f"{name} causes a gap of at most {most:.2g} noise floors.")
+    return Sized(strength, most, values_at(strength))

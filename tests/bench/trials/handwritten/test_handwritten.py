@@ -18,10 +18,11 @@ from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight_bench.running.files import BenchFolder
 from rigsight_bench.trials import n_trials
 from rigsight_bench.trials.handwritten.cells import TURNS, Cell, handwritten_cell_of, handwritten_cells
-from rigsight_bench.trials.handwritten.plan import Recording, draw_plan
+from rigsight_bench.trials.handwritten.plan import between_samples, draw_plan
 from rigsight_bench.trials.handwritten.plants import DRIVE_LAWS, JOINT_LAWS, PRESCRIBED
 from rigsight_bench.trials.handwritten.shapes import SHAPES, Sizes, draw_shape
 from rigsight_bench.trials.handwritten.trial import _by_names_of_fit, draw_bench, draw_handwritten_trial
+from rigsight_bench.trials.runs import Run
 
 SEED = 7
 SIZES = Sizes(x=0.1, v=1.0, force=5.0, stiffness=50.0, input=2.0)
@@ -97,7 +98,7 @@ def test_forms_are_no_starts_of_the_search() -> None:
             assert len({own[p.name] for own in drawn}) == len(drawn)
 
 
-def plans(prescribed: bool, n: int = 40) -> list[tuple[Recording, ...]]:
+def plans(prescribed: bool, n: int = 40) -> list[tuple[Run, ...]]:
     return [
         draw_plan({"u": 1.0}, (2.0, 40.0), np.random.default_rng(i), prescribed=prescribed) for i in range(n)
     ]
@@ -117,7 +118,7 @@ def test_every_plan_has_two_amplitudes_to_fit_and_another_waveform_to_score() ->
     for plan in plans(prescribed=False) + plans(prescribed=True):
         fitted = [r for r in plan if r.role == "estimation"]
         scored = [r for r in plan if r.role == "validation"]
-        sizes = [float(np.max(np.abs(r.sampled["u"]))) for r in fitted[:2]]
+        sizes = [float(np.max(np.abs(r.inputs()["u"]))) for r in fitted[:2]]
         assert sizes[0] < 0.8 * sizes[1]
         assert scored[0].kind != fitted[0].kind
         assert [r.role for r in plan].count(None) == 2
@@ -130,7 +131,7 @@ def test_a_prescribed_motion_has_no_corners() -> None:
 
 def test_a_held_input_reaches_the_plant_as_its_record_says() -> None:
     steps = next(r for plan in plans(prescribed=False) for r in plan if r.hold == "zoh" and r.kind == "sweep")
-    u, (held,) = steps.sampled["u"], steps.inputs
+    u, (held,) = steps.inputs()["u"], between_samples(steps)
     for i in (0, 100, 2000):
         between = held.during(i * steps.dt, (i + 1) * steps.dt)
         assert between((i + 0.3) * steps.dt) == between((i + 0.9) * steps.dt) == u[i]

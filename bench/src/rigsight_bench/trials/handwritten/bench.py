@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from rigsight.errors import SimulationError
-from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales
+from rigsight.identify import FitResult, characteristic_scales
 from rigsight.identify.typical_size import typical_size
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import compose
+from rigsight_bench.trials.fitted import fitted, largest_left
 from rigsight_bench.trials.handwritten.cells import Cell
 from rigsight_bench.trials.handwritten.equations.plant import Response
-from rigsight_bench.trials.handwritten.plan import Recording
+from rigsight_bench.trials.handwritten.plan import between_samples
 from rigsight_bench.trials.handwritten.plants import JOINT_LAWS, MOTIONS, respond
 from rigsight_bench.trials.handwritten.shapes import Shape, Sizes
-from rigsight_bench.trials.strength import strength_for
-
-_LEAST_OF_WISHED = 0.5
-"""Share of the requested gap that an effect must cause; otherwise it is drawn again."""
+from rigsight_bench.trials.runs import Run
+from rigsight_bench.trials.strength import Sized, sized
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class HandwrittenBench:
 
     cell: Cell
     values: Mapping[str, float]
-    plan: Sequence[Recording]
+    plan: Sequence[Run]
     noise_shares: Mapping[str, float]
 
     @property
@@ -53,7 +50,7 @@ class HandwrittenBench:
         return RIGS[self.cell.rig]
 
     @cached_property
-    def _fitted_to(self) -> list[Recording]:
+    def _fitted_to(self) -> list[Run]:
         return [recording for recording in self.plan if recording.role == "estimation"]
 
     @cached_property
@@ -81,16 +78,23 @@ class HandwrittenBench:
         """Standard deviation of the noise of each sensor, all that lies between plant and record: the true noise floor."""
         return {name: self.noise_shares[name] * size for name, size in self.readings.items()}
 
-    def _moved(self, recording: Recording, own: Mapping[str, float] | None) -> Response:
+    def _moved(self, recording: Run, own: Mapping[str, float] | None) -> Response:
         cell = self.cell
         effect = cell.effect if own is not None else ""
         # Without an effect the place says of which joint the motion is returned.
         place = cell.place if effect or cell.effect in JOINT_LAWS else ""
         return respond(
-            cell.rig, self.values, recording.inputs, recording.dt, recording.n_samples, effect, place, own
+            cell.rig,
+            self.values,
+            between_samples(recording),
+            recording.dt,
+            recording.n_samples,
+            effect,
+            place,
+            own,
         )
 
-    def quiet(self, recording: Recording, own: Mapping[str, float] | None) -> Record:
+    def quiet(self, recording: Run, own: Mapping[str, float] | None) -> Record:
         """Return a record without noise.
 
         Parameters
@@ -148,8 +152,8 @@ class HandwrittenBench:
         along = list(MOTIONS[self.cell.rig](self.values).drives.values())
         return next((i for i, coordinate in enumerate(along) if pulls[coordinate]), 0)
 
-    def sized(self, shape: Shape, wished: float) -> tuple[dict[str, float], float]:
-        """Return the effect's parameters and the strength at which it leaves a gap near the wished size.
+    def sized(self, shape: Shape, wished: float) -> Sized:
+        """Return the effect of the strength at which it leaves a gap near the wished size.
 
         Parameters
         ----------
@@ -163,18 +167,12 @@ class HandwrittenBench:
         SimulationError
             If no strength leaves half of that.
         """
-        reached: dict[float, float] = {}
 
-        def gap(strength: float) -> float:
-            quiet = [self.quiet(recording, shape.at(strength)) for recording in self._fitted_to[:2]]
-            reached[strength] = self.largest_left(self.refit(quiet))
-            return reached[strength]
+        def gap(own: Mapping[str, float]) -> float:
+            quiet = [self.quiet(recording, own) for recording in self._fitted_to[:2]]
+            return largest_left(self.refit(quiet), self.noise)
 
-        strength = strength_for(gap, math.sqrt(wished**2 - 1.0))
-        most = reached.get(strength, 0.0)
-        if most < _LEAST_OF_WISHED * wished:
-            raise SimulationError(f"{self.cell.effect} causes a gap of at most {most:.2g} noise floors.")
-        return shape.at(strength), strength
+        return sized(self.cell.effect, shape.at, gap, wished)
 
     def refit(self, records: Sequence[Record]) -> FitResult:
         """Return the rig's equations with the numbers that fit these records best.
@@ -199,15 +197,4 @@ class HandwrittenBench:
     def _fitted(
         self, records: Sequence[Record], start: Mapping[str, float], free: Sequence[str]
     ) -> FitResult:
-        fit = GreyBoxFit(compose(self.rig), records, self.scales, self.noise)
-        found = fit.fit(start, list(free))
-        if not found.residuals:
-            raise SimulationError(
-                f"The equations of {self.rig.name} cannot be fitted to this motion: {found.message}"
-            )
-        return found
-
-    def largest_left(self, found: FitResult) -> float:
-        """Return the largest residual RMS of a fit over the readings, in units of their noise."""
-        left = np.sqrt(np.nanmean(np.concatenate(found.residuals) ** 2, axis=0))
-        return float(np.max(left / [self.noise[s.name] for s in self.rig.outputs]))
+        return fitted(compose(self.rig), records, self.scales, self.noise, start, free)

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from rigsight_bench.trials.subjects import Kind
+from rigsight_bench.trials.kinds import Kind
+from rigsight_bench.trials.passes import shuffled
 
 
 @dataclass(frozen=True)
@@ -125,6 +124,4 @@ def handwritten_cells() -> tuple[Cell, ...]:
 def handwritten_cell_of(seed: int, trial: int) -> Cell:
     """Return what a trial hides; every pass over the cells of a kind is shuffled anew."""
     turn, number = divmod(trial, len(TURNS))
-    cells = TURNS[number]
-    cycle, row = divmod(turn, len(cells))
-    return cells[int(np.random.default_rng([seed, cycle, number]).permutation(len(cells))[row])]
+    return shuffled(TURNS[number], turn, seed, number)

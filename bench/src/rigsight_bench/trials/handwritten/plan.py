@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.records import Hold, Kind, Record, Role
+from rigsight.records import Hold, Kind, Role
 from rigsight_bench.trials.handwritten.equations.held_inputs import Generated, Held, Input
-from rigsight_bench.trials.waveforms import Doublet, Multisine, PlannedMoves, Signal, Sweep, Waveform, samples
-
-Floats = NDArray[np.float64]
+from rigsight_bench.trials.runs import Run
+from rigsight_bench.trials.waveforms import Doublet, Multisine, PlannedMoves, Signal, Sweep, Waveform
 
 _RATES = (100.0, 200.0, 250.0, 400.0, 500.0, 1000.0)
 """Sample rates of common loggers and controllers [Hz]; natural frequencies end at 7 Hz."""
@@ -63,63 +61,11 @@ class Later:
         return lambda t: piece(t - rest)
 
 
-@dataclass(frozen=True)
-class Recording:
-    """One record to be measured.
-
-    Attributes
-    ----------
-    name, role, kind, hold
-        As of a record; role None for one that no diagnosis sees.
-    waveforms
-        Of each input.
-    dt
-        Sample time [s].
-    n_samples
-        Number of samples.
-    """
-
-    name: str
-    role: Role | None
-    kind: Kind
-    hold: Hold
-    waveforms: Mapping[str, Waveform]
-    dt: float
-    n_samples: int
-
-    @property
-    def sampled(self) -> dict[str, Floats]:
-        """Samples of each input, each of shape (n_samples,)."""
-        t = self.dt * np.arange(self.n_samples, dtype=np.float64)
-        return {name: samples(waveform, t) for name, waveform in self.waveforms.items()}
-
-    @property
-    def inputs(self) -> list[Input]:
-        """The input of the plant between the samples, exactly according to the hold."""
-        if self.hold == "band_limited":
-            return [Generated(waveform) for waveform in self.waveforms.values()]
-        return [Held(u.tolist(), self.dt, lines=self.hold == "foh") for u in self.sampled.values()]
-
-    def record(self, outputs: Mapping[str, Floats]) -> Record:
-        """Return the record with these samples of the sensors.
-
-        Parameters
-        ----------
-        outputs
-            Each of shape (n_samples,).
-        """
-        inputs = self.sampled
-        largest = float(np.max(np.abs(next(iter(inputs.values())))))
-        return Record(
-            name=self.name,
-            dt=self.dt,
-            signals={**inputs, **outputs},
-            units={},
-            role=self.role or "validation",
-            kind=self.kind,
-            amplitude=float(f"{largest:.4g}"),
-            hold=self.hold,
-        )
+def between_samples(run: Run) -> list[Input]:
+    """Return the inputs of the plant between the samples of a record, exactly according to its hold."""
+    if run.hold == "band_limited":
+        return [Generated(waveform) for waveform in run.waveforms.values()]
+    return [Held(u.tolist(), run.dt, lines=run.hold == "foh") for u in run.inputs().values()]
 
 
 def draw_plan(
@@ -128,7 +74,7 @@ def draw_plan(
     rng: np.random.Generator,
     *,
     prescribed: bool,
-) -> tuple[Recording, ...]:
+) -> tuple[Run, ...]:
     """Draw the records of a campaign, and behind them two that stay withheld from every diagnosis.
 
     Parameters
@@ -149,13 +95,13 @@ def draw_plan(
     kinds: tuple[Kind, ...] = ("sweep", "multisine", "operation", "step")
     any_kind = kinds[:2] if prescribed else kinds
 
-    def recording(name: str, role: Role | None, kind: Kind, share: float) -> Recording:
+    def recording(name: str, role: Role | None, kind: Kind, share: float) -> Run:
         n = min(round(rng.uniform(*_DURATION) / dt), _MOST_SAMPLES)
         own = {name: share * amplitude for name, amplitude in amplitudes.items()}
         moving = n * dt - rest
         waves = {name: _waveform(kind, i, a, band, moving, rng) for i, (name, a) in enumerate(own.items())}
         late: dict[str, Waveform] = {name: Later(w, rest) if rest else w for name, w in waves.items()}
-        return Recording(name, role, kind, "zoh" if kind == "step" else hold, late, dt, n)
+        return Run(name, role, kind, "zoh" if kind == "step" else hold, late, n, dt)
 
     n_estimation, n_validation = (
         int(rng.integers(low, high + 1)) for low, high in (_N_ESTIMATION, _N_VALIDATION)

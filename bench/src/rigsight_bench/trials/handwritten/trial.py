@@ -11,23 +11,18 @@ from rigsight.errors import SimulationError
 from rigsight.identify import FitResult
 from rigsight.records import Record
 from rigsight.rigs import RIGS
-from rigsight.simulate import compose
-from rigsight.simulate.linearization import linearize
 from rigsight_bench.trials.any_rig_campaign import draw_amplitudes
 from rigsight_bench.trials.any_rig_numbers import draw_numbers, draw_offsets
 from rigsight_bench.trials.attempts import first_that_succeeds
-from rigsight_bench.trials.campaign import LinearRig
-from rigsight_bench.trials.draw import Trial
+from rigsight_bench.trials.fitted import largest_left
 from rigsight_bench.trials.handwritten.bench import HandwrittenBench
 from rigsight_bench.trials.handwritten.cells import Cell, handwritten_cell_of
 from rigsight_bench.trials.handwritten.plan import draw_plan
 from rigsight_bench.trials.handwritten.plants import PRESCRIBED
 from rigsight_bench.trials.handwritten.shapes import draw_shape
+from rigsight_bench.trials.strength import GAPS, draw_gap
+from rigsight_bench.trials.trial import Trial, as_given, off_by
 
-GAPS = (5.0, 100.0)
-"""Gap of the re-identified equations in noise floors: from just visible in a plot to a wrong model."""
-_MOST_OF_MOTION = 0.5
-"""Largest gap, relative to the reading: a user's simulation is better than that."""
 _NOISE = (2e-4, 5e-3)
 """Noise of a sensor in units of its reading's size: from an interferometer's (74 dB) to a cheap potentiometer's (46 dB)."""
 _APART = 0.5
@@ -36,8 +31,6 @@ _NOISY = 1e-3
 """Noise from which a trial is called noisy: the middle of what is drawn."""
 _OFF, _WRONG = (0.02, 0.1), (0.05, 0.2)
 """Errors of the given parameters: as of data sheets if an effect is hidden, larger if wrong parameters are the cause."""
-_DIGITS = 5
-"""Digits of the given simulation's parameters."""
 
 
 def draw_handwritten_trial(seed: int, trial: int) -> Trial:
@@ -56,24 +49,24 @@ def draw_handwritten_trial(seed: int, trial: int) -> Trial:
         If no plant that was drawn can be integrated, or no effect causes a gap of the requested size.
     """
     cell = handwritten_cell_of(seed, trial)
-    return first_that_succeeds(lambda attempt: _drawn(cell, seed, trial, attempt), seed, trial)
+    return first_that_succeeds(lambda streams: _drawn(cell, seed, trial, streams), seed, trial)
 
 
-def _drawn(cell: Cell, seed: int, trial: int, attempt: int) -> Trial:
-    streams = [np.random.default_rng(s) for s in np.random.SeedSequence([seed, trial, attempt]).spawn(5)]
-    of_rig, of_effect, of_strength, of_noise, of_given = streams
+def _drawn(cell: Cell, seed: int, trial: int, streams: Sequence[np.random.Generator]) -> Trial:
+    of_rig, of_effect, of_strength, of_noise, of_given, _ = streams
     rig = RIGS[cell.rig]
     bench = draw_bench(cell, of_rig)
-    own, strength, wished = None, None, None
+    hidden, wished = None, None
     if cell.effect:
-        wished = _wished_gap(bench, of_strength)
-        own, strength = bench.sized(draw_shape(cell.effect, bench.sizes, of_effect), wished)
+        wished = draw_gap(bench.readings, bench.noise, of_strength)
+        hidden = bench.sized(draw_shape(cell.effect, bench.sizes, of_effect), wished)
+    own = None if hidden is None else hidden.values
     records = bench.measured(own, of_noise)
     roles = [recording.role for recording in bench.plan]
     seen = [record for record, role in zip(records, roles, strict=True) if role is not None]
     withheld = [record for record, role in zip(records, roles, strict=True) if role is None]
     refit = bench.refit([r for r in seen if r.role == "estimation"])
-    gap = bench.largest_left(bench.scored(refit, [r for r in seen if r.role == "validation"]))
+    gap = largest_left(bench.scored(refit, [r for r in seen if r.role == "validation"]), bench.noise)
     if cell.effect and gap < GAPS[0]:
         raise SimulationError(f"{cell.effect} causes a gap of {gap:.2g} noise floors.")
     key = {
@@ -89,17 +82,14 @@ def _drawn(cell: Cell, seed: int, trial: int, attempt: int) -> Trial:
         "aimed_tier": None,
         "aimed_gap": wished,
         "gap": gap,
-        "strengths": [] if strength is None else [strength],
+        "strengths": [] if hidden is None else [hidden.strength],
         "values": {**bench.values, **_by_names_of_fit(cell, own or {})},
         "noise_floor": bench.noise,
         "sample_time": bench.plan[0].dt,
         "hold": next((r.hold for r in bench.plan if r.kind != "step"), "zoh"),
     }
-    poles = linearize(compose(rig), bench.values).poles
-    vibrating = np.abs(poles[np.abs(poles.imag) > 0.0])
-    linear = LinearRig(rig, dict(bench.values), float(np.min(vibrating, initial=0.0)))
     given = _given(bench, seen, refit, of_given)
-    return Trial(linear, given, tuple(seen), tuple(withheld), key)
+    return Trial(rig, bench.values, given, tuple(seen), tuple(withheld), key)
 
 
 def draw_bench(cell: Cell, rng: np.random.Generator) -> HandwrittenBench:
@@ -129,12 +119,6 @@ def draw_bench(cell: Cell, rng: np.random.Generator) -> HandwrittenBench:
     return HandwrittenBench(cell, {**values, **offsets, **held}, plan, shares)
 
 
-def _wished_gap(bench: HandwrittenBench, rng: np.random.Generator) -> float:
-    largest = max(_MOST_OF_MOTION * bench.readings[name] / noise for name, noise in bench.noise.items())
-    most = min(GAPS[1], largest)
-    return math.exp(rng.uniform(math.log(GAPS[0]), math.log(most)))
-
-
 def _by_names_of_fit(cell: Cell, own: dict[str, float]) -> dict[str, float]:
     """Return the effect's parameters as results name them: with the effect where the rig has that name too."""
     taken = {p.name for p in (*RIGS[cell.rig].constants, *RIGS[cell.rig].parameters)}
@@ -149,7 +133,7 @@ def _given(
     first = [r for r in seen if r.role == "estimation"][:2]
     one = first[int(rng.integers(len(first)))]
     ends = _WRONG if bench.cell.kind == "parameters" else _OFF
-    off = {p.name: 1.0 + rng.uniform(*ends) * rng.choice([-1.0, 1.0]) for p in bench.rig.parameters}
+    off = off_by(bench.rig, ends, rng)
     fitted_to_one = rng.random() < 0.5
     if bench.cell.kind == "none":
         found = dict(refit.values)
@@ -157,4 +141,4 @@ def _given(
         found = dict(bench.refit([one]).values)
     else:
         found = {name: bench.values[name] * factor for name, factor in off.items()}
-    return {p.name: float(f"{found[p.name]:.{_DIGITS}g}") for p in bench.rig.parameters}
+    return as_given({p.name: found[p.name] for p in bench.rig.parameters})

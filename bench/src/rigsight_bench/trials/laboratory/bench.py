@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.effects import Effect, effect_named, kind_of, placed
 from rigsight.errors import SimulationError
-from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales
+from rigsight.identify import FitResult, characteristic_scales
 from rigsight.identify.typical_size import typical_size
 from rigsight.records import Record
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure, compose, simulate
-from rigsight_bench.trials.any_rig_campaign import DT, Run
+from rigsight_bench.trials.fitted import fitted, largest_left, left_of
 from rigsight_bench.trials.laboratory.channels import in_steps, sampled
 from rigsight_bench.trials.laboratory.runs import before
 from rigsight_bench.trials.laboratory.stands import (
@@ -32,8 +32,9 @@ from rigsight_bench.trials.laboratory.stands import (
     wired_rig,
 )
 from rigsight_bench.trials.laboratory.subjects import LaboratorySubject
-from rigsight_bench.trials.laboratory.surroundings import GAPS, LEAST_BESIDE, Surroundings
-from rigsight_bench.trials.strength import Sized, draw_shape, sized
+from rigsight_bench.trials.laboratory.surroundings import LEAST_BESIDE, Surroundings
+from rigsight_bench.trials.runs import DT, Run
+from rigsight_bench.trials.strength import GAPS, Sized, draw_shape, scaled, sized
 from rigsight_bench.trials.waveforms import low_pass_noise
 
 Floats = NDArray[np.float64]
@@ -129,12 +130,12 @@ class LaboratoryBench:
         rng
             Source of randomness.
         """
-        around, n_fine = self.around, round(FINER * run.duration / DT)
-        t = DT / FINER * np.arange(n_fine)
+        around = self.around
+        t = DT / FINER * np.arange(FINER * run.n_samples)
         outside: dict[str, Floats] = {}
         if around.push:
             size = around.push * self._drive_force(self.quiet(effects, own, run))
-            outside[PUSH] = low_pass_noise(size, around.push_corner, run.duration, rng).spline(t)
+            outside[PUSH] = low_pass_noise(size, around.push_corner, run.n_samples * DT, rng).spline(t)
         if around.softening is not None:
             outside[WARMTH] = 1.0 - np.exp(-(t + number * _EVERY) / around.warms_up)
         fine = self._moved(effects, own, run, outside)
@@ -164,7 +165,7 @@ class LaboratoryBench:
         for effect, at in zip(effects, there, strict=True):
             for p in effect.parameters:
                 numbers[structure.parameter_name(at, p.name)] = own[named.parameter_name(effect, p.name)]
-        record = run.record(dt=DT / FINER)
+        record = run.record(finer=FINER)
         still = {s.name: np.zeros(record.n_samples) for s in self._wired.inputs if s.name not in record}
         record = record.with_signals(**{**still, **(outside or {})})
         shown = simulate(structure, numbers, record, accuracy=_ACCURACY)
@@ -229,7 +230,8 @@ class LaboratoryBench:
             shape = draw_shape(effect, self.scales, rng)
             gap = functools.partial(self._gap_of, effect, floor)
             least = LEAST_BESIDE if sizes else GAPS[0]
-            own = sized(effect, shape, self.scales, gap, wished, least)
+            at = functools.partial(scaled, effect, shape, scales=self.scales)
+            own = sized(effect.name, at, gap, wished, least)
             sizes.append(own)
             found |= {together.parameter_name(effect, name): value for name, value in own.values.items()}
         if max(sizes, key=lambda own: own.gap) is not sizes[0]:
@@ -295,25 +297,9 @@ class LaboratoryBench:
         # What drifts is compared over windows, as a diagnosis does it.
         whole = not self.stand.looped
         pieces = records if whole else cut(records, window_length(self.rig, records))
-        fit = GreyBoxFit(structure, pieces, self.scales, self.noise)
-        found = fit.fit(start, list(free))
-        if not found.residuals:
-            raise SimulationError(
-                f"The equations of {self.rig.name} cannot be fitted to this motion: {found.message}"
-            )
-        return found
+        return fitted(structure, pieces, self.scales, self.noise, start, free)
 
 
 def effect_of(effect: Effect) -> Effect:
     """Return an effect without its place."""
     return effect_named(kind_of(effect.name))
-
-
-def left_of(found: FitResult) -> Floats:
-    """Return the RMS of what a fit leaves of each reading, shape (n_outputs,)."""
-    return np.asarray(np.sqrt(np.nanmean(np.concatenate(found.residuals) ** 2, axis=0)))
-
-
-def largest_left(found: FitResult, floor: Mapping[str, float]) -> float:
-    """Return the largest of these in units of the floor of each."""
-    return float(np.max(left_of(found) / np.array(list(floor.values()))))

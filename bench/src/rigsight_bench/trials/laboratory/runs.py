@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from rigsight.simulate import compose
 from rigsight.simulate.linearization import linearize
 from rigsight_bench.trials.any_rig_campaign import (
     DURATION,
-    Run,
     doublets,
     draw_amplitudes,
     draw_motion,
@@ -22,6 +22,7 @@ from rigsight_bench.trials.any_rig_campaign import (
 )
 from rigsight_bench.trials.laboratory.stands import GOAL, PUSH, STANDS, Law, wired_rig
 from rigsight_bench.trials.laboratory.subjects import LaboratorySubject
+from rigsight_bench.trials.runs import DT, Run
 from rigsight_bench.trials.waveforms import PlannedMoves, Release, Sweep, Waveform
 
 RUNNING_BEFORE = 3.0
@@ -73,29 +74,27 @@ def draw_laboratory_runs(
     # Between samples the output of a controller is smooth, whatever its goal.
     smooth: Hold = "foh" if law is not None else "band_limited"
     duration = DURATION + before(subject)
+    n_samples = round(duration / DT)
 
     def sweep(name: str, role: Role, share: float) -> Run:
         waves = in_proportion(sweeps(amplitudes, band, rng, duration), share)
-        return Run(name, role, "sweep", smooth, waves, duration)
+        return Run(name, role, "sweep", smooth, waves, n_samples)
 
     def multisine(name: str, role: Role, share: float) -> Run:
         waves = in_proportion(multisines(amplitudes, band, rng), share)
-        return Run(name, role, "multisine", smooth, waves, duration)
+        return Run(name, role, "multisine", smooth, waves, n_samples)
 
     def step(name: str, role: Role, share: float) -> Run:
         if law is not None:
-            return Run(name, role, "operation", smooth, _moves(share * amplitudes[GOAL], law, rng), duration)
+            return Run(name, role, "operation", smooth, _moves(share * amplitudes[GOAL], law, rng), n_samples)
         waves = in_proportion(doublets(amplitudes, band, rng), share)
-        return Run(name, role, "step", "zoh", waves, duration)
-
-    def again(name: str, run: Run) -> Run:
-        return Run(name, run.role, run.kind, run.hold, run.waveforms, run.duration)
+        return Run(name, role, "step", "zoh", waves, n_samples)
 
     first = (sweep("record_1", "estimation", 0.4), sweep("record_2", "estimation", 1.0))
     last = (multisine("record_5", "validation", 0.7), sweep("record_6", "validation", 0.75))
     if subject.condition == "repeats":
         twice = multisine("record_3", "estimation", 0.8)
-        return (*first, twice, again("record_4", twice), *last, again("record_7", last[0]))
+        return (*first, twice, replace(twice, name="record_4"), *last, replace(last[0], name="record_7"))
     if subject.condition == "antialias_filter":
         # A step has a rest before it.
         return (
@@ -138,7 +137,7 @@ def _decays(
             "operation",
             "zoh",
             {**still, PUSH: Release(share * math.exp(rng.uniform(-0.1, 0.1)) * force, at)},
-            DURATION + HELD_BEFORE,
+            round((DURATION + HELD_BEFORE) / DT),
         )
         for number, (role, share) in enumerate(_LET_GO, 1)
     )

@@ -16,6 +16,7 @@ from rigsight.effects import Effect, Place, kind_of
 from rigsight.rigs import joint_of
 from rigsight_bench.trials.counted import counted_effects
 from rigsight_bench.trials.laboratory.stands import STANDS, Stand
+from rigsight_bench.trials.passes import shuffled
 
 Item = TypeVar("Item")
 
@@ -124,10 +125,7 @@ def laboratory_subject_of(seed: int, trial: int) -> LaboratorySubject:
     """Return what a trial hides; every pass over the cells of a condition is shuffled anew."""
     turn, number = divmod(trial, len(CONDITIONS))
     condition = CONDITIONS[number]
-    cells = _CELLS[condition]
-    cycle, row = divmod(turn, len(cells))
-    order = np.random.default_rng([seed, cycle, number]).permutation(len(cells))
-    return LaboratorySubject(condition, *cells[int(order[row])])
+    return LaboratorySubject(condition, *shuffled(_CELLS[condition], turn, seed, number))
 
 
 def draw_laboratory_effects(subject: LaboratorySubject, rng: np.random.Generator) -> tuple[Effect, ...]:

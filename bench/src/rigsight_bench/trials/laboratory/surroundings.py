@@ -10,8 +10,6 @@ import numpy as np
 from rigsight_bench.trials.laboratory.stands import STANDS, Law, Softening, draw_law
 from rigsight_bench.trials.laboratory.subjects import LaboratorySubject
 
-GAPS = (5.0, 100.0)
-"""Gap of the re-identified equations in true noise floors: from just visible in a plot to a wrong model."""
 LEAST_BESIDE = 1.5
 """Least gap of a further effect in addition to the main one, in units of the floor: less is not visible."""
 _NOISE = (3e-4, 3e-3)

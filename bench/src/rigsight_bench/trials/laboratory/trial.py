@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 
@@ -11,13 +10,11 @@ import numpy as np
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import SimulationError
 from rigsight.records import Record
-from rigsight.simulate import compose
-from rigsight.simulate.linearization import linearize
 from rigsight_bench.trials.any_rig_numbers import draw_offsets, is_offset
 from rigsight_bench.trials.attempts import first_that_succeeds
-from rigsight_bench.trials.campaign import LinearRig
-from rigsight_bench.trials.draw import Trial
-from rigsight_bench.trials.laboratory.bench import LaboratoryBench, largest_left
+from rigsight_bench.trials.fitted import largest_left
+from rigsight_bench.trials.kinds import SEVERAL
+from rigsight_bench.trials.laboratory.bench import LaboratoryBench
 from rigsight_bench.trials.laboratory.runs import draw_laboratory_runs
 from rigsight_bench.trials.laboratory.stands import STANDS
 from rigsight_bench.trials.laboratory.subjects import (
@@ -25,21 +22,18 @@ from rigsight_bench.trials.laboratory.subjects import (
     draw_laboratory_effects,
     laboratory_subject_of,
 )
-from rigsight_bench.trials.laboratory.surroundings import GAPS, LEAST_BESIDE, draw_surroundings
-from rigsight_bench.trials.subjects import SEVERAL
+from rigsight_bench.trials.laboratory.surroundings import LEAST_BESIDE, draw_surroundings
+from rigsight_bench.trials.strength import GAPS, draw_gap
+from rigsight_bench.trials.trial import Trial, as_given, off_by
 
 _NOISY = 1e-3
 """Noise in units of the reading's size from which a trial is called noisy: the middle of what is drawn."""
-_MOST_OF_MOTION = 0.5
-"""Gap in units of the reading's size that is not exceeded: a laboratory knows its rig better than that."""
 _BESIDE = (0.15, 0.5)
 """Gaps of two further effects, in units of that of the main one."""
 _OFF = (0.02, 0.1)
 """How far the given numbers are off: what data sheets and drawings are worth."""
 _WITHOUT_INPUTS = 0.5
 """Share of free decays that hold no column of an input."""
-_DIGITS = 5
-"""Digits of the given simulation's parameters."""
 
 
 def draw_laboratory_trial(seed: int, trial: int) -> Trial:
@@ -58,11 +52,12 @@ def draw_laboratory_trial(seed: int, trial: int) -> Trial:
         If no stand that was drawn can be simulated, or no effect causes a gap of the requested size.
     """
     subject = laboratory_subject_of(seed, trial)
-    return first_that_succeeds(lambda attempt: _drawn(subject, seed, trial, attempt), seed, trial)
+    return first_that_succeeds(lambda streams: _drawn(subject, seed, trial, streams), seed, trial)
 
 
-def _drawn(subject: LaboratorySubject, seed: int, trial: int, attempt: int) -> Trial:
-    streams = [np.random.default_rng(s) for s in np.random.SeedSequence([seed, trial, attempt]).spawn(6)]
+def _drawn(
+    subject: LaboratorySubject, seed: int, trial: int, streams: Sequence[np.random.Generator]
+) -> Trial:
     of_rig, of_effect, of_strength, of_surroundings, of_noise, of_given = streams
     rig = STANDS[subject.stand].rig
     effects = draw_laboratory_effects(subject, of_effect)
@@ -96,10 +91,8 @@ def _drawn(subject: LaboratorySubject, seed: int, trial: int, attempt: int) -> T
         "noise_floor": floor,
         "surroundings": asdict(bench.around),
     }
-    poles = linearize(compose(rig), bench.values).poles
-    vibrating = np.abs(poles[np.abs(poles.imag) > 0.0])
-    linear = LinearRig(rig, dict(bench.values), float(np.min(vibrating, initial=0.0)))
-    return Trial(linear, _given(bench, of_given), tuple(handed(bench, seen, of_given)), (), key)
+    given = _given(bench, of_given)
+    return Trial(rig, bench.values, given, tuple(handed(bench, seen, of_given)), (), key)
 
 
 def draw_bench(
@@ -134,11 +127,7 @@ def _wished_gaps(
     bench: LaboratoryBench, floor: Mapping[str, float], n_effects: int, rng: np.random.Generator
 ) -> list[float]:
     """Draw the gap of each effect in units of the floor, the main one first."""
-    largest = max(_MOST_OF_MOTION * bench.sizes[name] / own for name, own in floor.items())
-    most = min(GAPS[1], largest)
-    if most <= GAPS[0]:
-        raise SimulationError(f"Noise and disturbance of {bench.rig.name} are too large for a visible gap.")
-    main = math.exp(rng.uniform(math.log(GAPS[0]), math.log(most)))
+    main = draw_gap(bench.sizes, floor, rng)
     beside = [max(rng.uniform(*_BESIDE) * main, LEAST_BESIDE) for _ in range(n_effects - 1)]
     return [main, *beside]
 
@@ -188,8 +177,7 @@ def handed(bench: LaboratoryBench, seen: Sequence[Record], rng: np.random.Genera
 
 def _given(bench: LaboratoryBench, rng: np.random.Generator) -> dict[str, float]:
     """Return the given simulation: numbers from drawings, without the offsets that no drawing has."""
-    off = {p.name: 1.0 + rng.uniform(*_OFF) * rng.choice([-1.0, 1.0]) for p in bench.rig.parameters}
-    return {
-        p.name: 0.0 if is_offset(p) else float(f"{bench.values[p.name] * off[p.name]:.{_DIGITS}g}")
-        for p in bench.rig.parameters
-    }
+    off = off_by(bench.rig, _OFF, rng)
+    return as_given(
+        {p.name: 0.0 if is_offset(p) else bench.values[p.name] * off[p.name] for p in bench.rig.parameters}
+    )

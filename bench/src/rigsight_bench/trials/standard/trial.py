@@ -1,36 +1,37 @@
-"""Records and key of one trial; everything follows from seed, design and the number of the trial."""
+"""Records and key of one trial of design ``standard``; everything follows from seed and number."""
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from rigsight.effects import Effect
-from rigsight.errors import SimulationError
-from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
+from rigsight.identify import FitResult, characteristic_scales, linear_start
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
 from rigsight_bench.trials.attempts import first_that_succeeds
-from rigsight_bench.trials.campaign import DT, Experiment, LinearRig, draw_experiments, draw_rig
-from rigsight_bench.trials.plant import Plant
-from rigsight_bench.trials.strength import draw_shape, scaled, strength_for
-from rigsight_bench.trials.subjects import (
-    NOISE_SIZES,
-    TIERS,
-    CatalogueDesign,
+from rigsight_bench.trials.fitted import fitted, largest_left
+from rigsight_bench.trials.kinds import TIERS
+from rigsight_bench.trials.runs import DT, Run
+from rigsight_bench.trials.standard.campaign import LinearRig, draw_experiments, draw_rig
+from rigsight_bench.trials.standard.plant import Plant
+from rigsight_bench.trials.standard.subjects import (
+    NOISES,
     Subject,
     hidden_effects,
     needs_running_gear,
-    subject_of,
+    standard_subject_of,
 )
+from rigsight_bench.trials.strength import draw_shape, scaled, sized
+from rigsight_bench.trials.trial import Trial, as_given, off_by
 from rigsight_bench.trials.waveforms import Disturbance
 
 _REST_TIME = 2.0
@@ -41,42 +42,13 @@ _CORNER = 5.0
 """Angular frequency above which the disturbance falls [rad/s]."""
 _OFF = (0.05, 0.2)
 """How far wrong parameters are off."""
-_DIGITS = 5
-"""Digits of the given simulation's parameters."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """One drawn trial.
-
-    Attributes
-    ----------
-    linear
-        The rig.
-    given
-        Parameters of the given simulation.
-    records
-        What the diagnosis sees.
-    withheld
-        What it never sees.
-    key
-        The truth, ready for JSON.
-    """
-
-    linear: LinearRig
-    given: dict[str, float]
-    records: tuple[Record, ...]
-    withheld: tuple[Record, ...]
-    key: dict[str, Any]
-
-
-def draw_trial(design: CatalogueDesign, seed: int, trial: int) -> Trial:
-    """Draw and measure one trial.
+def draw_standard_trial(seed: int, trial: int) -> Trial:
+    """Draw and measure one trial of design ``standard``.
 
     Parameters
     ----------
-    design
-        List of cells to draw from.
     seed
         Seed of the whole bench.
     trial
@@ -87,12 +59,11 @@ def draw_trial(design: CatalogueDesign, seed: int, trial: int) -> Trial:
     SimulationError
         If no plant that was drawn can be integrated, or is close enough to a linear one to be re-identified.
     """
-    return first_that_succeeds(lambda attempt: _drawn(design, seed, trial, attempt), seed, trial)
+    subject = standard_subject_of(seed, trial)
+    return first_that_succeeds(lambda streams: _drawn(subject, seed, trial, streams), seed, trial)
 
 
-def _drawn(design: CatalogueDesign, seed: int, trial: int, attempt: int) -> Trial:
-    subject = subject_of(design, seed, trial)
-    streams = [np.random.default_rng(s) for s in np.random.SeedSequence([seed, trial, attempt]).spawn(6)]
+def _drawn(subject: Subject, seed: int, trial: int, streams: Sequence[np.random.Generator]) -> Trial:
     of_rig, of_effect, of_strength, of_noise, of_disturbance, of_given = streams
     effects = hidden_effects(subject)
     linear = draw_rig(
@@ -101,7 +72,7 @@ def _drawn(design: CatalogueDesign, seed: int, trial: int, attempt: int) -> Tria
         swings_wide="gravity_pendulum" in subject.effects,
     )
     experiments = draw_experiments(linear, of_rig)
-    bench = _Bench(linear, experiments, NOISE_SIZES[subject.noise] * math.exp(of_noise.uniform(-0.2, 0.2)))
+    bench = _Bench(linear, experiments, NOISES[subject.noise] * math.exp(of_noise.uniform(-0.2, 0.2)))
     wished = None if subject.tier is None else math.exp(of_strength.uniform(*np.log(TIERS[subject.tier])))
     values, strengths = bench.truth(effects, wished, of_effect)
     records = bench.measure(effects, values, of_noise, of_disturbance)
@@ -111,7 +82,7 @@ def _drawn(design: CatalogueDesign, seed: int, trial: int, attempt: int) -> Tria
     given = bench.given(subject, seen, refit, of_given)
     key = {
         "schema_version": 1,
-        "design": design,
+        "design": "standard",
         "seed": seed,
         "trial": trial,
         "kind": subject.kind,
@@ -126,7 +97,7 @@ def _drawn(design: CatalogueDesign, seed: int, trial: int, attempt: int) -> Tria
         "values": values,
         "noise_floor": bench.floor,
     }
-    return Trial(linear, given, seen, withheld, key)
+    return Trial(linear.rig, linear.values, given, seen, withheld, key)
 
 
 _MOST_DISTURBED = 0.5
@@ -136,7 +107,7 @@ _MOST_DISTURBED = 0.5
 class _Bench:
     """A linear rig with its experiments, sizes and noise."""
 
-    def __init__(self, linear: LinearRig, experiments: Sequence[Experiment], noise: float) -> None:
+    def __init__(self, linear: LinearRig, experiments: Sequence[Run], noise: float) -> None:
         self.linear = linear
         self.experiments = experiments
         self.structure = compose(linear.rig)
@@ -158,31 +129,29 @@ class _Bench:
         for effect in effects:
             assert wished is not None
             shape = draw_shape(effect, self.scales, rng)
-            alone = compose(self.linear.rig, [effect])
-
-            def gap(strength: float, effect: Effect = effect, shape: Mapping[str, float] = shape) -> float:
-                own = scaled(effect, shape, strength, self.scales)
-                named = {alone.parameter_name(effect, name): value for name, value in own.items()}  # noqa: B023
-                return self._gap_of([effect], {**self.linear.values, **named})
-
-            strength = strength_for(gap, math.sqrt(wished**2 - 1.0))
-            strengths.append(strength)
-            for name, value in scaled(effect, shape, strength, self.scales).items():
-                values[structure.parameter_name(effect, name)] = value
+            at = functools.partial(scaled, effect, shape, scales=self.scales)
+            own = sized(effect.name, at, functools.partial(self._gap_of, effect), wished, least=0.0)
+            strengths.append(own.strength)
+            values |= {structure.parameter_name(effect, name): value for name, value in own.values.items()}
         return values, strengths
 
-    def _gap_of(self, effects: Sequence[Effect], values: Mapping[str, float]) -> float:
-        """Return the error of the linear equations on two small sweeps, in units of the sensor noise."""
-        plant = self._plant(effects, values)
+    def _gap_of(self, effect: Effect, own: Mapping[str, float]) -> float:
+        """Return what the linear equations leave of two small sweeps, in units of the sensor noise."""
+        alone = compose(self.linear.rig, [effect])
+        named = {alone.parameter_name(effect, name): value for name, value in own.items()}
+        plant = self._plant([effect], {**self.linear.values, **named})
         records = []
         for experiment in self.experiments[1:3]:
             clean = plant.respond(
-                experiment.waveform, lambda _: 0.0, self._rest(effects, None), 0.0, DT, experiment.n_samples
+                experiment.waveforms["u"],
+                lambda _: 0.0,
+                self._rest([effect], None),
+                0.0,
+                DT,
+                experiment.n_samples,
             )
-            records.append(experiment.record(**dict(zip(self.outputs, clean.T, strict=True))))
-        fit = self.refit(records)
-        left = np.concatenate(fit.residuals) / [self.noise[name] for name in self.outputs]
-        return float(np.max(np.sqrt(np.mean(left**2, axis=0))))
+            records.append(experiment.record(dict(zip(self.outputs, clean.T, strict=True))))
+        return largest_left(self.refit(records), self.noise)
 
     def _plant(self, effects: Sequence[Effect], values: Mapping[str, float]) -> Plant:
         structure = compose(self.linear.rig, effects)
@@ -225,16 +194,16 @@ class _Bench:
             disturbance = _draw_disturbance(experiment, force, of_disturbance)
             start = self._rest(effects, of_disturbance)
             clean = plant.respond(
-                experiment.waveform, disturbance, start, -_REST_TIME, DT, experiment.n_samples
+                experiment.waveforms["u"], disturbance, start, -_REST_TIME, DT, experiment.n_samples
             )
             calm = plant.respond(
-                experiment.waveform, lambda _: 0.0, start, -_REST_TIME, DT, experiment.n_samples
+                experiment.waveforms["u"], lambda _: 0.0, start, -_REST_TIME, DT, experiment.n_samples
             )
             seen = {
                 name: clean[:, i] + of_noise.normal(scale=self.noise[name], size=experiment.n_samples)
                 for i, name in enumerate(self.outputs)
             }
-            records.append(experiment.record(**seen))
+            records.append(experiment.record(seen))
             passed.append(clean - calm)
         for i, name in enumerate(self.outputs):
             through = math.sqrt(float(np.mean(np.concatenate([p[:, i] for p in passed]) ** 2)))
@@ -249,7 +218,7 @@ class _Bench:
         experiment = self.experiments[0]
         disturbance = _draw_disturbance(experiment, force, np.random.default_rng(0))
         disturbed, calm = (
-            plant.respond(experiment.waveform, drive, rest, -_REST_TIME, DT, experiment.n_samples)
+            plant.respond(experiment.waveforms["u"], drive, rest, -_REST_TIME, DT, experiment.n_samples)
             for drive in (disturbance, lambda _: 0.0)
         )
         seen = math.sqrt(float(np.mean((disturbed[:, 0] - calm[:, 0]) ** 2)))
@@ -261,7 +230,7 @@ class _Bench:
         seen = math.sqrt(float(np.mean(self._passed(unit, self.experiments[0])[:, 0] ** 2)))
         return float(rng.uniform(0.2, 0.5)) * self.noise[self.outputs[0]] / seen
 
-    def _passed(self, disturbance: Disturbance, experiment: Experiment) -> NDArray[np.float64]:
+    def _passed(self, disturbance: Disturbance, experiment: Run) -> NDArray[np.float64]:
         """Return what a disturbance does to the linear rig's outputs, shape (n_samples, n_outputs)."""
         t = DT * np.arange(experiment.n_samples, dtype=np.float64)
         record = replace(
@@ -273,11 +242,7 @@ class _Bench:
 
     def refit(self, records: Sequence[Record]) -> FitResult:
         """Return the linear equations with the numbers that fit these records best."""
-        fit = GreyBoxFit(self.structure, records, self.scales, self.noise)
-        found = fit.fit(self.linear.values, self._free)
-        if not found.residuals:
-            raise SimulationError(f"Linear equations cannot be fitted to this motion: {found.message}")
-        return found
+        return fitted(self.structure, records, self.scales, self.noise, self.linear.values, self._free)
 
     @property
     def _free(self) -> list[str]:
@@ -286,9 +251,8 @@ class _Bench:
 
     def gap(self, records: Sequence[Record], refit: FitResult) -> float:
         """Return the error of the re-identified equations on the validation records, in units of the noise floor."""
-        scored = GreyBoxFit(self.structure, records, self.scales, self.noise).fit(refit.values, [])
-        left = np.concatenate(scored.residuals) / [self.floor[name] for name in self.outputs]
-        return float(np.max(np.sqrt(np.mean(left**2, axis=0))))
+        scored = fitted(self.structure, records, self.scales, self.noise, refit.values)
+        return largest_left(scored, self.floor)
 
     def given(
         self, subject: Subject, seen: Sequence[Record], refit: FitResult, rng: np.random.Generator
@@ -296,22 +260,21 @@ class _Bench:
         """Return the given simulation: fitted to one sweep, well fitted to all, or with numbers that are off."""
         sweeps = [r for r in seen if r.kind == "sweep" and r.role == "estimation"]
         one = sweeps[int(rng.integers(len(sweeps)))]
-        off = [rng.uniform(*_OFF) * rng.choice([-1.0, 1.0]) for _ in self.linear.rig.parameters]
-        names = [p.name for p in self.linear.rig.parameters]
+        off = off_by(self.linear.rig, _OFF, rng)
         if subject.kind == "none":
-            found = {name: refit.values[name] for name in names}
+            found = {name: refit.values[name] for name in off}
         elif subject.kind == "parameters":
             found = {
-                name: self.linear.values[name] * (1.0 if name.endswith("_off") else 1.0 + error)
-                for name, error in zip(names, off, strict=True)
+                name: self.linear.values[name] * (1.0 if name.endswith("_off") else factor)
+                for name, factor in off.items()
             }
         else:
             constants = {p.name: self.linear.values[p.name] for p in self.linear.rig.constants}
             found = linear_start(self.linear.rig, [one], constants, {})
-        return {name: float(f"{value:.{_DIGITS}g}") for name, value in found.items()}
+        return as_given(found)
 
 
-def _draw_disturbance(experiment: Experiment, size: float, rng: np.random.Generator) -> Disturbance:
+def _draw_disturbance(experiment: Run, size: float, rng: np.random.Generator) -> Disturbance:
     """Return a random force of this standard deviation, white up to a corner, from before the record to its end."""
     n_values = math.ceil((_REST_TIME + experiment.n_samples * DT) / _SPACING) + 4
     pole = math.exp(-_CORNER * _SPACING)

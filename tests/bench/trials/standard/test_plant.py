@@ -12,8 +12,8 @@ from rigsight.records import Record
 from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
-from rigsight_bench.trials.outside import OUTSIDE
-from rigsight_bench.trials.plant import Plant
+from rigsight_bench.trials.standard.outside import OUTSIDE
+from rigsight_bench.trials.standard.plant import Plant
 from rigsight_bench.trials.strength import draw_shape, scaled
 from rigsight_bench.trials.waveforms import Step, Sweep, samples
 

@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 
 from rigsight.errors import SimulationError
 from rigsight.simulate import Structure
-from rigsight_bench.trials.switches import SwitchedEquations, switched_equations
+from rigsight_bench.trials.standard.switches import SwitchedEquations, switched_equations
 from rigsight_bench.trials.waveforms import Signal, Waveform
 
 RELATIVE_TOLERANCE = 1e-8

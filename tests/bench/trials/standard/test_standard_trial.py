@@ -9,16 +9,17 @@ import pytest
 
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
-from rigsight_bench.trials import Trial, draw_trial, n_trials, subject_of
-from rigsight_bench.trials.campaign import LinearRig, draw_rig
-from rigsight_bench.trials.subjects import TIERS, Subject
+from rigsight_bench.trials import Trial, draw_trial, n_trials
+from rigsight_bench.trials.kinds import TIERS
+from rigsight_bench.trials.standard.campaign import LinearRig, draw_rig
+from rigsight_bench.trials.standard.subjects import Subject, standard_subject_of
 
 SEED = 4711
-"""The seed of tests/workflow/test_blind.py, which then needs no trial of its own."""
+"""The seed of tests/bench/test_benches.py, which then needs no trial of its own."""
 
 
 def first_trial(fits: Callable[[Subject], bool]) -> int:
-    return next(t for t in range(n_trials("small")) if fits(subject_of("small", SEED, t)))
+    return next(t for t in range(n_trials("standard")) if fits(standard_subject_of(SEED, t)))
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +33,7 @@ def nothing(drawn: Callable[[int, int], Trial]) -> Trial:
 
 
 def test_a_trial_drawn_twice_is_the_same(nothing: Trial) -> None:
-    again = draw_trial("small", SEED, nothing.key["trial"])
+    again = draw_trial("standard", SEED, nothing.key["trial"])
     assert again.key == nothing.key
     assert again.given == nothing.given
     first, second = (*nothing.records, *nothing.withheld), (*again.records, *again.withheld)
@@ -50,10 +51,10 @@ def test_a_hidden_effect_leaves_a_gap_of_about_the_wished_size(cubic: Trial) -> 
 def test_the_given_simulation_fits_the_one_sweep_it_was_identified_from_and_no_other_as_well(
     cubic: Trial,
 ) -> None:
-    output = cubic.linear.rig.outputs[0].name
+    output = cubic.rig.outputs[0].name
     errors = []
     for record in (r for r in cubic.records if r.kind == "sweep"):
-        simulated = simulate(compose(cubic.linear.rig), {**cubic.linear.values, **cubic.given}, record)
+        simulated = simulate(compose(cubic.rig), {**cubic.values, **cubic.given}, record)
         left = np.sqrt(np.mean((record[output] - simulated[output]) ** 2))
         errors.append(left / cubic.key["noise_floor"][output])
     assert max(errors) > 3.0
@@ -68,7 +69,7 @@ def test_without_an_effect_nothing_but_noise_is_left(nothing: Trial) -> None:
 
 
 def test_wrong_parameters_are_off_by_what_a_data_sheet_is(cubic: Trial) -> None:
-    trial = draw_trial("small", SEED, first_trial(lambda s: s.kind == "parameters"))
+    trial = draw_trial("standard", SEED, first_trial(lambda s: s.kind == "parameters"))
     assert trial.key["gap"] == pytest.approx(1.0, abs=0.05)
     off = [
         abs(value / trial.key["values"][name] - 1.0)

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.records import Hold, Kind, Record, Role
+from rigsight.records import Role
 from rigsight.rigs import AXIS, RUNNING_GEAR, Rig, evaluated
-from rigsight_bench.trials.waveforms import Multisine, Step, Sweep, Waveform, samples
+from rigsight_bench.trials.runs import DT, Run
+from rigsight_bench.trials.waveforms import Multisine, Step, Sweep
 
-DT = 5e-3
-"""Sample time of all records [s]."""
 _SWEEP_TIME = 40.0
 _BAND = (0.08, 6.0)
 """Begin and end of a sweep in units of the natural frequency."""
@@ -48,33 +46,6 @@ class LinearRig:
     def drive_gain(self) -> float:
         """Force per unit of the input."""
         return evaluated(self.rig.motion.drive_gain, self.values)
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """One record to be measured; `role` is None for one that no diagnosis sees."""
-
-    name: str
-    role: Role | None
-    kind: Kind
-    amplitude: float
-    hold: Hold
-    waveform: Waveform
-    n_samples: int
-
-    def record(self, **outputs: NDArray[np.float64]) -> Record:
-        """Return the record of the input's samples and these outputs."""
-        t = DT * np.arange(self.n_samples, dtype=np.float64)
-        return Record(
-            name=self.name,
-            dt=DT,
-            signals={"u": samples(self.waveform, t), **outputs},
-            units={},
-            role=self.role or "validation",
-            kind=self.kind,
-            amplitude=self.amplitude,
-            hold=self.hold,
-        )
 
 
 def draw_rig(rng: np.random.Generator, rig: Rig | None, swings_wide: bool) -> LinearRig:
@@ -124,23 +95,24 @@ def draw_rig(rng: np.random.Generator, rig: Rig | None, swings_wide: bool) -> Li
     return LinearRig(rig, values, omega)
 
 
-def draw_experiments(linear: LinearRig, rng: np.random.Generator) -> tuple[Experiment, ...]:
+def draw_experiments(linear: LinearRig, rng: np.random.Generator) -> tuple[Run, ...]:
     """Draw the experiments of a campaign, and behind them two that stay withheld from every diagnosis."""
     start, stop = (share * linear.omega * math.exp(rng.uniform(-0.1, 0.1)) for share in _BAND)
 
-    def sweep(name: str, role: Role, amplitude: float) -> Experiment:
+    def sweep(name: str, role: Role, amplitude: float) -> Run:
         wave = Sweep(amplitude, start, stop, _SWEEP_TIME)
-        return Experiment(name, role, "sweep", amplitude, "band_limited", wave, _count(_SWEEP_TIME))
+        n = round(_SWEEP_TIME / DT)
+        return Run(name, role, "sweep", "band_limited", {"u": wave}, n, amplitude=amplitude)
 
-    def multisine(name: str, role: Role | None, effective: float) -> Experiment:
+    def multisine(name: str, role: Role | None, effective: float) -> Run:
         wave = _multisine(linear.omega, effective, rng)
-        drawn = Experiment(name, role, "multisine", 1.0, "band_limited", wave, _count(_SWEEP_TIME))
-        peak = float(np.max(np.abs(drawn.record()["u"])))
+        drawn = Run(name, role, "multisine", "band_limited", {"u": wave}, round(_SWEEP_TIME / DT))
+        peak = float(np.max(np.abs(drawn.inputs()["u"])))
         return replace(drawn, amplitude=round(peak, 3))
 
-    def step(name: str, role: Role | None, amplitude: float) -> Experiment:
+    def step(name: str, role: Role | None, amplitude: float) -> Run:
         wave = Step(amplitude, _STEP_START)
-        return Experiment(name, role, "step", amplitude, "zoh", wave, _count(_STEP_TIME))
+        return Run(name, role, "step", "zoh", {"u": wave}, round(_STEP_TIME / DT), amplitude=amplitude)
 
     return (
         sweep("record_1", "estimation", 0.25),
@@ -152,10 +124,6 @@ def draw_experiments(linear: LinearRig, rng: np.random.Generator) -> tuple[Exper
         multisine("withheld_1", None, 0.22),
         step("withheld_2", None, 0.85),
     )
-
-
-def _count(duration: float) -> int:
-    return round(duration / DT)
 
 
 def _multisine(omega: float, effective: float, rng: np.random.Generator) -> Multisine:
