@@ -287,5 +287,5 @@ def test_a_trial_that_kills_its_workers_is_named(tmp_path: Path, monkeypatch: py
 
 def test_a_cluster_without_dask_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install 'rigsight\[bench\]'"):
+    with pytest.raises(InputError, match=r"pip install '\./bench\[cluster\]'"):
         list(finished(abs, [1], 1, "tcp://127.0.0.1:8786"))
