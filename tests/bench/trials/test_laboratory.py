@@ -106,7 +106,7 @@ def test_one_effect_of_each_family_is_drawn_and_any_may_be_the_main_one() -> Non
 def test_a_wired_rig_that_nothing_touches_moves_as_the_rig_itself() -> None:
     bench, _ = taken("clean", "drive_train")
     run = bench.runs[1]
-    itself = simulate(compose(bench.rig), bench.values, run.record(dt=1.25e-3), accuracy=1e-7)
+    itself = simulate(compose(bench.rig), bench.values, run.record(finer=4), accuracy=1e-7)
     for name in ("motor_angle", "load_angle"):
         assert np.allclose(quiet(bench)[1][name], itself[name][::4], atol=1e-6 * np.ptp(itself[name]))
 
