@@ -26,7 +26,7 @@ NOW := date +%s
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check bench dist docs fuzz calibrate blind blind-small clean
+.PHONY: help demo test check bench dist docs fuzz calibrate blind clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 20
@@ -50,8 +50,9 @@ bench: $(DEVELOPMENT)  ## measure the simulator against C and scipy, the time of
 	@$(BIN)/python benchmarks/diagnosis.py
 	@$(BIN)/python benchmarks/exports.py
 
-dist: $(DEVELOPMENT)  ## build wheel and source distribution in dist/
+dist: $(DEVELOPMENT)  ## build wheels and source distributions in dist/
 	@$(BIN)/python -m hatchling build
+	@cd bench && ../$(BIN)/python -m hatchling build -d ../dist
 
 docs: $(DEVELOPMENT) $(DOCS_INSTALLED)  ## build the documentation site in build/site, links checked
 	@# Not --quiet: suppressed warnings would not make a strict build fail.
@@ -64,20 +65,17 @@ fuzz: $(DEVELOPMENT) $(FUZZER_INSTALLED)  ## fuzz everything that reads a file, 
 calibrate: $(DEVELOPMENT)  ## fit the calibration of probabilities again to its table of training trials
 	@$(BIN)/python experiments/calibration/fit.py
 
-blind-small: $(RUNNABLE) $(COMPILER)  ## run the small blind bench; takes hours, continues where it was stopped
-	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
-
-blind: $(RUNNABLE) $(COMPILER)  ## run the standard blind bench; takes hours, continues where it was stopped; writes docs/blind.md
+blind: $(RUNNABLE) $(COMPILER)  ## run the blind bench; takes hours, continues where it was stopped; writes docs/blind.md
 	@$(BIN)/rigsight blind --design standard --seed $(SEED) --out out/blind --markdown docs/blind.md
 
 clean:  ## remove results and caches; the environment is kept (remove .venv to start from scratch)
 	rm -rf demo out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
-	find src tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src bench tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Stamps are written last: an interrupted installation is continued by the next call.
 # Runtime packages, pinned by the lock file, of which they are a third. hatchling, which builds the package, comes from
 # there too, so that no unpinned build tool is downloaded.
-$(RUNNABLE): pyproject.toml requirements.lock
+$(RUNNABLE): pyproject.toml bench/pyproject.toml requirements.lock
 	@command -v $(PYTHON) >/dev/null || { echo "rigsight needs Python 3.11 or newer, and '$(PYTHON)' was not found. Name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3.12" >&2; exit 1; }
 	@test ! -x $(BIN)/python || $(BIN)/python -c '$(NEW_ENOUGH)' || { echo "$(VENV) holds a Python older than 3.11: remove it (rm -r $(VENV)) and call make again." >&2; exit 1; }
 	@set -e; begun=$$($(NOW)); \
@@ -87,7 +85,7 @@ $(RUNNABLE): pyproject.toml requirements.lock
 	 echo "Installing rigsight and what it runs with into $(VENV) ..."; \
 	 $(PIP_INSTALL) --only-binary uv "uv==0.13.8" 2>/dev/null || true; \
 	 $(call install,--constraint requirements.lock hatchling); \
-	 $(call install,--constraint requirements.lock --no-build-isolation --editable .); \
+	 $(call install,--constraint requirements.lock --no-build-isolation --editable . --editable ./bench); \
 	 touch $@; \
 	 echo "Installed in $$(($$($(NOW)) - begun)) s."
 

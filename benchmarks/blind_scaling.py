@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/blind_scaling.py --trials 4
 
-Every way runs the same trials of the small design from the draw to the score, one diagnosis of one thread at a time per worker,
+Every way runs the same trials of the standard design from draw to score, one diagnosis of one thread at a time per worker,
 after a pass that compiles the kernels. Dask's scheduler and workers are started by Dask's own commands on this machine.
 
 Efficiency is the rate of two workers over twice that of one; the rate is trials over the time from the first hand-over to the
@@ -34,13 +34,13 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rigsight.blind import Outcome
-from rigsight.cli import trial_process
-from rigsight.workflow.bench.execution import finished
-from rigsight.workflow.bench.files import BenchFolder, trial_name
-from rigsight.workflow.bench.scoring import score_trial
-from rigsight.workflow.bench.store import TrialStore
-from rigsight.workflow.bench.trial import diagnose_trial, make_trial
+from rigsight_bench import trial_process
+from rigsight_bench.running.execution import finished
+from rigsight_bench.running.files import BenchFolder, trial_name
+from rigsight_bench.running.scoring import score_trial
+from rigsight_bench.running.store import TrialStore
+from rigsight_bench.running.trial import diagnose_trial, make_trial
+from rigsight_bench.scoring import Outcome
 
 N_EMPTY = 2000
 N_ROWS = 200
@@ -64,7 +64,7 @@ class Ran:
 
 def run_trial(folder: BenchFolder, seed: int, number: int) -> Ran:
     begin = time.time()
-    make_trial(folder, "small", seed, number)
+    make_trial(folder, "standard", seed, number)
     diagnose_trial(folder, trial_name(number), trial_process.START)
     outcome = score_trial(folder, trial_name(number))
     memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / (
@@ -238,7 +238,7 @@ def project(trial: float, longest: float, per_trial: float, traffic: float) -> N
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--trials", type=int, default=4)
-    parser.add_argument("--seed", type=int, default=1, help="seed of the small design")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the standard design")
     parser.add_argument(
         "--rounds", type=int, default=1, help="repetitions of each way; an even number cancels drift"
     )
@@ -261,7 +261,7 @@ def main() -> None:
             if options.stand_in is not None:
                 return functools.partial(stand_in, options.stand_in)
             folder = BenchFolder(place / f"bench-{next(number)}")
-            folder.settle("small", options.seed)
+            folder.settle("standard", options.seed)
             return functools.partial(run_trial, folder, options.seed)
 
         trials = range(options.trials)

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.effects import CATALOGUE
-from rigsight.workflow.bench.files import STORE_FILE
-from rigsight.workflow.bench.score_files import BLIND_FILE, PAGE_FILE, merge
-from rigsight.workflow.bench.store import TrialStore
+from rigsight_bench.running.files import STORE_FILE
+from rigsight_bench.running.score_files import BLIND_FILE, PAGE_FILE, merge
+from rigsight_bench.running.store import TrialStore
+from rigsight_bench.scoring import Outcome, ParameterError, WithheldError
 
 PARTS = 4
 """Benches that the rows come from, as if they had run on so many clusters."""

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import pickle
 import signal
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
-from rigsight.blind import Outcome, ParameterError, Trial, WithheldError, draw_trial
+from rigsight import cli
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
@@ -39,6 +38,7 @@ for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIG
 if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
+Run = Callable[..., tuple[int, str, str]]
 SHARED_DATA = Path(__file__).parents[1] / "../shared/data"
 
 
@@ -160,67 +160,6 @@ def write_model(tmp_path: Path) -> Callable[..., Path]:
     return write
 
 
-@pytest.fixture(scope="session")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, int], Trial]:
-    """Return a trial of the small bench by seed and number, drawn once for all processes that test: it takes ten seconds."""
-    own = tmp_path_factory.getbasetemp()
-    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
-
-    def draw(seed: int, number: int) -> Trial:
-        file = shared / f"trial-{seed}-{number}"
-        with file.with_suffix(".lock").open("w") as lock:
-            # Where files cannot be locked, two processes may draw the same; the later one replaces what is alike.
-            with contextlib.suppress(ImportError):
-                import fcntl
-
-                fcntl.flock(lock, fcntl.LOCK_EX)
-            if not file.exists():
-                part = file.with_suffix(f".{os.getpid()}")
-                part.write_bytes(pickle.dumps(draw_trial("small", seed, number)))
-                part.replace(file)
-        trial: Trial = pickle.loads(file.read_bytes())
-        return trial
-
-    return draw
-
-
-@pytest.fixture
-def outcome_like() -> Callable[..., Outcome]:
-    """Return an outcome of a blind trial, right unless it is told otherwise."""
-
-    def like(**changes: Any) -> Outcome:
-        content: dict[str, Any] = {
-            "design": "small", "seed": 1, "trial": "000", "fingerprint": "", "version": "1.0",
-            "kind": "single", "effects": ("backlash",), "places": ("dynamics",),
-            "rig": "axis", "noise": "low", "gap": 12.0, "tier": "clear",
-            "verdict": "effect", "named": ("backlash",), "named_places": ("dynamics",), "right": True, "effect_right": True,
-            "right_within_set": True, "place_right": True, "looked_at": None,
-            "probability": 0.9, "stated": 0.9, "stated_is_true": True, "in_set": True, "set_size": 1, "several_places": False,
-            "held_out": 1.02,
-            "withheld": (WithheldError("withheld_1", "step", 0.85, 3000, 1.02),),
-            "parameters": (ParameterError("g", "backlash", -0.5), ParameterError("k", "rig", 1.5)),
-            "seconds": 20.0,
-        }  # fmt: skip
-        return Outcome(**(content | changes))
-
-    return like
-
-
-@pytest.fixture
-def wrong_outcome(outcome_like: Callable[..., Outcome]) -> Callable[..., Outcome]:
-    """Return an outcome of a trial of which the wrong effect was named."""
-
-    def like(**changes: Any) -> Outcome:
-        content: dict[str, Any] = {
-            "named": ("free_play",), "right": False, "effect_right": False, "right_within_set": False,
-            "probability": 0.2, "stated": 0.75, "stated_is_true": False, "in_set": False,
-            "parameters": (),
-        }  # fmt: skip
-        return outcome_like(**(content | changes))
-
-    return like
-
-
 @pytest.fixture
 def mass_on_spring(tmp_path: Path) -> Callable[..., Rig]:
     """Make a rig of one mass on a spring, driven by a force, whose joint is written as asked."""
@@ -238,3 +177,20 @@ def mass_on_spring(tmp_path: Path) -> Callable[..., Rig]:
         return read_rig_file(file)
 
     return make
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    """Run a command line in this process and return exit code, stdout and stderr."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["rigsight", *map(str, arguments)])
+        capfd.readouterr()
+        try:
+            cli.command_line()
+            code: Any = 0
+        except SystemExit as leaving:
+            code = leaving.code or 0
+        return code, *capfd.readouterr()
+
+    return call

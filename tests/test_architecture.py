@@ -14,17 +14,11 @@ import pytest
 from rigsight.rigs import RIGS
 
 ROOT = Path(__file__).parents[1]
-MODULES = sorted((ROOT / "src").rglob("*.py"))
+PACKAGES = (ROOT / "src/rigsight", ROOT / "bench/src/rigsight_bench")
+MODULES = sorted(module for package in PACKAGES for module in package.rglob("*.py"))
 LONGEST_FILE = 600
 NAME_A_RIG = {
     "api/example.py": "the records of the ten lines of the README come from a virtual axis",
-    "blind/campaign.py": "designs small and standard draw axes and running gears",
-    "blind/counted.py": "the rigs that the designs draw from",
-    "blind/draw.py": "rolling effects are drawn on the running gear, the only built-in rig that rolls",
-    "blind/handwritten/cells.py": "which rig each hidden effect of the handwritten design has",
-    "blind/handwritten/plants.py": "whose equations are written by hand are built-in rigs",
-    "blind/laboratory/stands.py": "the stands of the laboratory design are built-in rigs",
-    "blind/laboratory/subjects.py": "which stand each hidden effect of the laboratory design has",
     "discover/terms/hysteresis.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/transfer/axis_parameters.py": "API: the parameters of an axis from a transfer function",
@@ -36,8 +30,19 @@ NAME_A_RIG = {
     "workflow/demo.py": "the demo is the running gear of the thesis",
     "workflow/own/effect_checks.py": "effects of one's own are tried on three built-in rigs",
     "workflow/campaign/virtual_rig.py": "the demo is the running gear of the thesis",
+    "trials/standard/campaign.py": "the standard design draws axes and running gears",
+    "trials/standard/trial.py": "rolling effects are drawn on the running gear, the only built-in rig that rolls",
+    "trials/handwritten/cells.py": "which rig each hidden effect of the handwritten design has",
+    "trials/handwritten/plants.py": "whose equations are written by hand are built-in rigs",
+    "trials/laboratory/stands.py": "the stands of the laboratory design are built-in rigs",
+    "trials/laboratory/subjects.py": "which stand each hidden effect of the laboratory design has",
 }
+"""Modules by their path in their package."""
 NAMES_WITHOUT_A_QUESTION = {"utils", "util", "common", "core", "helpers", "misc"}
+
+
+def in_package(module: Path) -> Path:
+    return module.relative_to(next(package for package in PACKAGES if module.is_relative_to(package)))
 
 
 def test_rooms_import_only_downwards() -> None:
@@ -48,7 +53,7 @@ def test_rooms_import_only_downwards() -> None:
     assert run.returncode == 0, run.stdout + run.stderr
 
 
-@pytest.mark.parametrize("module", MODULES, ids=lambda path: str(path.relative_to(ROOT / "src")))
+@pytest.mark.parametrize("module", MODULES, ids=lambda path: str(in_package(path)))
 def test_a_module_is_short_and_says_its_question(module: Path) -> None:
     text = module.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= LONGEST_FILE
@@ -71,7 +76,7 @@ def test_the_lock_pins_every_package_and_names_no_place(lock: str) -> None:
 def test_git_has_every_file() -> None:
     """A commit without one of its files could not be imported, whatever .gitignore says."""
     listed = subprocess.run(
-        ["git", "ls-files", "--others", "-x", "__pycache__", "-x", "*.egg-info", "src", "tests"],
+        ["git", "ls-files", "--others", "-x", "__pycache__", "-x", "*.egg-info", "src", "bench", "tests"],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -85,7 +90,7 @@ def test_git_has_every_file() -> None:
 def test_every_language_is_printed_in_one_place() -> None:
     """Two printers of one language would in time print two equations."""
     printers = {
-        str(module.relative_to(ROOT / "src" / "rigsight").as_posix())
+        in_package(module).as_posix()
         for module in MODULES
         if any(word in module.read_text(encoding="utf-8") for word in ("sympy.printing", "sp.latex("))
     }
@@ -100,7 +105,7 @@ def test_no_text_names_a_module_of_a_room_above() -> None:
     layers = next(c["layers"] for c in contracts if c.get("containers") == ["rigsight"])
     height = {room: -i for i, layer in enumerate(layers) for room in layer.split(" | ")}
     found = []
-    for module in MODULES:
+    for module in (ROOT / "src" / "rigsight").rglob("*.py"):
         own = module.relative_to(ROOT / "src" / "rigsight").with_suffix("").parts[0]
         tree = ast.parse(module.read_text(encoding="utf-8"))
         told = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
@@ -129,7 +134,7 @@ def test_no_other_module_knows_a_rig_by_name() -> None:
         return isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in RIGS
 
     found = {
-        module.relative_to(ROOT / "src" / "rigsight").as_posix()
+        in_package(module).as_posix()
         for module in MODULES
         if any(map(names_one, ast.walk(ast.parse(module.read_text(encoding="utf-8")))))
     }

@@ -1,4 +1,4 @@
-"""Does the wheel hold all of the package, and run outside of the repository?"""
+"""Do the wheels hold all of their packages, and does rigsight run outside of the repository?"""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build wheel and source distribution as `make dist` does, and return their folder."""
+    """Build wheels and source distributions as `make dist` does, and return their folder."""
     folder = tmp_path_factory.mktemp("dist")
-    subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-d", str(folder)],
-        cwd=ROOT,
-        check=True,
-        capture_output=True,
-    )
+    for project in (ROOT, ROOT / "bench"):
+        subprocess.run(
+            [sys.executable, "-m", "hatchling", "build", "-d", str(folder)],
+            cwd=project,
+            check=True,
+            capture_output=True,
+        )
     return folder
 
 
-def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built: Path) -> None:
-    (wheel,) = built.glob("*.whl")
+@pytest.mark.parametrize("source", [ROOT / "src", ROOT / "bench/src"], ids=["rigsight", "bench"])
+def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built: Path, source: Path) -> None:
+    (package,) = (folder.name for folder in source.iterdir())
+    (wheel,) = built.glob(f"{package}-*.whl")
     held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-    source = ROOT / "src"
     wanted = {
         path.relative_to(source).as_posix()
         for path in source.rglob("*")
@@ -42,17 +44,17 @@ def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built: Path)
 
 
 def test_the_source_distribution_holds_what_it_is_built_and_tested_from(built: Path) -> None:
-    (archive,) = built.glob("*.tar.gz")
+    (archive,) = built.glob("rigsight-*.tar.gz")
     with tarfile.open(archive) as opened:
         top = {name.split("/", 2)[1] for name in opened.getnames()}
     assert top == {
-        "src", "tests", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "requirements.lock",
+        "bench", "src", "tests", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "requirements.lock",
         "pyproject.toml", "PKG-INFO", ".gitignore",
     }  # fmt: skip
 
 
 def test_the_wheel_runs_outside_of_the_repository(built: Path, tmp_path: Path) -> None:
-    (wheel,) = built.glob("*.whl")
+    (wheel,) = built.glob("rigsight-*.whl")
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = (
         "import sys; sys.path.insert(0, sys.argv.pop(1)); import rigsight; from rigsight.cli import main; "
@@ -66,6 +68,11 @@ def test_the_wheel_runs_outside_of_the_repository(built: Path, tmp_path: Path) -
 
 
 def test_the_version_is_the_same_wherever_it_stands() -> None:
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    bench = tomllib.loads((ROOT / "bench/pyproject.toml").read_text(encoding="utf-8"))["project"]
+    version = project["version"]
+    assert bench["version"] == version
+    assert bench["dependencies"] == [f"rigsight=={version}"]
+    assert project["optional-dependencies"]["bench"] == [f"rigsight-bench=={version}"]
     assert f"version: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")

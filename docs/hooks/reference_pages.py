@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-SOURCE = Path(__file__).parents[2] / "src/rigsight"
+ROOT = Path(__file__).parents[2]
+SOURCE, BENCH = ROOT / "src/rigsight", ROOT / "bench/src/rigsight_bench"
 PACKAGES = (
     "records",
     "parameters",
@@ -25,7 +26,6 @@ PACKAGES = (
     "discover",
     "compare",
     "diagnose",
-    "blind",
     "workflow",
     "plot",
     "report",
@@ -41,7 +41,6 @@ COMMANDS = (
     "compare",
     "simulate",
     "vary",
-    "blind",
     "campaign.model_file",
 )
 """Modules of `rigsight.workflow` that are public one by one: each command is a function of its own module."""
@@ -58,9 +57,9 @@ _LONGEST_VALUE = 120
 """Letters of a constant's value that is shown: an alias of types is, a catalogue is not."""
 
 
-def question(name: str) -> str:
+def question(name: str, source: Path = SOURCE) -> str:
     """Return the first line of a package's docstring."""
-    folder = SOURCE / name
+    folder = source / name
     file = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
     return (ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").partition("\n")[0]
 
@@ -68,6 +67,7 @@ def question(name: str) -> str:
 def reference_index() -> str:
     """Return the page that lists the packages."""
     rows = [f"| [`rigsight.{name}`]({name}.md) | {question(name)} |" for name in PACKAGES]
+    rows.append(f"| [`{BENCH.name}`]({BENCH.name}.md) | {question('', BENCH)} |")
     return "\n".join(
         [
             "# Python reference",
@@ -84,14 +84,14 @@ def reference_index() -> str:
     )
 
 
-def public_names(name: str) -> dict[str, str]:
+def public_names(name: str, source: Path = SOURCE) -> dict[str, str]:
     """Return the names that a package offers, each with the path at which it is defined; none for a single module.
 
     The path matters: several functions are called as the module that holds them, and a name alone would be taken for that.
     """
-    if not (SOURCE / name).is_dir():
+    if not (source / name).is_dir():
         return {}
-    tree = ast.parse((SOURCE / name / "__init__.py").read_text(encoding="utf-8"))
+    tree = ast.parse((source / name / "__init__.py").read_text(encoding="utf-8"))
     found = {
         alias.asname: f"{node.module}.{alias.name}"
         for node in tree.body
@@ -104,7 +104,7 @@ def public_names(name: str) -> dict[str, str]:
         for node in tree.body
         if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
     ]
-    found |= {constant: f"rigsight.{name}.{constant}" for constant in own}
+    found |= {constant: f"{source.name}.{name}.{constant}" for constant in own}
     return dict(sorted(found.items(), key=lambda item: item[0].lower()))
 
 
@@ -112,10 +112,7 @@ def reference_page(name: str) -> str:
     """Return the page of a package."""
     names = public_names(name)
     if names:
-        blocks = [
-            f"::: {path}\n{_AS_ENTRY.format(values=str(_is_short(path)).lower())}" for path in names.values()
-        ]
-        return "\n\n".join([f"# rigsight.{name}", question(name), *blocks, ""])
+        return "\n\n".join([f"# rigsight.{name}", question(name), *map(_entry, names.values()), ""])
     modules = (
         [f"rigsight.workflow.{command}" for command in COMMANDS]
         if name == "workflow"
@@ -125,10 +122,23 @@ def reference_page(name: str) -> str:
     return "\n\n".join([*head, *(f"::: {module}" for module in modules), ""])
 
 
+def bench_page() -> str:
+    """Return the page of the package of the blind bench."""
+    names = [path for name in ("trials", "scoring") for path in public_names(name, BENCH).values()]
+    return "\n\n".join(
+        [f"# {BENCH.name}", question("", BENCH), f"::: {BENCH.name}.benches", *map(_entry, names), ""]
+    )
+
+
+def _entry(path: str) -> str:
+    return f"::: {path}\n{_AS_ENTRY.format(values=str(_is_short(path)).lower())}"
+
+
 def _is_short(path: str) -> bool:
     """Return True if a name stands for a value that fits into a line."""
     module, _, name = path.rpartition(".")
-    file = SOURCE.parent / Path(*module.split("."))
+    source = BENCH if module.startswith(BENCH.name) else SOURCE
+    file = source.parent / Path(*module.split("."))
     file = file / "__init__.py" if file.is_dir() else file.with_suffix(".py")
     for node in ast.parse(file.read_text(encoding="utf-8")).body:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]

@@ -15,7 +15,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from policy_page import policy_page
-from reference_pages import PACKAGES, reference_index, reference_page
+from reference_pages import BENCH, PACKAGES, bench_page, reference_index, reference_page
 from repository_links import MOVED, with_site_links
 
 from rigsight.effects import CATALOGUE
@@ -36,6 +36,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         "reference/index.md": [
             {"Overview": "reference/index.md"},
             *({f"rigsight.{name}": f"reference/{name}.md"} for name in PACKAGES),
+            {BENCH.name: f"reference/{BENCH.name}.md"},
         ],
     }
     config.nav = [_filled(entry, sections) for entry in config.nav or ()]
@@ -62,6 +63,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         NUMBERS: policy_page(),
     }
     pages |= {f"reference/{name}.md": reference_page(name) for name in PACKAGES}
+    pages[f"reference/{BENCH.name}.md"] = bench_page()
     for effect in CATALOGUE:
         pages[f"effects/{effect.name}.md"] = effect_page(effect)
         for end, picture in figures(effect).items():

@@ -2,7 +2,7 @@
 
     python experiments/adequacy/run.py --seed 2 --trials 80
 
-Each trial of the small blind bench (disturbed, noisy, one mass) gives two models: the hidden effects fitted from their true
+Each trial of the standard blind bench (disturbed, noisy, one mass) gives two models: the hidden effects fitted from their true
 numbers, and the re-identified equations without them. Writes results.md beside this file and docs/images/p_values.png.
 """
 
@@ -16,7 +16,6 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
-from rigsight.blind import draw_trial
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing
@@ -26,6 +25,7 @@ from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.errors import RigsightError
 from rigsight.identify import IdleThreads
+from rigsight_bench.trials import draw_trial
 
 HERE = Path(__file__).parent
 LARGE = 2.0
@@ -52,11 +52,11 @@ class Row:
 
 def row(seed: int, trial: int) -> Row | None:
     """Return what one trial gives; None for an effect from outside and for wrong parameters."""
-    drawn = draw_trial("small", seed, trial)
+    drawn = draw_trial("standard", seed, trial)
     if drawn.key["kind"] in ("outside", "parameters"):
         return None
-    rig, records = drawn.linear.rig, drawn.records
-    constants = {p.name: drawn.linear.values[p.name] for p in rig.constants}
+    rig, records = drawn.rig, drawn.records
+    constants = {p.name: drawn.values[p.name] for p in rig.constants}
     campaign = Campaign(str(trial), rig, constants, {}, tuple(records))
     noise = {floor.output: floor.std for floor in noise_floors(rig, records)}
     bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1))

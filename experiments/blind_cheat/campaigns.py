@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.blind import n_trials, subject_of
-from rigsight.workflow.bench.files import BenchFolder, trial_name
-from rigsight.workflow.bench.trial import make_trial
+from rigsight_bench.running.files import BenchFolder, trial_name
+from rigsight_bench.running.trial import make_trial
+from rigsight_bench.trials import n_trials
+from rigsight_bench.trials.standard.subjects import standard_subject_of
 
 SEED = 6
 FIRST = 100
@@ -58,14 +59,14 @@ class Campaign:
 
 def campaigns() -> list[Campaign]:
     bench = BenchFolder(FOLDER)
-    bench.settle("small", SEED)
+    bench.settle("standard", SEED)
     controls = ("none", "parameters")
     numbers = [
-        n for n in range(n_trials("small")) if n < FIRST or subject_of("small", SEED, n).kind in controls
+        n for n in range(n_trials("standard")) if n < FIRST or standard_subject_of(SEED, n).kind in controls
     ]
     found = []
     for number in numbers:
-        make_trial(bench, "small", SEED, number)
+        make_trial(bench, "standard", SEED, number)
         folder = bench.campaign(trial_name(number))
         text = (folder / "campaign.toml").read_text()
         key = bench.read_key(trial_name(number))

@@ -1,6 +1,6 @@
 """Check that the files of a diagnosis reveal the hidden effect only by the physics.
 
-Draws 108 trials of the small design (seed 6: the first 100 and all others without an effect), unless `out/blind-cheat` holds
+Draws 108 trials of the standard design (seed 6: the first 100 and all others without an effect), unless `out/blind-cheat` holds
 them, and looks at their campaigns as a cheat would, who knows the source of the draws but not the keys.
 
 Run with ``python experiments/blind_cheat/cheat.py [part ...]``; parts: same, tests, noise, rig, seed, random, cache, process.

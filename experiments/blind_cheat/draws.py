@@ -12,10 +12,16 @@ import numpy as np
 from campaigns import REST, SEED, Campaign
 from scipy.stats import chi2_contingency
 
-from rigsight.blind import draw, draw_trial, n_trials, subject_of
-from rigsight.blind.campaign import LinearRig, draw_rig
-from rigsight.blind.subjects import Subject, hidden_effects, needs_running_gear
 from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
+from rigsight_bench.trials import draw_trial, n_trials
+from rigsight_bench.trials.standard import trial
+from rigsight_bench.trials.standard.campaign import LinearRig, draw_rig
+from rigsight_bench.trials.standard.subjects import (
+    Subject,
+    hidden_effects,
+    needs_running_gear,
+    standard_subject_of,
+)
 
 SEEDS_OF_RIGS = range(10, 110)
 """Of the rigs that are drawn without being simulated."""
@@ -25,8 +31,8 @@ SEEDS_SEARCHED = range(100)
 def rig(_: list[Campaign]) -> None:
     """Print what the rig tells about what is hidden: the design says which effects need which rig."""
     hidden, rigs, numbers = [], [], []
-    for candidate in itertools.product(SEEDS_OF_RIGS, range(n_trials("small"))):
-        subject = subject_of("small", *candidate)
+    for candidate in itertools.product(SEEDS_OF_RIGS, range(n_trials("standard"))):
+        subject = standard_subject_of(*candidate)
         gear = any(needs_running_gear(effect) for effect in hidden_effects(subject))
         wide = "gravity_pendulum" in subject.effects
         drawn = draw_rig(stream(*candidate), RUNNING_GEAR if gear else None, wide)
@@ -105,7 +111,7 @@ def seed(trials: list[Campaign]) -> None:
     times = np.array([2.0, 4.0, 6.0])
     ways: list[tuple[Rig, bool]] = [(RUNNING_GEAR, False), (AXIS, False), (AXIS, True)]
     tried, inputs = [], []
-    for candidate in itertools.product(SEEDS_SEARCHED, range(n_trials("small"))):
+    for candidate in itertools.product(SEEDS_SEARCHED, range(n_trials("standard"))):
         for kind, wide in ways:
             rng = stream(*candidate)
             omega = draw_rig(rng, kind, wide).omega
@@ -116,11 +122,11 @@ def seed(trials: list[Campaign]) -> None:
     seconds = time.perf_counter() - start
     table = np.array(inputs)
     found = right = 0
-    for trial in trials:
-        seen = trial.cells(1)[np.round(times / 5e-3).astype(int), 1].astype(float)
+    for campaign in trials:
+        seen = campaign.cells(1)[np.round(times / 5e-3).astype(int), 1].astype(float)
         matches = {tried[i] for i in np.flatnonzero(np.max(np.abs(table - seen), axis=1) < 1e-8)}
         found += len(matches) == 1
-        right += matches == {(SEED, trial.number)}
+        right += matches == {(SEED, campaign.number)}
     print(
         f"\n{len(tried) // 3} seeds and numbers tried in {seconds:.0f} s: {found} of {len(trials)} campaigns found again, "
         f"{right} of them correctly"
@@ -131,14 +137,16 @@ def random(_: list[Campaign]) -> None:
     """Print whether a trial's random numbers depend on what is hidden."""
     drawn = []
     for effect in ("cubic_stiffness", "position_dependent_damping"):
-        with patch.object(draw, "subject_of", lambda *_, e=effect: Subject("single", (e,), "clear", "low")):
-            drawn.append(draw_trial("small", SEED, 0))
+        with patch.object(
+            trial, "standard_subject_of", lambda *_, e=effect: Subject("single", (e,), "clear", "low")
+        ):
+            drawn.append(draw_trial("standard", SEED, 0))
     alike = all(
         np.array_equal(a["u"], b["u"]) for a, b in zip(drawn[0].records, drawn[1].records, strict=True)
     )
-    output = drawn[0].linear.rig.outputs[0].name
+    output = drawn[0].rig.outputs[0].name
     quiet = [np.diff(one.records[3][output][:REST], 2) for one in drawn]
     print(
         f"\none trial with two different effects: inputs the same: {alike}, rigs the same: "
-        f"{drawn[0].linear.values == drawn[1].linear.values}, correlation of the noise {np.corrcoef(*quiet)[0, 1]:.4f}"
+        f"{drawn[0].values == drawn[1].values}, correlation of the noise {np.corrcoef(*quiet)[0, 1]:.4f}"
     )

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from campaigns import Campaign
 
-from rigsight.workflow.bench.files import BenchFolder, trial_name
-from rigsight.workflow.bench.trial import diagnose_trial
+from rigsight_bench.running.files import BenchFolder, trial_name
+from rigsight_bench.running.trial import diagnose_trial
 
 SPY = """
 import json, os, sys
@@ -28,12 +28,13 @@ json.dump({**seen, "parent": reached}, open("results/seen.json", "w"))
 DRAWS = """
 import os, pathlib, sys
 from unittest.mock import patch
-from rigsight.blind import draw, draw_trial
-from rigsight.blind.subjects import Subject
+from rigsight_bench.trials import draw_trial
+from rigsight_bench.trials.standard import trial
+from rigsight_bench.trials.standard.subjects import Subject
 cache = pathlib.Path(os.environ["RIGSIGHT_CACHE_DIR"])
 for effect in ("cubic_stiffness", "position_dependent_damping"):
-    with patch.object(draw, "subject_of", lambda *_: Subject("single", (effect,), "clear", "low")):
-        draw_trial("small", 6, 0)
+    with patch.object(trial, "standard_subject_of", lambda *_: Subject("single", (effect,), "clear", "low")):
+        draw_trial("standard", 6, 0)
     print(effect, len([file for file in cache.rglob("*") if file.is_file()]))
 """
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from table import FILE, read_table, write_table
 
-from rigsight.blind.scoring.training_trial import TrainingTrial, training_trial
+from rigsight_bench.scoring.training_trial import TrainingTrial, training_trial
 
 
 def main() -> None:

@@ -21,14 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from rigsight.blind.scoring.goals import is_clear
-from rigsight.blind.scoring.probability_scores import ALL, probability_scores, scores_of
-from rigsight.blind.scoring.score import FAILED, Outcome, outcome
-from rigsight.blind.scoring.shares import share_of as share_of_trials
-from rigsight.blind.scoring.training_trial import first_model, share_of, training_trial
 from rigsight.diagnose import Calibration
 from rigsight.diagnose.verdict.calibration import trained
 from rigsight.effects import AT
+from rigsight_bench.scoring.goals import is_clear
+from rigsight_bench.scoring.probability_scores import ALL, probability_scores, scores_of
+from rigsight_bench.scoring.score import FAILED, Outcome, outcome
+from rigsight_bench.scoring.shares import share_of as share_of_trials
+from rigsight_bench.scoring.training_trial import first_model, share_of, training_trial
 
 FOLDER = Path(__file__).parent / "judged"
 OF_KEY = (

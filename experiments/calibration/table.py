@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from rigsight.blind.scoring.training_trial import TrainingTrial
 from rigsight.diagnose import Situation
+from rigsight_bench.scoring.training_trial import TrainingTrial
 
 FILE = Path(__file__).parent / "trials.csv"
 _OF_SITUATION = (

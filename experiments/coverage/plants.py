@@ -6,16 +6,13 @@ each joint has one with a corner frequency of its own, which bends between the s
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.blind.any_rig_campaign import DT, DURATION, Run, draw_runs
-from rigsight.blind.any_rig_numbers import draw_numbers, draw_offsets
-from rigsight.blind.strength import draw_shape, sized
-from rigsight.blind.waveforms import Disturbance, low_pass_noise
 from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.diagnose.pushes.probes import push
 from rigsight.diagnose.uncertainty.replicates import with_forces
@@ -23,9 +20,21 @@ from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.typical_size import typical_size
-from rigsight.records import Record
+from rigsight.records import Hold, Kind, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
+from rigsight_bench.trials.any_rig_campaign import (
+    DURATION,
+    doublets,
+    draw_amplitudes,
+    in_proportion,
+    multisines,
+    sweeps,
+)
+from rigsight_bench.trials.any_rig_numbers import draw_numbers, draw_offsets
+from rigsight_bench.trials.runs import DT, Run
+from rigsight_bench.trials.strength import draw_shape, scaled, sized
+from rigsight_bench.trials.waveforms import Disturbance, low_pass_noise
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +48,11 @@ DISTURBED = (0.3, 3.0)
 CORNERS = (0.5, 50.0)
 """Angular frequency above which a force falls [rad/s]."""
 _ATTEMPTS = 8
+_RECORDS: tuple[tuple[Kind, float], ...] = (
+    ("sweep", 0.4), ("sweep", 1.0), ("step", 0.6), ("multisine", 0.8),
+    ("multisine", 0.7), ("sweep", 0.75), ("multisine", 0.65), ("step", 0.85),
+)  # fmt: skip
+"""Kind and share of the largest amplitude. Only the first four are measured; the others keep the later draws as they were."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +79,7 @@ def drawn(rig: Rig, effect: Effect, key: tuple[int, ...]) -> Drawn:
 
 def _drawn(rig: Rig, effect: Effect, rng: np.random.Generator) -> Drawn:
     values = draw_numbers(rig, rng)
-    runs = [run for run in draw_runs(rig, values, rng) if run.role == "estimation"]
+    runs = _drawn_runs(rig, values, rng)
     quiet = [simulate(compose(rig), values, run.record()) for run in runs]
     values |= draw_offsets(rig, quiet, values, rng)
     if "force_off" in values and rig.has_one_motion:
@@ -87,7 +101,8 @@ def _drawn(rig: Rig, effect: Effect, rng: np.random.Generator) -> Drawn:
         left = np.concatenate(fit.residuals) / [noise[s.name] for s in rig.outputs]
         return float(np.max(np.sqrt(np.mean(left**2, axis=0))))
 
-    own = sized(effect, draw_shape(effect, scales, rng), scales, gap, _between(GAP, rng))
+    at = functools.partial(scaled, effect, draw_shape(effect, scales, rng), scales=scales)
+    own = sized(effect.name, at, gap, _between(GAP, rng))
     values |= {structure.parameter_name(effect, name): value for name, value in own.values.items()}
     wanted = _between(DISTURBED, rng)
     records, floor, disturbed = _measured(rig, effect, values, runs, noise, scales, wanted, rng)
@@ -101,6 +116,19 @@ def _drawn(rig: Rig, effect: Effect, rng: np.random.Generator) -> Drawn:
         held=frozenset(),
     )
     return Drawn(bench, (effect,), values, own.gap, disturbed)
+
+
+def _drawn_runs(rig: Rig, values: dict[str, float], rng: np.random.Generator) -> list[Run]:
+    amplitudes, band = draw_amplitudes(rig, values, rng)
+    cannot_jump = any(c.prescribed_by in rig.mechanism.inputs for c in rig.mechanism.prescribed)
+    runs = []
+    for number, (wanted, share) in enumerate(_RECORDS, 1):
+        kind: Kind = "multisine" if wanted == "step" and cannot_jump else wanted
+        draw = {"sweep": sweeps, "multisine": multisines, "step": doublets}[kind]
+        waves = in_proportion(draw(amplitudes, band, rng), share)
+        hold: Hold = "zoh" if kind == "step" else "band_limited"
+        runs.append(Run(f"record_{number}", "estimation", kind, hold, waves, round(DURATION / DT)))
+    return runs[:4]
 
 
 def _measured(
@@ -122,7 +150,7 @@ def _measured(
     }
 
     def shown(index: int, size: float) -> dict[str, Floats]:
-        record = runs[index].record(dt=DT / FINER)
+        record = runs[index].record(finer=FINER)
         t = record.dt * np.arange(record.n_samples)
         forces = {}
         for joint in joints:

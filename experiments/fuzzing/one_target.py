@@ -13,7 +13,7 @@ import atheris
 _INSTRUMENTED = [
     "rigsight.records",
     "rigsight.parameters",
-    "rigsight.workflow.bench.external",
+    "rigsight_bench.running.external",
     "rigsight.workflow.campaign",
     "rigsight.workflow.inspect",
     "rigsight.workflow.own.effect_declaration",

@@ -24,12 +24,12 @@ from rigsight.records import read_record
 from rigsight.records.formats import channel_file
 from rigsight.records.formats.known import BY_SUFFIX, reader_of
 from rigsight.rigs import RIGS
-from rigsight.workflow.bench.external import ExternalBench
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.inspect import run_inspect
 from rigsight.workflow.own import own_effects, python_file
 from rigsight.workflow.run.results import json_text
+from rigsight_bench.running.external import ExternalBench
 
 Plain = Callable[[bytes, int], bytes]
 """libFuzzer's own mutation of bytes up to a size."""

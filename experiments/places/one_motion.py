@@ -2,7 +2,7 @@
 
     python experiments/places/one_motion.py --draws 50 --seed 3
 
-A draw is a trial of the small blind bench with one hidden effect. Writes one_motion.md beside this file.
+A draw is a trial of the standard blind bench with one hidden effect. Writes one_motion.md beside this file.
 """
 
 from __future__ import annotations
@@ -11,8 +11,6 @@ import argparse
 import time
 from pathlib import Path
 
-from rigsight.blind import draw_trial
-from rigsight.blind.subjects import subject_of
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing
@@ -21,8 +19,9 @@ from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import CATALOGUE
 from rigsight.identify import IdleThreads
+from rigsight_bench.trials import draw_trial
+from rigsight_bench.trials.standard.subjects import standard_subject_of
 
-DESIGN = "small"
 HEAD = """# On a rig with one motion: is the true effect looked at first?
 
 `one_motion.py --draws {draws} --seed {seed}`: {kept} of {all} true effects are among those that are looked at first, which are
@@ -35,9 +34,9 @@ HEAD = """# On a rig with one motion: is the true effect looked at first?
 
 def row(seed: int, number: int) -> tuple[int, int, bool, str]:
     """Return how many effects are looked at first, of how many, whether the true one is among them, and a row of the table."""
-    trial = draw_trial(DESIGN, seed, number)
-    rig = trial.linear.rig
-    constants = {p.name: trial.linear.values[p.name] for p in rig.constants}
+    trial = draw_trial("standard", seed, number)
+    rig = trial.rig
+    constants = {p.name: trial.values[p.name] for p in rig.constants}
     campaign = Campaign(str(number), rig, constants, trial.given, trial.records)
     noise = {floor.output: floor.std for floor in noise_floors(rig, campaign.records, campaign.drifts, True)}
     bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1))
@@ -59,7 +58,7 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=50)
     parser.add_argument("--seed", type=int, default=3)
     asked = parser.parse_args()
-    numbers = [n for n in range(asked.draws) if subject_of(DESIGN, asked.seed, n).kind == "single"]
+    numbers = [n for n in range(asked.draws) if standard_subject_of(asked.seed, n).kind == "single"]
     rows = []
     for number in numbers:
         rows.append(row(asked.seed, number))

@@ -1,4 +1,4 @@
-"""The diagnoses that are repeated: hysteresis by sliders, recovery on an axis, trials of the small blind bench."""
+"""The diagnoses that are repeated: hysteresis by sliders, recovery on an axis, trials of the standard blind bench."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigsight.blind import draw_trial
 from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
+from rigsight_bench.trials import draw_trial
 
 DT, NOISE = 0.01, 2e-5
 RIG = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
@@ -61,12 +61,12 @@ def cases(draws: int, trials: tuple[int, ...]) -> list[Case]:
     rivals = tuple(name for name, _ in _OTHERS)
     found += [_axis(name, name, own, 0, rivals) for name, own in _OTHERS]
     for number in trials:
-        trial = draw_trial("small", 9, number)
-        rig = trial.linear.rig
-        constants = {p.name: trial.linear.values[p.name] for p in rig.constants}
+        trial = draw_trial("standard", 9, number)
+        rig = trial.rig
+        constants = {p.name: trial.values[p.name] for p in rig.constants}
         campaign = Campaign(f"trial {number}", rig, constants, trial.given, trial.records)
         noise = min(float(value) for value in trial.key["noise_floor"].values())
-        found.append(Case(f"small 9, trial {number}", campaign, CATALOGUE, noise))
+        found.append(Case(f"standard 9, trial {number}", campaign, CATALOGUE, noise))
     return found
 
 

@@ -1,7 +1,7 @@
 """Effect of rounding on diagnoses: repetitions with data disturbed by 1e-9 of the noise, other compilers, one and two jobs.
 
 run.py                     all builds, table in results.md beside this file
-run.py --trials 3 17       with these trials of the small blind bench, seed 9 (some minutes each)
+run.py --trials 3 17       with these trials of the standard blind bench, seed 9 (some minutes each)
 """
 
 from __future__ import annotations
@@ -78,7 +78,9 @@ def main() -> None:
     )
     parser.add_argument("--seeds", type=int, default=3, help="disturbances")
     parser.add_argument("--draws", type=int, default=3, help="draws of noise of each case with sliders")
-    parser.add_argument("--trials", type=int, nargs="*", default=[], help="trials of the small bench, seed 9")
+    parser.add_argument(
+        "--trials", type=int, nargs="*", default=[], help="trials of the standard bench, seed 9"
+    )
     parser.add_argument("--part", nargs=3, help=argparse.SUPPRESS)
     asked = parser.parse_args()
     chosen = cases(asked.draws, tuple(asked.trials))

@@ -61,9 +61,8 @@ for name in rigsight.__all__:
     getattr(rigsight, name)
 for package in (rigsight.cli, rigsight.workflow):
     for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-        if module.name not in ("rigsight.cli.trial_process", "rigsight.workflow.blind", "rigsight.workflow.bench"):
-            importlib.import_module(module.name)
-found = [name for name in sys.modules if name.startswith(("sqlite3", "distributed", "dask", "rigsight.workflow.bench"))]
+        importlib.import_module(module.name)
+found = [name for name in sys.modules if name.startswith(("sqlite3", "distributed", "dask", "rigsight_bench.running"))]
 sys.exit(", ".join(found) or 0)
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

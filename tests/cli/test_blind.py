@@ -1,73 +1,39 @@
-"""What belongs together is asked for together; a score of parts is written where it is asked for."""
+"""Without the package of the bench, its command says how to get it, and every other command works."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+import subprocess
+import sys
 
 import pytest
 
-from rigsight.blind import Outcome
-from rigsight.workflow.bench.files import STORE_FILE
-from rigsight.workflow.bench.store import TrialStore
-
-Run = Callable[..., tuple[int, str, str]]
+WITHOUT = "import sys; sys.modules['rigsight_bench'] = None; from rigsight.cli import main; main()"
 
 
-@pytest.fixture
-def part(tmp_path: Path, outcome_like: Callable[..., Outcome]) -> Path:
-    folder = tmp_path / "part"
-    folder.mkdir()
-    with TrialStore(folder / STORE_FILE) as store:
-        store.add([outcome_like()])
-    return folder
+def rigsight(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", WITHOUT, *arguments], capture_output=True, text=True, check=False
+    )
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--campaigns", "a"], ["--keys is missing"]),
-        (["--keys", "a"], ["--campaigns is missing"]),
-        (["--merge", "a", "--rescore"], ["--merge and --rescore", "cannot be combined"]),
-        (["--merge", "a", "--campaigns", "b", "--keys", "c"], ["--merge and --campaigns"]),
-        (["--rescore", "--trial", "3"], ["--rescore runs no trial"]),
-        (["--campaigns", "a", "--keys", "b", "--seed", "0"], ["--campaigns draws no rigs, so --seed"]),
-        (
-            ["--campaigns", "a", "--keys", "b", "--trials", "3", "--design", "small"],
-            ["so --trials and --design would"],
-        ),
-        (["--rescore", "--design", "small"], ["--rescore draws no rigs, so --design"]),
-        (["--merge", "a", "--trials", "3"], ["--merge draws no rigs, so --trials"]),
-        (["--trial", "three"], ["--trial must be a number", "'three'", "--campaigns"]),
-        (["--trial", "9999", "--design", "small"], ["numbered from 0", "9999"]),
-        (["--trial", "60", "--design", "laboratory"], ["numbered from 0 to 59", "60"]),
-        (["--campaigns", "gone", "--keys", "gone"], ["not a folder", "--campaigns"]),
-        (["--rescore"], ["does not contain a blind bench", "--out"]),
-        (["--merge", "gone"], ["no scored trials", "--rescore"]),
-    ],
+    "arguments", [(), ("--design", "laboratory", "--trials", "3"), ("--merge", "a", "b")]
 )
-def test_options_that_cannot_be_meant_are_refused(
-    run: Run, tmp_path: Path, options: list[str], words: list[str]
-) -> None:
-    code, out, err = run("blind", "--out", tmp_path / "out", *options)
-    assert (code, out) == (2, "")
-    for word in words:
-        assert word in err
-    assert not (tmp_path / "out").exists()
+def test_a_bench_that_is_not_installed_says_how_it_is(arguments: tuple[str, ...]) -> None:
+    ran = rigsight("blind", *arguments)
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert "pip install ./bench" in ran.stderr
+    assert len(ran.stderr.splitlines()) == 1
 
 
-def test_parts_are_merged_into_json_page_and_text(run: Run, tmp_path: Path, part: Path) -> None:
-    text = tmp_path / "docs" / "blind.md"
-    code, out, _ = run("blind", "--merge", part, "--out", tmp_path / "all", "--markdown", text)
-    assert code == 0
-    assert "1 of design small, seed 1" in out
-    assert sorted(file.name for file in (tmp_path / "all").iterdir()) == ["blind.html", "blind.json"]
-    assert f"`rigsight blind --merge {part}" in text.read_text()
-    assert str(text) in out
+@pytest.mark.parametrize("arguments", [("--help",), ("blind", "--help")])
+def test_help_lists_the_command_all_the_same(arguments: tuple[str, ...]) -> None:
+    ran = rigsight(*arguments)
+    assert ran.returncode == 0
+    assert "blind" in ran.stdout
 
 
-def test_a_text_that_cannot_be_written_is_told_before_any_work(run: Run, tmp_path: Path, part: Path) -> None:
-    code, _, err = run("blind", "--merge", part, "--out", tmp_path / "all", "--markdown", tmp_path)
-    assert code == 2
-    assert "is a folder" in err
-    assert not (tmp_path / "all").exists()
+def test_other_commands_do_without_the_bench() -> None:
+    ran = rigsight("rigs", "--json")
+    assert ran.returncode == 0, ran.stderr
+    assert "running_gear" in ran.stdout

@@ -35,14 +35,14 @@ WORK = {
     "simulate": "rigsight.workflow.simulate.run_simulate",
     "export": "rigsight.workflow.export.run_export",
     "vary": "rigsight.workflow.vary.run_vary",
-    "blind": "rigsight.workflow.blind.run_blind",
+    "blind": "rigsight_bench.benches.run_blind",
 }
 """The function that a command calls; what it makes of its arguments is asked of it in its own tests."""
 ELSEWHERE = {
     "--mjcf": "rigsight.workflow.init.run_init_from_mjcf",
-    "--campaigns": "rigsight.workflow.blind.run_external",
-    "--merge": "rigsight.workflow.bench.score_files.merge",
-    "--rescore": "rigsight.workflow.blind.rescore",
+    "--campaigns": "rigsight_bench.benches.run_external",
+    "--merge": "rigsight_bench.running.score_files.merge",
+    "--rescore": "rigsight_bench.benches.rescore",
 }
 ARGUMENTS: dict[str, list[str]] = {
     "inspect": ["a.csv"],
@@ -87,7 +87,7 @@ GIVEN: dict[str, list[str]] = {
     "--output": ["x"],
     "--trials": ["3"],
     "--trial": ["0"],
-    "--design": ["small"],
+    "--design": ["laboratory"],
     "--campaigns": ["a", "--keys", "b"],
     "--keys": ["b", "--campaigns", "a"],
     "--merge": ["a"],

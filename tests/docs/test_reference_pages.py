@@ -23,6 +23,13 @@ def test_every_room_but_the_command_line_has_a_page(hook: Callable[[str], Module
     assert set(hook("reference_pages").PACKAGES) == rooms - {"cli"}
 
 
+def test_the_bench_has_a_page(hook: Callable[[str], ModuleType]) -> None:
+    reference = hook("reference_pages")
+    entries = re.findall(r"^::: (\S+)$", reference.bench_page(), re.MULTILINE)
+    assert {"rigsight_bench.benches", "rigsight_bench.scoring.score.Outcome"} <= set(entries)
+    assert all(pkgutil.resolve_name(entry) is not None for entry in entries)
+
+
 def test_no_public_name_is_missed(hook: Callable[[str], ModuleType]) -> None:
     reference = hook("reference_pages")
     for name in reference.PACKAGES:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.blind.scoring.training_trial import training_trial
 from rigsight.diagnose.verdict.calibration import trained
+from rigsight_bench.scoring.training_trial import training_trial
 
 STUDY = Path(__file__).parents[2] / "experiments/calibration"
 MODULES = ("fit", "judged", "table")

@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+OURS = ("rigsight", "rigsight_bench")
 FILES = sorted(path for folder in ("experiments", "benchmarks") for path in (ROOT / folder).rglob("*.py"))
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_what_a_study_imports_is_there(path: Path) -> None:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "rigsight":
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in OURS:
             module = importlib.import_module(str(node.module))
             for name in (alias.name for alias in node.names):
                 assert hasattr(module, name) or importlib.import_module(f"{node.module}.{name}")
@@ -31,7 +32,7 @@ def test_a_module_that_a_study_names_in_a_text_is_there(path: Path) -> None:
     for node in ast.walk(tree):
         if not isinstance(node, ast.Constant) or not isinstance(node.value, str):
             continue
-        if not re.fullmatch(r"rigsight(\.\w+)*\.?\w*", node.value):
+        if not re.fullmatch(r"rigsight(_bench)?(\.\w+)*\.?\w*", node.value):
             continue
         if id(node) in parts:
             # The beginning of a name: the package is there, and something in it is called like this.

@@ -15,8 +15,6 @@ from hypothesis import strategies as st
 
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
-from rigsight.workflow.bench.external import KeyTable
-from rigsight.workflow.bench.files import read_json
 from rigsight.workflow.campaign.campaign_file import (
     CampaignTable,
     FileTable,
@@ -30,6 +28,8 @@ from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.own_effects import own_effects
 from rigsight.workflow.run.json_file import json_object
+from rigsight_bench.running.external import KeyTable
+from rigsight_bench.running.files import read_json
 
 drawn = settings(
     derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.blind import blind
+from rigsight.cli.blind import REFUSES, blind_command, not_installed
 from rigsight.cli.compare import compare
 from rigsight.cli.demo import demo
 from rigsight.cli.diagnose import diagnose
@@ -35,7 +35,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "simulate": simulate,
     "export": export,
     "vary": vary,
-    "blind": blind,
+    "blind": blind_command(),
     "effects": list_effects,
     "rigs": list_rigs,
 }
@@ -78,4 +78,4 @@ def rigsight(
 
 
 for _name, _command in COMMANDS.items():
-    app.command(_name)(_command)
+    app.command(_name, context_settings=REFUSES if _command is not_installed else None)(_command)

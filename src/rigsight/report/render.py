@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from importlib.resources import files
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from rigsight.diagnose.location.trace import STAGES
@@ -126,10 +126,16 @@ def _content_hash(script: str) -> str:
     return f"sha256-{base64.b64encode(hashlib.sha256(script.encode('utf-8')).digest()).decode('ascii')}"
 
 
-def environment() -> Environment:
-    """Return what all pages are rendered with."""
+def environment(*packages: str) -> Environment:
+    """Return what all pages are rendered with.
+
+    Parameters
+    ----------
+    packages
+        Whose templates there are beside those of reports.
+    """
     made = Environment(
-        loader=PackageLoader("rigsight.report"),
+        loader=ChoiceLoader([PackageLoader(name) for name in ("rigsight.report", *packages)]),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,

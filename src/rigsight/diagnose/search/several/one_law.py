@@ -2,7 +2,7 @@
 
 Two effects of the spring, two damping effects, two linear effects between drive and motion: their sum resembles many laws outside
 the catalogue. Of 14 such pairs named on blind rigs, ten imitated a cause outside the catalogue, and two imitated a single effect
-whose own fit had stopped too early (seeds 3 to 8, `experiments/blind_small`).
+whose own fit had stopped too early (seeds 3 to 8, `experiments/blind_standard`).
 """
 
 from __future__ import annotations

@@ -1,1 +1,0 @@
-"""Scores of trials whose truth is known, single and summarized."""
