@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import importlib.metadata
 import json
 import os
 import pickle
 import signal
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,9 +19,11 @@ import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
+import rigsight
 from rigsight.blind import Outcome, ParameterError, Trial, WithheldError, draw_trial
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
+from rigsight.libraries.library_cache import processor
 from rigsight.records import Record
 from rigsight.rigs import AXIS, Rig, read_rig_file
 from rigsight.simulate import compose, simulate
@@ -39,6 +44,7 @@ for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIG
 if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
+Kept = Callable[[str, Callable[[], Any]], Any]
 SHARED_DATA = Path(__file__).parents[1] / "../shared/data"
 
 
@@ -161,27 +167,52 @@ def write_model(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, int], Trial]:
-    """Return a trial of the small bench by seed and number, drawn once for all processes that test: it takes ten seconds."""
-    own = tmp_path_factory.getbasetemp()
-    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+def kept(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Kept:
+    """Return what takes long to make: from disk, if all that it depends on is the same as when it was made.
 
-    def draw(seed: int, number: int) -> Trial:
-        file = shared / f"trial-{seed}-{number}"
-        with file.with_suffix(".lock").open("w") as lock:
-            # Where files cannot be locked, two processes may draw the same; the later one replaces what is alike.
+    What is kept lies below `.pytest_cache`, under a hash of the sources of rigsight and of the tests, and is made once for all
+    processes that test.
+    """
+    state = sources_hash()
+    cache = getattr(request.config, "cache", None)
+    folder = tmp_path_factory.getbasetemp() if cache is None else Path(cache.mkdir("rigsight"))
+
+    def get(name: str, make: Callable[[], Any]) -> Any:
+        file = folder / f"{name}.{state}"
+        with (folder / f"{name}.lock").open("w") as lock:
+            # Where files cannot be locked, two processes may make the same; the later one replaces what is alike.
             with contextlib.suppress(ImportError):
                 import fcntl
 
                 fcntl.flock(lock, fcntl.LOCK_EX)
             if not file.exists():
-                part = file.with_suffix(f".{os.getpid()}")
-                part.write_bytes(pickle.dumps(draw_trial("small", seed, number)))
+                for earlier in folder.glob(f"{name}.*"):
+                    if earlier.suffix != ".lock":
+                        earlier.unlink(missing_ok=True)
+                part = folder / f"{name}.{os.getpid()}"
+                part.write_bytes(pickle.dumps(make()))
                 part.replace(file)
-        trial: Trial = pickle.loads(file.read_bytes())
-        return trial
+        return pickle.loads(file.read_bytes())
 
-    return draw
+    return get
+
+
+def sources_hash() -> str:
+    """Return a hash of what a result depends on: sources of rigsight and of the tests, packages, processor, this Python."""
+    found = hashlib.sha256(sys.version.encode() + processor().encode())
+    for package in ("control", "numpy", "scikit-learn", "scipy", "sympy"):
+        found.update(importlib.metadata.version(package).encode())
+    for root in (Path(rigsight.__file__).parent, Path(__file__).parent):
+        for path in sorted(root.rglob("*")):
+            if path.is_file() and "__pycache__" not in path.parts:
+                found.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
+    return found.hexdigest()[:32]
+
+
+@pytest.fixture(scope="session")
+def drawn(kept: Kept) -> Callable[[int, int], Trial]:
+    """Return a trial of the small bench by seed and number; to draw one takes ten seconds."""
+    return lambda seed, number: kept(f"trial-{seed}-{number}", lambda: draw_trial("small", seed, number))
 
 
 @pytest.fixture

@@ -28,6 +28,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.release
 def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built: Path) -> None:
     (wheel,) = built.glob("*.whl")
     held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
@@ -41,6 +42,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built: Path)
     assert wheel.stat().st_size < 2e6
 
 
+@pytest.mark.release
 def test_the_source_distribution_holds_what_it_is_built_and_tested_from(built: Path) -> None:
     (archive,) = built.glob("*.tar.gz")
     with tarfile.open(archive) as opened:
@@ -51,6 +53,7 @@ def test_the_source_distribution_holds_what_it_is_built_and_tested_from(built: P
     }  # fmt: skip
 
 
+@pytest.mark.release
 def test_the_wheel_runs_outside_of_the_repository(built: Path, tmp_path: Path) -> None:
     (wheel,) = built.glob("*.whl")
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
