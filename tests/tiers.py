@@ -14,4 +14,9 @@ def slow_but(*kept: object, of: Iterable[Any]) -> list[Any]:
     missing = [value for value in kept if value not in every]
     if missing:
         raise ValueError(f"Kept, but not among the parameters: {missing}")
-    return [value if value in kept else pytest.param(value, marks=pytest.mark.slow) for value in every]
+    return [
+        value
+        if value in kept
+        else pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.slow)
+        for value in every
+    ]

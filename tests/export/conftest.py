@@ -282,7 +282,8 @@ def is_refused(case: Case, target: str) -> bool:
 
 EACH_FORM = (
     "bouc_wen_hysteresis", "iwan_hysteresis", "stribeck_friction", "presliding_friction", "maxwell_branch", "free_play",
-    "end_stop", "backlash", "asymmetric_stiffness", "flexible_mode", "torque_ripple", "speed_limit", "input_saturation", "sensor_delay",
+    "end_stop", "backlash", "asymmetric_stiffness", "flexible_mode", "torque_ripple", "speed_limit",
+    "input_saturation", "sensor_delay",
     "linear axis", "axis without a spring", "offsets", "start under load", "start held by friction", "all delays",
     "jumps into kinks", "element with sliders", "friction at two joints", "one effect twice", "a saturated control law",
     "a mass matrix of coordinates", "a prescribed road",

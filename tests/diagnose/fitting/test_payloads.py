@@ -87,8 +87,11 @@ def diagnosed(effect: str, own: Mapping[str, float], payloads: tuple[float, ...]
 
 @pytest.mark.parametrize(
     ("effect", "own", "payloads"),
-    [(*LOADED, (1.0, 4.0, 10.0)), (*EVEN, (1.0, 4.0, 10.0)), (*EVEN, (4.0, 4.0))],
-    ids=["grows with the load", "does not", "does not, one payload"],
+    [
+        pytest.param(*LOADED, (1.0, 4.0, 10.0), id="grows with the load"),
+        pytest.param(*EVEN, (1.0, 4.0, 10.0), id="does not", marks=pytest.mark.slow),
+        pytest.param(*EVEN, (4.0, 4.0), id="does not, one payload", marks=pytest.mark.slow),
+    ],
 )
 def test_friction_that_grows_with_the_load_is_named_where_it_does(
     effect: str, own: Mapping[str, float], payloads: tuple[float, ...]

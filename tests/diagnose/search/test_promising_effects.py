@@ -20,6 +20,8 @@ from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
 
+from ...tiers import slow_but
+
 DT, N, NOISE = 5e-3, 2000, 2e-5
 VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
 HIDDEN: list[tuple[str, Mapping[str, float]]] = [
@@ -97,7 +99,11 @@ def test_the_others_follow_where_none_explains_the_records() -> None:
 
 
 @pytest.mark.parametrize(
-    ("at_once", "values"), [("input_dead_zone", {"u_0": 0.4}), ("input_saturation", {"u_max": 2.2})]
+    ("at_once", "values"),
+    slow_but(
+        ("input_dead_zone", {"u_0": 0.4}),
+        of=[("input_dead_zone", {"u_0": 0.4}), ("input_saturation", {"u_max": 2.2})],
+    ),
 )
 def test_a_lag_beside_a_limited_drive_is_no_other_form_of_it(
     at_once: str, values: Mapping[str, float]
