@@ -76,7 +76,8 @@ def test_its_numbers_come_back(name: str) -> None:
         assert best.parameters[number].value == pytest.approx(truth[number], rel=0.02), number
 
 
-@pytest.mark.parametrize("draw", slow_but(4, of=[4, 5, 6]))
+@pytest.mark.slow
+@pytest.mark.parametrize("draw", [4, 5, 6])
 def test_no_draw_of_noise_leads_to_a_wrong_minimum(draw: int) -> None:
     """Another one, with sliders that reach sixty times as far, leaves eight times the noise."""
     best = diagnose(recorded(NEARLY_ALL_MEMORY, draw, disturbance=1), [IWAN]).candidates[0]
@@ -85,9 +86,8 @@ def test_no_draw_of_noise_leads_to_a_wrong_minimum(draw: int) -> None:
         assert best.parameters[name].value == pytest.approx(NEARLY_ALL_MEMORY[name], rel=0.02), name
 
 
-@pytest.mark.parametrize(
-    "case", slow_but("nearly all memory", of=["nearly all memory", "sliders of any size"])
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["nearly all memory", "sliders of any size"])
 def test_rounding_moves_no_number(case: str) -> None:
     """A disturbance of 1e-9 of the noise stands for another processor; no number moves by a hundredth of its standard error."""
     found = diagnose(recorded(TRUTHS[case], disturbance=1), [IWAN]).candidates[0].parameters

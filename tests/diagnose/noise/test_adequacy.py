@@ -65,7 +65,8 @@ def asked(context: FitContext, model: Scored) -> Adequacy:
     return adequacy(context, model, np.random.default_rng(1))
 
 
-@pytest.mark.parametrize("disturbance", slow_but(0.5, of=[0.0, 0.05, 0.5]))
+@pytest.mark.slow
+@pytest.mark.parametrize("disturbance", [0.0, 0.05, 0.5])
 def test_p_values_of_noise_and_disturbance_are_uniform(disturbance: float) -> None:
     """A disturbing force of 0.5 leaves 80 times the noise, most of it at the resonance."""
     benches = [axis_bench(seed=seed, disturbance=disturbance) for seed in range(16)]

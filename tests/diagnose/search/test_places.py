@@ -58,7 +58,7 @@ def test_effect_and_place_are_named(train: Any) -> None:
 
 
 def test_a_record_may_lack_a_sensor(train: Any) -> None:
-    records = train.records()
+    records = replace(train, n_samples=300).records()
     partial = replace(records[1], signals={n: s for n, s in records[1].signals.items() if n != "motor_angle"})
     found = diagnose(
         Campaign("train", TRAIN, {"k_t": 0.05}, {}, (records[0], partial, records[2])), EFFECTS[:1]
@@ -69,7 +69,7 @@ def test_a_record_may_lack_a_sensor(train: Any) -> None:
 
 def test_a_sensor_may_stand_still_in_the_validation_record(train: Any) -> None:
     """Relative to a motion of nothing no error has a size."""
-    records = train.records()
+    records = replace(train, n_samples=300).records()
     still = records[2].with_signals(load_angle=np.zeros(records[2].n_samples))
     found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, (*records[:2], still)), EFFECTS[:1])
     assert found.gap["load_angle"].noise_floor == np.inf
