@@ -38,7 +38,8 @@ demo: $(RUNNABLE) $(COMPILER)  ## run the whole chain on the built-in virtual ri
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 test: $(DEVELOPMENT)  ## run the tests that every change must pass; six minutes
-	@$(PYTEST) -m "not slow and not release"
+	@# Kernels compile in two thirds of the time; test-all takes the options that users have.
+	@RIGSIGHT_CFLAGS=-O1 $(PYTEST) -m "not slow and not release"
 
 test-all: $(DEVELOPMENT)  ## run all tests, with long studies, notebooks, wheel and browser
 	@$(PYTEST)
