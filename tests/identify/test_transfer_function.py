@@ -74,6 +74,7 @@ def test_a_known_system_comes_back_within_its_errors(truth: dict[str, float], wi
         assert fit.misfit == pytest.approx(1.0, abs=4.0 / np.sqrt(4.0 * OMEGA.size))
 
 
+@pytest.mark.slow
 def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
     truth = {**YAW, "dead_time": 0.02}
     found = np.array(
