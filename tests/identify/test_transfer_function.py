@@ -100,6 +100,7 @@ def test_maximum_likelihood_beats_uniform_weights_where_noise_differs() -> None:
     assert np.std(errors["variance"]) < 0.3 * np.std(errors["uniform"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [local_polynomial_response, local_rational_response])
 def test_errors_from_a_local_model_are_the_scatter_of_repeated_records(method) -> None:  # type: ignore[no-untyped-def]
     """Its lines overlap: counted as independent they would promise errors two to three times too small."""
@@ -160,6 +161,7 @@ def test_the_fit_is_a_python_control_transfer_function() -> None:
         fit.to_control(pade_order=0)
 
 
+@pytest.mark.slow
 def test_the_error_band_is_the_scatter_of_the_fitted_response() -> None:
     omega = np.array([1.0, 11.0, 13.0, 40.0])
     fits = [fit_frequency_response(measured(YAW, seed=i), "pt2") for i in range(60)]
