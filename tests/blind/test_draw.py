@@ -31,6 +31,7 @@ def nothing(drawn: Callable[[int, int], Trial]) -> Trial:
     return drawn(SEED, first_trial(lambda s: s.kind == "none"))
 
 
+@pytest.mark.slow
 def test_a_trial_drawn_twice_is_the_same(nothing: Trial) -> None:
     again = draw_trial("small", SEED, nothing.key["trial"])
     assert again.key == nothing.key
@@ -60,6 +61,7 @@ def test_the_given_simulation_fits_the_one_sweep_it_was_identified_from_and_no_o
     assert min(errors) < 0.3 * max(errors)
 
 
+@pytest.mark.slow
 def test_without_an_effect_nothing_but_noise_is_left(nothing: Trial) -> None:
     assert nothing.key["gap"] == pytest.approx(1.0, abs=0.05)
     for name in ("J_z", "k_c", "k_d", "m", "d", "k"):
@@ -78,6 +80,7 @@ def test_wrong_parameters_are_off_by_what_a_data_sheet_is(cubic: Trial) -> None:
     assert all(0.049 < error < 0.201 for error in off)
 
 
+@pytest.mark.slow
 def test_records_look_alike_whatever_is_hidden(cubic: Trial, nothing: Trial) -> None:
     for one, two in zip(cubic.records, nothing.records, strict=True):
         assert (one.name, one.role, one.kind, one.hold, one.n_samples, one.dt) == (
