@@ -41,6 +41,7 @@ def test_a_trial_drawn_twice_is_the_same(nothing: Trial) -> None:
         assert all(np.array_equal(one[name], other[name]) for name in one.signals)
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_leaves_a_gap_of_about_the_wished_size(cubic: Trial) -> None:
     low, high = TIERS["clear"]
     assert low / 2.0 < cubic.key["gap"] < high * 1.5
@@ -48,6 +49,7 @@ def test_a_hidden_effect_leaves_a_gap_of_about_the_wished_size(cubic: Trial) -> 
     assert cubic.key["values"]["k_3"] != 0.0
 
 
+@pytest.mark.slow
 def test_the_given_simulation_fits_the_one_sweep_it_was_identified_from_and_no_other_as_well(
     cubic: Trial,
 ) -> None:
@@ -61,7 +63,6 @@ def test_the_given_simulation_fits_the_one_sweep_it_was_identified_from_and_no_o
     assert min(errors) < 0.3 * max(errors)
 
 
-@pytest.mark.slow
 def test_without_an_effect_nothing_but_noise_is_left(nothing: Trial) -> None:
     assert nothing.key["gap"] == pytest.approx(1.0, abs=0.05)
     for name in ("J_z", "k_c", "k_d", "m", "d", "k"):
@@ -69,6 +70,7 @@ def test_without_an_effect_nothing_but_noise_is_left(nothing: Trial) -> None:
             assert nothing.given[name] == pytest.approx(nothing.key["values"][name], rel=0.01)
 
 
+@pytest.mark.slow
 def test_wrong_parameters_are_off_by_what_a_data_sheet_is(cubic: Trial) -> None:
     trial = draw_trial("small", SEED, first_trial(lambda s: s.kind == "parameters"))
     assert trial.key["gap"] == pytest.approx(1.0, abs=0.05)
