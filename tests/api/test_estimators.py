@@ -112,6 +112,9 @@ def test_a_folder_gives_what_the_commands_give(axis_campaign: Path) -> None:
     same = run_identify(axis_campaign, method="h1", n_jobs=1)
     assert identification_json(identified, {}) == identification_json(same, {})
 
+
+@pytest.mark.slow
+def test_a_discovery_of_a_folder_is_that_of_the_command(axis_campaign: Path) -> None:
     discovered = rs.EquationDiscoverer("full", seed=3, n_jobs=1).fit(str(axis_campaign)).discovery_
     assert discovered.to_json() == run_discover(axis_campaign, method="full", seed=3, n_jobs=1).to_json()
 

@@ -69,6 +69,7 @@ def test_law_and_place_of_a_missing_force_are_found(
     assert first.parameters["J_l"] == pytest.approx(TRAIN["J_l"], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_joint_that_cannot_explain_all_sensors_contradicts_them(drive_train: Rig) -> None:
     values = {**TRAIN, "c_2": 1e-4}
     records, noise = measured(drive_train, "quadratic_damping@motor_bearing", values, (0.8, 1.5))

@@ -57,6 +57,7 @@ def test_effect_and_place_are_named(train: Any) -> None:
     assert abs(c_2.value - 2e-4) < 5.0 * c_2.std
 
 
+@pytest.mark.slow
 def test_a_record_may_lack_a_sensor(train: Any) -> None:
     records = replace(train, n_samples=300).records()
     partial = replace(records[1], signals={n: s for n, s in records[1].signals.items() if n != "motor_angle"})
@@ -67,6 +68,7 @@ def test_a_record_may_lack_a_sensor(train: Any) -> None:
     assert np.isfinite(found.gap["motor_angle"].after)
 
 
+@pytest.mark.slow
 def test_a_sensor_may_stand_still_in_the_validation_record(train: Any) -> None:
     """Relative to a motion of nothing no error has a size."""
     records = replace(train, n_samples=300).records()

@@ -92,6 +92,7 @@ def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:
     assert all(suspect.share < 0.1 for suspect in lineup.suspects(at_the_drive))
 
 
+@pytest.mark.slow
 def test_the_others_follow_where_none_explains_the_records() -> None:
     tried = ("quadratic_damping", "input_saturation", "sensor_lag", "free_play", "coulomb_friction")
     found = diagnosed(["cubic_stiffness"], {"k_3": 5e6}, tried)

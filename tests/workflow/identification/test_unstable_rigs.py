@@ -78,6 +78,7 @@ def test_a_negative_stiffness_comes_back(tmp_path: Path, truth: dict[str, float]
     assert found.joint.scores[-1].nrmse["x"] < 0.01
 
 
+@pytest.mark.slow
 def test_no_sign_is_to_be_changed_where_the_stiffness_is_negative() -> None:
     signals = in_a_loop(2.0, 5.0, -30.0, 0)
     turned = {"u": signals["u"], "psi": signals["x"]}
