@@ -99,6 +99,7 @@ def test_the_hidden_spring_is_found_and_predicts_down_to_the_noise(
     assert left["LinearIdentifier"] > 100.0 * 2e-5
 
 
+@pytest.mark.slow
 def test_a_folder_gives_what_the_commands_give(axis_campaign: Path) -> None:
     few = ["cubic_stiffness"]
     for file in axis_campaign.glob("*.csv"):

@@ -297,6 +297,17 @@ def case(request: pytest.FixtureRequest) -> Case:
     return made_case(request.param)
 
 
+@pytest.fixture(
+    params=slow_but(
+        "flexible_mode", "end_stop", "maxwell_branch", "linear axis", "a saturated control law", "a mass matrix of coordinates",
+        of=WRITTEN,
+    )
+)  # fmt: skip
+def solved_case(request: pytest.FixtureRequest) -> Case:
+    """Each of the models in turn, for a target whose solver takes a second or more for each."""
+    return made_case(request.param)
+
+
 @pytest.fixture(scope="session")
 def case_named() -> Callable[[str], Case]:
     """One model by its name."""

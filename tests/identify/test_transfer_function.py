@@ -86,6 +86,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
     assert np.all(np.abs(np.std(found, axis=0, ddof=1) - 1.0) < 3.0 / np.sqrt(198.0))
 
 
+@pytest.mark.slow
 def test_maximum_likelihood_beats_uniform_weights_where_noise_differs() -> None:
     std = np.where(OMEGA < 10.0, 1e-5, 5e-4)
     exact = measured(YAW, 0.0).values

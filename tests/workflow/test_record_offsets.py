@@ -142,6 +142,7 @@ def test_records_without_such_offsets_are_left_in_peace(effects: Any) -> None:
     assert "coulomb_friction" in found.effects or not effects
 
 
+@pytest.mark.slow
 def test_levels_farther_apart_than_the_motion_are_told() -> None:
     (finding,) = told(diagnosed(campaign(factor=1e3), ["coulomb_friction"]))
     assert finding.serious
@@ -173,6 +174,7 @@ def test_discovery_finds_the_friction_beside_them() -> None:
     assert found.model["effects"] == ["coulomb_friction"]
 
 
+@pytest.mark.slow
 def test_two_sensors_have_an_offset_each() -> None:
     rig: Rig = RIGS["drive_train"]
     rng, t = np.random.default_rng(1), DT * np.arange(1200)

@@ -45,6 +45,7 @@ def test_the_place_comes_first(train: Any, name: str, place: str, values: dict[s
     assert len(search.effects) + len(search.others) == len(effects)
 
 
+@pytest.mark.slow
 def test_effect_and_place_are_named(train: Any) -> None:
     records = train.records([placed(effect_named("quadratic_damping"), "load_bearing")], {"c_2": 2e-4})
     found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, records), EFFECTS[:2])

@@ -150,12 +150,7 @@ CASES = [
 ]  # fmt: skip
 
 
-ONE_OF_EACH_PLACE = {
-    "presliding_friction on axis",
-    "speed_limit on axis",
-    "power_law_stiffness on axis",
-    "inertia on element",
-}
+ONE_OF_EACH_PLACE = {"speed_limit on axis", "power_law_stiffness on axis", "inertia on element"}
 
 
 @pytest.mark.parametrize(
