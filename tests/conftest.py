@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import importlib.metadata
 import json
 import os
+import pickle
 import signal
 import sys
 from collections.abc import Callable
@@ -15,9 +19,11 @@ import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
+import rigsight
 from rigsight import cli
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
+from rigsight.libraries.library_cache import processor
 from rigsight.records import Record
 from rigsight.rigs import AXIS, Rig, read_rig_file
 from rigsight.simulate import compose, simulate
@@ -39,7 +45,9 @@ if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 Run = Callable[..., tuple[int, str, str]]
-SHARED_DATA = Path(__file__).parents[1] / "../shared/data"
+Kept = Callable[[str, Callable[[], Any]], Any]
+TESTS = Path(__file__).parent
+SHARED_DATA = TESTS.parent / "../shared/data"
 
 
 @pytest.fixture(scope="session")
@@ -158,6 +166,49 @@ def write_model(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture(scope="session")
+def kept(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Kept:
+    """Return what takes long to make: from disk, if all that it depends on is the same as when it was made.
+
+    What is kept lies below `.pytest_cache`, under a hash of the sources of rigsight and of the tests, and is made once for all
+    processes that test.
+    """
+    state = sources_hash()
+    cache = getattr(request.config, "cache", None)
+    folder = tmp_path_factory.getbasetemp() if cache is None else Path(cache.mkdir("rigsight"))
+
+    def get(name: str, make: Callable[[], Any]) -> Any:
+        file = folder / f"{name}.{state}"
+        with (folder / f"{name}.lock").open("w") as lock:
+            # Where files cannot be locked, two processes may make the same; the later one replaces what is alike.
+            with contextlib.suppress(ImportError):
+                import fcntl
+
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            if not file.exists():
+                for earlier in folder.glob(f"{name}.*"):
+                    if earlier.suffix != ".lock":
+                        earlier.unlink(missing_ok=True)
+                part = folder / f"{name}.{os.getpid()}"
+                part.write_bytes(pickle.dumps(make()))
+                part.replace(file)
+        return pickle.loads(file.read_bytes())
+
+    return get
+
+
+def sources_hash() -> str:
+    """Return a hash of what a result depends on: sources of rigsight and of the tests, packages, processor, this Python."""
+    found = hashlib.sha256(sys.version.encode() + processor().encode())
+    for package in ("control", "numpy", "scikit-learn", "scipy", "sympy"):
+        found.update(importlib.metadata.version(package).encode())
+    for root in (Path(rigsight.__file__).parent, TESTS.parent / "bench/src", TESTS):
+        for path in sorted(root.rglob("*")):
+            if path.is_file() and "__pycache__" not in path.parts:
+                found.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
+    return found.hexdigest()[:32]
 
 
 @pytest.fixture

@@ -29,6 +29,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("source", [ROOT / "src", ROOT / "bench/src"], ids=["rigsight", "bench"])
 def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built: Path, source: Path) -> None:
     (package,) = (folder.name for folder in source.iterdir())
@@ -43,6 +44,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built: Path,
     assert wheel.stat().st_size < 2e6
 
 
+@pytest.mark.release
 def test_the_source_distribution_holds_what_it_is_built_and_tested_from(built: Path) -> None:
     (archive,) = built.glob("rigsight-*.tar.gz")
     with tarfile.open(archive) as opened:
@@ -53,6 +55,7 @@ def test_the_source_distribution_holds_what_it_is_built_and_tested_from(built: P
     }  # fmt: skip
 
 
+@pytest.mark.release
 def test_the_wheel_runs_outside_of_the_repository(built: Path, tmp_path: Path) -> None:
     (wheel,) = built.glob("rigsight-*.whl")
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")

@@ -71,6 +71,7 @@ def installed(calls: list[str], what: str) -> bool:
     return any(what in call for call in calls)
 
 
+@pytest.mark.release
 def test_the_demo_installs_what_it_runs_with_pinned_and_nothing_else(make: Make) -> None:
     calls = make("demo")
     assert installed(calls, RUNNABLE)
@@ -82,6 +83,7 @@ def test_the_demo_installs_what_it_runs_with_pinned_and_nothing_else(make: Make)
     assert make("demo") == ["demo ran"]
 
 
+@pytest.mark.release
 def test_the_tests_install_the_rest_on_top(make: Make) -> None:
     make("demo")
     calls = make("test")
@@ -92,6 +94,7 @@ def test_the_tests_install_the_rest_on_top(make: Make) -> None:
     assert make("demo") == ["demo ran"]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("step", ["hatchling", RUNNABLE, DEVELOPMENT])
 def test_an_interrupted_installation_is_taken_up_again(step: str, make: Make, project: Path) -> None:
     broken = project / "broken"
@@ -106,6 +109,7 @@ def test_an_interrupted_installation_is_taken_up_again(step: str, make: Make, pr
     assert calls[-1] == "tests ran"
 
 
+@pytest.mark.release
 def test_where_uv_cannot_be_had_or_fails_pip_installs(make: Make, project: Path) -> None:
     (project / "broken").write_text("uv", "utf-8")
     calls = make("test")
@@ -116,6 +120,7 @@ def test_where_uv_cannot_be_had_or_fails_pip_installs(make: Make, project: Path)
     assert calls[-1] == "tests ran"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("changed", ["requirements.lock", "pyproject.toml"])
 def test_another_lock_or_other_dependencies_are_installed_by_the_next_call(
     changed: str, make: Make, project: Path

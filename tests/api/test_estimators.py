@@ -99,8 +99,12 @@ def test_the_hidden_spring_is_found_and_predicts_down_to_the_noise(
     assert left["LinearIdentifier"] > 100.0 * 2e-5
 
 
+@pytest.mark.slow
 def test_a_folder_gives_what_the_commands_give(axis_campaign: Path) -> None:
     few = ["cubic_stiffness"]
+    for file in axis_campaign.glob("*.csv"):
+        # Half a sweep passes the resonance.
+        file.write_text("".join(file.read_text("utf-8").splitlines(keepends=True)[:1100]), "utf-8")
     diagnosed = rs.Diagnoser(effects=few, n_jobs=1).fit(axis_campaign).diagnosis_
     effects = [effect_named(name) for name in few]
     assert diagnosed.to_json() == run_diagnose(axis_campaign, effects=effects, n_jobs=1).to_json()
@@ -109,6 +113,9 @@ def test_a_folder_gives_what_the_commands_give(axis_campaign: Path) -> None:
     same = run_identify(axis_campaign, method="h1", n_jobs=1)
     assert identification_json(identified, {}) == identification_json(same, {})
 
+
+@pytest.mark.slow
+def test_a_discovery_of_a_folder_is_that_of_the_command(axis_campaign: Path) -> None:
     discovered = rs.EquationDiscoverer("full", seed=3, n_jobs=1).fit(str(axis_campaign)).discovery_
     assert discovered.to_json() == run_discover(axis_campaign, method="full", seed=3, n_jobs=1).to_json()
 

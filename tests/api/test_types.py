@@ -34,7 +34,7 @@ MISTAKES = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_type_checker_knows_every_type_and_sees_every_mistake(tmp_path: Path) -> None:
     api = pytest.importorskip("mypy.api", reason="mypy is not installed")
     if find_spec("pandas-stubs") is None:

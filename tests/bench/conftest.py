@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -15,27 +12,9 @@ from rigsight_bench.trials import Trial, draw_trial
 
 
 @pytest.fixture(scope="session")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, int], Trial]:
-    """Return a trial of the standard design by seed and number, drawn once for all processes that test: it takes ten seconds."""
-    own = tmp_path_factory.getbasetemp()
-    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
-
-    def draw(seed: int, number: int) -> Trial:
-        file = shared / f"trial-{seed}-{number}"
-        with file.with_suffix(".lock").open("w") as lock:
-            # Where files cannot be locked, two processes may draw the same; the later one replaces what is alike.
-            with contextlib.suppress(ImportError):
-                import fcntl
-
-                fcntl.flock(lock, fcntl.LOCK_EX)
-            if not file.exists():
-                part = file.with_suffix(f".{os.getpid()}")
-                part.write_bytes(pickle.dumps(draw_trial("standard", seed, number)))
-                part.replace(file)
-        trial: Trial = pickle.loads(file.read_bytes())
-        return trial
-
-    return draw
+def drawn(kept: Callable[[str, Callable[[], Any]], Any]) -> Callable[[int, int], Trial]:
+    """Return a trial of the standard design by seed and number; to draw one takes ten seconds."""
+    return lambda seed, number: kept(f"trial-{seed}-{number}", lambda: draw_trial("standard", seed, number))
 
 
 @pytest.fixture

@@ -22,7 +22,10 @@ def figures(run: Run, folder: Path) -> dict[str, object]:
     return {key: diagnosis[key] for key in ("verdict", "effects", "candidates", "gap", "gap_by_band")}
 
 
-@pytest.mark.parametrize(("suffix", "write"), [(".mat", write_matlab_packed), (".tdms", write_tdms)])
+@pytest.mark.parametrize(
+    ("suffix", "write"),
+    [pytest.param(".mat", write_matlab_packed, marks=pytest.mark.slow), (".tdms", write_tdms)],
+)
 def test_records_in_another_format_are_diagnosed_alike(
     axis_campaign: Path, run: Run, suffix: str, write: Write
 ) -> None:

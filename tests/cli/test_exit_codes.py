@@ -73,7 +73,10 @@ def test_a_path_that_cannot_exist_is_told(
 @pytest.mark.parametrize(
     ("stage", "candidates"),
     # So many that they are not compiled when the request comes, and some that take long to be fitted.
-    [("Compiling", ()), ("Diagnosing", ("iwan_hysteresis", "bouc_wen_hysteresis"))],
+    [
+        pytest.param("Compiling", (), marks=pytest.mark.slow),
+        ("Diagnosing", ("iwan_hysteresis", "bouc_wen_hysteresis")),
+    ],
 )
 def test_an_interrupted_diagnosis_leaves_nothing(
     stage: str, candidates: tuple[str, ...], axis_campaign: Path, tmp_path: Path

@@ -113,6 +113,7 @@ def test_the_gap_is_that_of_the_given_simulation(cubic: Diagnosis, cubic_records
     assert cubic.gap["x"].before == pytest.approx(error, rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_a_loose_rig_does_at_rest_is_not_taken_for_noise(cubic_records: tuple[Record, ...]) -> None:
     rng = np.random.default_rng(3)
     wandering = []
@@ -223,6 +224,7 @@ def test_validation_records_alone_are_an_error(cubic_records) -> None:
         diagnosed(cubic_records[-1:])
 
 
+@pytest.mark.slow
 def test_validation_records_are_never_fitted(cubic: Diagnosis, cubic_records) -> None:
     """Another validation record must leave every estimate as it was."""
     *fitted, validation = cubic_records

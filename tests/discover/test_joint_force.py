@@ -15,6 +15,8 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig, read_rig_file
 from rigsight.simulate import compose, simulate
 
+from ..tiers import slow_but
+
 DT, SECONDS = 5e-3, 4.0
 T = DT * np.arange(round(SECONDS / DT))
 TRAIN = {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
@@ -53,7 +55,10 @@ def disturbed(values: Mapping[str, float], share: float = 0.05) -> dict[str, flo
 
 @pytest.mark.parametrize(
     ("effect", "parameter", "value"),
-    [("quadratic_damping@motor_bearing", "c_2", 1e-4), ("cubic_stiffness@load_bearing", "k_3", 0.3)],
+    slow_but(
+        ("cubic_stiffness@load_bearing", "k_3", 0.3),
+        of=[("quadratic_damping@motor_bearing", "c_2", 1e-4), ("cubic_stiffness@load_bearing", "k_3", 0.3)],
+    ),
 )
 def test_law_and_place_of_a_missing_force_are_found(
     drive_train: Rig, effect: str, parameter: str, value: float
@@ -69,6 +74,7 @@ def test_law_and_place_of_a_missing_force_are_found(
     assert first.parameters["J_l"] == pytest.approx(TRAIN["J_l"], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_joint_that_cannot_explain_all_sensors_contradicts_them(drive_train: Rig) -> None:
     values = {**TRAIN, "c_2": 1e-4}
     records, noise = measured(drive_train, "quadratic_damping@motor_bearing", values, (0.8, 1.5))

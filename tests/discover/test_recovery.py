@@ -81,7 +81,7 @@ def test_support_and_coefficients_are_recovered(truth: str, noise: float, discov
     ("truth", "there", "rival"),
     [
         ("Iwan", "iwan_hysteresis", "bouc_wen_hysteresis"),
-        ("Bouc-Wen, n = 1", "bouc_wen_hysteresis", "iwan_hysteresis"),
+        pytest.param("Bouc-Wen, n = 1", "bouc_wen_hysteresis", "iwan_hysteresis", marks=pytest.mark.slow),
     ],
 )
 def test_one_hysteresis_is_not_taken_for_the_other(
@@ -93,6 +93,7 @@ def test_one_hysteresis_is_not_taken_for_the_other(
     assert {term.name: term.inclusion for term in found.terms}.get(rival, 0.0) < 0.5
 
 
+@pytest.mark.slow
 def test_too_much_noise_to_decide_is_said(make_data: Make) -> None:
     # Noise as large as the motion at the middle amplitude hides the friction.
     _, data = make_data("Coulomb", 5e-3, seconds=5.0)
@@ -109,6 +110,7 @@ def test_too_much_noise_to_decide_is_said(make_data: Make) -> None:
     assert "T_c is known to" in friction.doubt
 
 
+@pytest.mark.slow
 def test_one_amplitude_is_warned_of(make_data: Make) -> None:
     _, data = make_data("linear", 2e-5, seconds=5.0, amplitudes=(0.6,))
     assert any("one amplitude" in warning for warning in discover(data).warnings)
@@ -169,6 +171,7 @@ def test_the_held_out_error_is_that_of_the_polished_equation(
     assert left == pytest.approx(found.held_out_error)
 
 
+@pytest.mark.slow
 def test_equations_that_cannot_be_simulated_are_told(
     make_data: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -204,6 +207,7 @@ def test_without_validation_a_record_is_set_aside_and_this_is_said(make_data: Ma
     assert [term.name for term in found.kept] == ["cubic_stiffness"]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_discovery_with_any_number_of_jobs(make_data: Make) -> None:
     _, data = make_data("Coulomb", 2e-5, amplitudes=(0.3, 0.8), seconds=5.0)
     first, second = discover(data, seed=3), discover(data, seed=3, n_jobs=2)

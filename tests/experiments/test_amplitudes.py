@@ -37,6 +37,7 @@ def test_the_configs_can_be_read(experiment: ModuleType) -> None:
     assert configs["joint"].with_published
 
 
+@pytest.mark.slow
 def test_a_deleted_result_is_the_only_one_that_is_made_again(
     experiment: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

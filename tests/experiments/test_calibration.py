@@ -38,6 +38,7 @@ def study(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
         sys.modules.pop(name, None)
 
 
+@pytest.mark.slow
 def test_the_table_gives_the_calibration_of_the_package(study: ModuleType) -> None:
     trials = [trial for trial in study.read_table() if study.is_judgeable(trial)]
     found, kept = study.calibrated(trials), trained()
@@ -47,6 +48,7 @@ def test_the_table_gives_the_calibration_of_the_package(study: ModuleType) -> No
         assert now == pytest.approx(dict(then), abs=2e-3)
 
 
+@pytest.mark.slow
 def test_sets_contain_the_cause_in_nine_of_ten_trials_by_weight(study: ModuleType) -> None:
     trials = [trial for trial in study.read_table() if study.is_judgeable(trial)]
     unseen, weights = study.probabilities_unseen(trials), study.weights_of(trials)

@@ -6,9 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 FUZZING = Path(__file__).parents[2] / "experiments" / "fuzzing"
 
 
+@pytest.mark.slow
 def test_a_text_that_the_fuzzer_wrote_is_read_and_not_run(tmp_path: Path) -> None:
     run, mark = "import contextlib, targets", tmp_path / "mark"
     text = f"open({str(mark)!r}, 'w').close()"

@@ -47,6 +47,7 @@ def sweep(amplitude: float) -> Record:
     return Record(f"sweep {amplitude} A", 5e-3, {"u": u}, {"u": "A", "psi": "rad"}, kind="sweep")
 
 
+@pytest.mark.slow
 def test_a_family_of_swept_responses_gives_the_hysteresis_back(to_responses: ModuleType) -> None:
     rng = np.random.default_rng(1)
     measured = []

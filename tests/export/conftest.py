@@ -25,6 +25,8 @@ from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.model import Model
 from rigsight.units import characteristic_value
 
+from ..tiers import slow_but
+
 DT = 0.01
 N_SAMPLES = 161
 RIG_VALUES: Mapping[str, Mapping[str, float]] = {
@@ -278,9 +280,31 @@ def is_refused(case: Case, target: str) -> bool:
     return bool(_unsaid(case.name) & TARGETS[target].lacks)
 
 
-@pytest.fixture(params=WRITTEN)
+EACH_FORM = (
+    "bouc_wen_hysteresis", "iwan_hysteresis", "stribeck_friction", "presliding_friction", "maxwell_branch", "free_play",
+    "end_stop", "backlash", "asymmetric_stiffness", "flexible_mode", "torque_ripple", "speed_limit",
+    "input_saturation", "sensor_delay",
+    "linear axis", "axis without a spring", "offsets", "start under load", "start held by friction", "all delays",
+    "jumps into kinks", "element with sliders", "friction at two joints", "one effect twice", "a saturated control law",
+    "a mass matrix of coordinates", "a prescribed road",
+)  # fmt: skip
+"""One of each form that a text takes: memory, branches, delays, starts, holds, motions; the others differ in a formula."""
+
+
+@pytest.fixture(params=slow_but(*EACH_FORM, of=WRITTEN))
 def case(request: pytest.FixtureRequest) -> Case:
-    """Each of the models in turn."""
+    """Each of the models in turn; `make test` takes one of each form."""
+    return made_case(request.param)
+
+
+@pytest.fixture(
+    params=slow_but(
+        "flexible_mode", "end_stop", "maxwell_branch", "linear axis", "a saturated control law", "a mass matrix of coordinates",
+        of=WRITTEN,
+    )
+)  # fmt: skip
+def solved_case(request: pytest.FixtureRequest) -> Case:
+    """Each of the models in turn, for a target whose solver takes a second or more for each."""
     return made_case(request.param)
 
 

@@ -18,7 +18,8 @@ def system_of(case):
     return space["system"], space["REST"]
 
 
-def test_it_gives_the_outputs_of_the_engine(case, refused):
+def test_it_gives_the_outputs_of_the_engine(solved_case, refused):
+    case = solved_case
     if refused(case, "control"):
         pytest.skip("friction and delays are refused, which test_targets.py tests")
     if case.model.hold == "zoh" or case.inputs[0][0] != 0.0 or case.model.structure.rig.mechanism.prescribed:

@@ -14,6 +14,8 @@ from rigsight.export import export_model
 from rigsight.libraries.compiler import c_compilers
 from rigsight.libraries.library_cache import kernel_options
 
+from ..tiers import slow_but
+
 fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed (pip install fmpy lxml)")
 
 OTHER_ROUNDING = 1e-8
@@ -127,7 +129,9 @@ the exported C, as is tested with its sources, and every model is held to the en
 
 
 @pytest.mark.parametrize("target", VERSIONS)
-@pytest.mark.parametrize("name", ALL_THAT_A_WRAPPER_TELLS)
+@pytest.mark.parametrize(
+    "name", slow_but("all delays", "one effect twice", "a prescribed road", of=ALL_THAT_A_WRAPPER_TELLS)
+)
 def test_it_gives_the_outputs_of_the_engine_to_rounding(name: str, target: str, case_named, tmp_path: Path):
     case = case_named(name)
     path = written(case, tmp_path, target)
@@ -171,7 +175,10 @@ def test_fmpy_simulates_straight_lines_by_fmi_3_with_slopes(case_named, tmp_path
 
 
 @pytest.mark.parametrize("target", VERSIONS)
-@pytest.mark.parametrize("name", ["linear axis", "all delays", "element with hysteresis", "friction twice"])
+@pytest.mark.parametrize(
+    "name",
+    slow_but("all delays", of=["linear axis", "all delays", "element with hysteresis", "friction twice"]),
+)
 def test_it_is_valid(name: str, target: str, case_named, tmp_path: Path):
     pytest.importorskip("lxml", reason="lxml is not installed (pip install fmpy lxml)")
     from fmpy.validation import validate_fmu

@@ -27,6 +27,8 @@ from rigsight.rigs.reading.functions import FUNCTIONS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 
+from ..tiers import slow_but
+
 DT, N_SAMPLES, STEP = 0.02, 11, 0.002
 WRITTEN_FROM = (
     "offsets", "element", "a saturated control law", "friction at a motor", "two masses with delays", "linear running gear",
@@ -157,7 +159,7 @@ def words(case_named, refused) -> list[str]:
     )
 
 
-@pytest.fixture(scope="module", params=range(ROLES))
+@pytest.fixture(scope="module", params=slow_but(0, of=range(ROLES)))
 def all_named(request: pytest.FixtureRequest, words: list[str], tmp_path_factory) -> Named:
     """Four rigs, so that every word is once an input, once a parameter, once a state and once a sensor."""
     by_role = [words[(request.param + i) % ROLES :: ROLES] for i in range(ROLES)]

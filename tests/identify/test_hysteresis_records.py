@@ -17,6 +17,8 @@ from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, parameter_vector, simulate
 
+from ..tiers import slow_but
+
 NOISE = 2e-5
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
 LATERAL = {"l_0": 0.25, "c_y": 0.98}
@@ -62,7 +64,7 @@ def calibrated(values: dict[str, float], n: float | None, seed: int) -> tuple[Ca
     return found, records
 
 
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("name", slow_but("r", of=SETS))
 def test_the_sets_of_the_thesis_come_back(name: str) -> None:
     found, _ = calibrated(SETS[name], 1.0, seed=3)
     assert found.fit.weighted_rms == pytest.approx(1.0, abs=0.02)
@@ -75,6 +77,7 @@ def test_the_sets_of_the_thesis_come_back(name: str) -> None:
     assert values["sum"] == pytest.approx(truth["sum"], rel=0.03, abs=0.002 * truth["difference"])
 
 
+@pytest.mark.slow
 def test_intervals_of_pair_saturation_and_loop_areas_hold_the_truth() -> None:
     structure = compose(RUNNING_GEAR, [BOUC_WEN], {"n": 1.0})
     truth = {**dict.fromkeys(structure.names, 0.0), **LATERAL, **CONSTANTS, **SETS["made_up"]}
@@ -104,6 +107,7 @@ def test_intervals_of_pair_saturation_and_loop_areas_hold_the_truth() -> None:
     assert np.sqrt(np.mean(np.square(pulls))) == pytest.approx(1.0, abs=3.0 / np.sqrt(36.0))
 
 
+@pytest.mark.slow
 def test_an_exponent_that_is_no_whole_number_comes_back() -> None:
     truth = {**SETS["made_up"], "n": 1.5, "beta": 5320.0, "gamma": -1320.0}
     found, _ = calibrated(truth, None, seed=2)

@@ -82,6 +82,7 @@ def test_the_conicity_of_the_joint_fit_comes_with_its_interval(linear: JointFit)
     assert found.interval[0] < 0.024 < found.interval[1]
 
 
+@pytest.mark.slow
 def test_the_comparison_is_calm_over_repeated_experiments() -> None:
     probabilities = [
         fit_jointly(GEAR, campaign(seed), CONSTANTS, output_noise={"psi": NOISE, "y": NOISE}).probability

@@ -85,6 +85,7 @@ def test_more_data_are_not_advised_where_the_response_is_another() -> None:
     assert "Record for longer" not in problem
 
 
+@pytest.mark.slow
 def test_a_signal_of_the_wrong_sign_is_told_also_where_friction_spoils_the_phases() -> None:
     t = DT * np.arange(8000)
     driven = Record("own", DT, {"u": log_sweep(t, 0.5, 0.5, 60.0)}, {"u": "A", "psi": "rad"}, kind="sweep")

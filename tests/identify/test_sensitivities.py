@@ -71,11 +71,17 @@ def central(problem: Problem, theta: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 CASES = [
-    pytest.param(rig, effect, id=f"{rig.name}-{effect.name}")
+    pytest.param(
+        rig,
+        effect,
+        id=f"{rig.name}-{effect.name}",
+        marks=pytest.mark.slow if rig is RUNNING_GEAR and AXIS.offers(effect) else (),
+    )
     for rig in (RUNNING_GEAR, AXIS)
     for effect in CATALOGUE
     if rig.offers(effect)
 ]
+"""`make test` takes each effect on one rig."""
 
 
 @pytest.mark.parametrize(("rig", "effect"), CASES)

@@ -74,6 +74,7 @@ def test_a_known_system_comes_back_within_its_errors(truth: dict[str, float], wi
         assert fit.misfit == pytest.approx(1.0, abs=4.0 / np.sqrt(4.0 * OMEGA.size))
 
 
+@pytest.mark.slow
 def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
     truth = {**YAW, "dead_time": 0.02}
     found = np.array(
@@ -85,6 +86,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
     assert np.all(np.abs(np.std(found, axis=0, ddof=1) - 1.0) < 3.0 / np.sqrt(198.0))
 
 
+@pytest.mark.slow
 def test_maximum_likelihood_beats_uniform_weights_where_noise_differs() -> None:
     std = np.where(OMEGA < 10.0, 1e-5, 5e-4)
     exact = measured(YAW, 0.0).values
@@ -99,6 +101,7 @@ def test_maximum_likelihood_beats_uniform_weights_where_noise_differs() -> None:
     assert np.std(errors["variance"]) < 0.3 * np.std(errors["uniform"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [local_polynomial_response, local_rational_response])
 def test_errors_from_a_local_model_are_the_scatter_of_repeated_records(method) -> None:  # type: ignore[no-untyped-def]
     """Its lines overlap: counted as independent they would promise errors two to three times too small."""
@@ -159,6 +162,7 @@ def test_the_fit_is_a_python_control_transfer_function() -> None:
         fit.to_control(pade_order=0)
 
 
+@pytest.mark.slow
 def test_the_error_band_is_the_scatter_of_the_fitted_response() -> None:
     omega = np.array([1.0, 11.0, 13.0, 40.0])
     fits = [fit_frequency_response(measured(YAW, seed=i), "pt2") for i in range(60)]

@@ -13,6 +13,7 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.records import read_record
 
+from ..tiers import slow_but
 from .formats import FORMATS, Write, write_matlab, write_text
 
 
@@ -26,6 +27,10 @@ SIGNALS = {"u": "A", "psi": "rad", "y": "m"}
 # A process is started for every such file.
 TRIALS = {"MDF4": 3, "HDF5": 8, "MATLAB 7.3": 8, "MATLAB 5": 8, "MATLAB 7": 8, "Parquet": 8}
 formats = pytest.mark.parametrize("name", FORMATS)
+read_often = pytest.mark.parametrize(
+    "name", slow_but(*(name for name in FORMATS if name not in TRIALS), of=FORMATS)
+)
+"""`make test` reads a format in a process of its own once: to start one takes a second or two."""
 
 
 def read(path: Path) -> None:
@@ -52,7 +57,7 @@ def told(path: Path) -> str | None:
     return message
 
 
-@formats
+@read_often
 def test_a_file_cut_short_is_told(tmp_path: Path, name: str) -> None:
     path, good = contents(tmp_path, name)
     read(path)
@@ -64,7 +69,7 @@ def test_a_file_cut_short_is_told(tmp_path: Path, name: str) -> None:
     assert unseen <= (2 if name in ("MATLAB 5", "UFF") else 0)
 
 
-@formats
+@read_often
 def test_flipped_bytes_are_told_or_read(tmp_path: Path, name: str) -> None:
     path, good = contents(tmp_path, name)
     rng = np.random.default_rng(7)

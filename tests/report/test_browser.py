@@ -14,6 +14,7 @@ from rigsight.report import render_report
 
 from .chromium import BROWSERS, Chromium, find
 
+pytestmark = pytest.mark.release
 FIRST = "document.querySelector('#record-1-output-1')"
 RESPONSE = "document.querySelector('#record-1-path-1')"
 

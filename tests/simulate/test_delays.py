@@ -106,10 +106,10 @@ def assert_same(found: Floats, expected: Floats) -> None:
 @pytest.mark.parametrize(
     ("effect", "delay", "goal", "hold"),
     [
-        ("sensor_delay@angle", 0.013, "within range", "foh"),
+        pytest.param("sensor_delay@angle", 0.013, "within range", "foh", marks=pytest.mark.slow),
         ("sensor_delay@angle", 0.013, "saturated", "zoh"),
-        ("input_delay@motor", 0.013, "within range", "zoh"),
-        ("input_delay@motor", 0.013, "saturated", "foh"),
+        pytest.param("input_delay@motor", 0.013, "within range", "zoh", marks=pytest.mark.slow),
+        pytest.param("input_delay@motor", 0.013, "saturated", "foh", marks=pytest.mark.slow),
         ("input_delay@motor", 0.0017, "saturated", "zoh"),
     ],
 )

@@ -112,6 +112,7 @@ def test_second_process_does_not_compile_and_gives_the_same_bits_and_damaged_cod
     assert all(len((folder / file.name).read_bytes()) == len(whole) for folder in folders)
 
 
+@pytest.mark.slow
 def test_processes_that_compile_the_same_kernel_at_once_do_not_harm_each_other(fresh_cache):
     processes = [start(fresh_cache) for _ in range(2)]
     said = [process.communicate() for process in processes]
@@ -162,6 +163,7 @@ def test_the_code_of_another_processor_is_not_run(fresh_cache, monkeypatch):
     assert kernel_cache.kernel_of(structure).path != own
 
 
+@pytest.mark.slow
 def test_source_does_not_depend_on_the_order_of_hashes():
     program = """
 import hashlib

@@ -58,8 +58,8 @@ def rig_of(way: str, folder: Path):
     ("way", "effects"),
     [
         *((way, ()) for way in WAYS),
-        ("mujoco", ("coulomb_friction",)),
-        ("fmu 2.0", ("coulomb_friction",)),
+        pytest.param("mujoco", ("coulomb_friction",), marks=pytest.mark.slow),
+        pytest.param("fmu 2.0", ("coulomb_friction",), marks=pytest.mark.slow),
         ("mujoco", ("backlash", "input_delay")),
     ],
 )

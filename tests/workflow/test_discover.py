@@ -54,6 +54,7 @@ def test_a_discovery_is_written_whole_and_its_model_simulates(axis_campaign: Pat
     assert np.sqrt(np.mean(error**2)) < 3.0 * found.noise_floor * np.std(validation["x"])
 
 
+@pytest.mark.slow
 def test_each_record_alone_is_reported_beside_all_together(axis_campaign: Path) -> None:
     found = run_discover(axis_campaign, one_by_one=True, n_jobs=1)
     campaign = read_campaign(axis_campaign)

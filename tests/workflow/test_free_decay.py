@@ -90,6 +90,7 @@ RIVALS = {
 OF_AN_INPUT = "input_delay actuator_lag input_saturation speed_limit input_dead_zone"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "level", "missing", "parameter", "value"),
     [
@@ -115,6 +116,15 @@ def test_what_bends_a_decay_is_named(
     assert best["k"].value == pytest.approx(K / M, rel=1e-2)
     assert "m" not in best
     assert any("only up to a common factor. m = 1 kg is held" in note for note in found.notes)
+
+
+def test_friction_that_ends_a_decay_is_told_from_what_else_slows_it(tmp_path: Path) -> None:
+    tried = [effect_named(name) for name in ("coulomb_friction", "quadratic_damping", "input_dead_zone")]
+    found = run_diagnose(campaign(tmp_path / "c", dry=0.35), effects=tried, n_jobs=1)
+    assert (found.verdict, found.effects, found.where) == ("effect", ("coulomb_friction",), ("dynamics",))
+    best = found.candidates[0].parameters
+    assert best["T_c"].value == pytest.approx(0.35 / M, abs=4.0 * best["T_c"].std, rel=1e-3)
+    assert "m" not in best
 
 
 def test_ratios_are_identified_and_the_rest_is_said(tmp_path: Path) -> None:

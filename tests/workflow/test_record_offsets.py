@@ -29,6 +29,8 @@ from rigsight.workflow.diagnose import diagnose_campaign
 from rigsight.workflow.discover import discover_campaign
 from rigsight.workflow.identify import checked_options, identify_campaign
 
+from ..tiers import slow_but
+
 DT, NOISE = 5e-3, 2e-5
 AXIS_VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
 TRAIN_VALUES = {
@@ -99,7 +101,7 @@ def test_offsets_that_nobody_declared_are_told_before_a_second_effect_is_believe
     assert not any("offset" in name for name in found.model["parameters"])
 
 
-@pytest.mark.parametrize("factor", [1.0, 1e4], ids=["of a few noises", "of meters"])
+@pytest.mark.parametrize("factor", slow_but(1.0, of=[1.0, 1e4]))
 def test_declared_offsets_leave_the_numbers_right(factor: float) -> None:
     found = diagnosed(campaign("per_record", factor=factor))
     assert found.effects == ("coulomb_friction",)
@@ -114,6 +116,7 @@ def test_declared_offsets_leave_the_numbers_right(factor: float) -> None:
     assert found.gap["x"].reidentified == pytest.approx(0.155, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_memory_beside_offsets_is_named_alone() -> None:
     memory = ("bouc_wen_hysteresis", {"A": 1.0, "a": 0.4, "beta": 500.0, "gamma": -100.0, "n": 1.0})
     found = diagnosed(campaign(effects=[memory]))
@@ -124,11 +127,14 @@ def test_a_memory_beside_offsets_is_named_alone() -> None:
 @pytest.mark.parametrize(
     "effects",
     [
-        [],
-        [FRICTION],
-        [FRICTION, ("asymmetric_stiffness", {"k_2": 2e4})],
+        pytest.param([], id="linear"),
+        pytest.param([FRICTION], id="friction", marks=pytest.mark.slow),
+        pytest.param(
+            [FRICTION, ("asymmetric_stiffness", {"k_2": 2e4})],
+            id="one that pulls to one side",
+            marks=pytest.mark.slow,
+        ),
     ],
-    ids=["linear", "friction", "one that pulls to one side"],
 )
 def test_records_without_such_offsets_are_left_in_peace(effects: Any) -> None:
     found = diagnosed(campaign(effects=effects, factor=0.0))
@@ -136,6 +142,7 @@ def test_records_without_such_offsets_are_left_in_peace(effects: Any) -> None:
     assert "coulomb_friction" in found.effects or not effects
 
 
+@pytest.mark.slow
 def test_levels_farther_apart_than_the_motion_are_told() -> None:
     (finding,) = told(diagnosed(campaign(factor=1e3), ["coulomb_friction"]))
     assert finding.serious
@@ -167,6 +174,7 @@ def test_discovery_finds_the_friction_beside_them() -> None:
     assert found.model["effects"] == ["coulomb_friction"]
 
 
+@pytest.mark.slow
 def test_two_sensors_have_an_offset_each() -> None:
     rig: Rig = RIGS["drive_train"]
     rng, t = np.random.default_rng(1), DT * np.arange(1200)

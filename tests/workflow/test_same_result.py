@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import rigsight
 
 PROGRAM = """
@@ -21,6 +23,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_a_diagnosis_does_not_depend_on_jobs_hashes_or_compiled_kernels(
     axis_campaign: Path, tmp_path: Path
 ) -> None:

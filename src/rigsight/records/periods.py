@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate
 
 from rigsight.records.record import Record
 
@@ -120,6 +119,9 @@ def same_signal(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool
     first, second
         Samples, shape (n_samples,) each, at the same sample time.
     """
+    # Loaded where it is used: the process that reads a file imports this package and needs none of it.
+    from scipy.signal import correlate
+
     short, long = sorted((first, second), key=len)
     mean, size = float(np.mean(short)), float(np.std(short))
     if size == 0.0:

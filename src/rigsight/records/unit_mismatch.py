@@ -7,7 +7,6 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from rigsight.records.record import Record
 
@@ -59,6 +58,9 @@ _Gain = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def _gain(record: Record, source: str, response: str) -> _Gain | None:
+    # Loaded where it is used: the process that reads a file imports this package and needs none of it.
+    from scipy.signal import welch
+
     if np.ptp(record[source]) == 0.0 or np.ptp(record[response]) == 0.0:
         return None
     length = max(record.n_samples // _SEGMENTS, min(record.n_samples, 64))

@@ -97,6 +97,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
     chromium.close()
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("width", [1280, 400])
 def test_a_page_opens_without_complaint_and_fits(
     browser: Chromium, page: str, tmp_path: Path, width: int

@@ -71,6 +71,7 @@ def test_a_trial_that_is_scored_again_replaces_its_row(tmp_path: Path, outcome_l
         assert [o.seconds for o in store.outcomes()] == [2.0]
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_loses_no_row_and_the_next_doubles_none(
     tmp_path: Path, outcome_like: Like
 ) -> None:

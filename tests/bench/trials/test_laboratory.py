@@ -281,6 +281,7 @@ def test_a_condition_does_what_it_is_called_after_and_nothing_else(condition: su
     }.get(condition, set())
 
 
+@pytest.mark.slow
 def test_a_trial_is_the_same_for_the_same_seed_and_its_campaign_holds_nothing_of_the_truth(
     tmp_path: Path,
 ) -> None:

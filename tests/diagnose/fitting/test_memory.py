@@ -18,6 +18,8 @@ from rigsight.records.record import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
 
+from ...tiers import slow_but
+
 DT = 0.01
 NOISE = 2e-5
 IWAN = effect_named("iwan_hysteresis")
@@ -64,7 +66,7 @@ def diagnosed(name: str) -> Diagnosis:
     return diagnose(recorded(TRUTHS[name]), [IWAN])
 
 
-@pytest.mark.parametrize("name", TRUTHS)
+@pytest.mark.parametrize("name", slow_but("nearly all memory", of=TRUTHS))
 def test_its_numbers_come_back(name: str) -> None:
     truth, found = TRUTHS[name], diagnosed(name)
     assert found.effects == ("iwan_hysteresis",)
@@ -74,6 +76,7 @@ def test_its_numbers_come_back(name: str) -> None:
         assert best.parameters[number].value == pytest.approx(truth[number], rel=0.02), number
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", [4, 5, 6])
 def test_no_draw_of_noise_leads_to_a_wrong_minimum(draw: int) -> None:
     """Another one, with sliders that reach sixty times as far, leaves eight times the noise."""
@@ -83,6 +86,7 @@ def test_no_draw_of_noise_leads_to_a_wrong_minimum(draw: int) -> None:
         assert best.parameters[name].value == pytest.approx(NEARLY_ALL_MEMORY[name], rel=0.02), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["nearly all memory", "sliders of any size"])
 def test_rounding_moves_no_number(case: str) -> None:
     """A disturbance of 1e-9 of the noise stands for another processor; no number moves by a hundredth of its standard error."""

@@ -137,6 +137,7 @@ def test_only_a_rig_that_drifts_is_followed_and_by_sensors_of_its_motion() -> No
     assert structure.observed == ("x",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("disturbance", [0.05, 0.3])
 def test_friction_of_a_disturbed_stage_is_named_with_its_numbers(disturbance: float) -> None:
     """In free runs or long windows the drift that the disturbance makes hides the friction (97 and 15 % of the gap closed)."""
@@ -153,6 +154,7 @@ def test_friction_of_a_disturbed_stage_is_named_with_its_numbers(disturbance: fl
     assert 1.0 - (1.0 - found.gap["x"].closed) ** 2 > 0.7
 
 
+@pytest.mark.slow
 def test_a_spring_that_nobody_left_out_and_that_is_not_there_is_found_to_be_none() -> None:
     names = ("coulomb_friction", "bouc_wen_hysteresis", "quadratic_damping")
     effects = [effect for effect in CATALOGUE if effect.name in names]

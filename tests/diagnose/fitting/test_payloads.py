@@ -85,10 +85,14 @@ def diagnosed(effect: str, own: Mapping[str, float], payloads: tuple[float, ...]
     return diagnose(campaign, [effect_named(f"{name}@guide") for name in TRIED])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "own", "payloads"),
-    [(*LOADED, (1.0, 4.0, 10.0)), (*EVEN, (1.0, 4.0, 10.0)), (*EVEN, (4.0, 4.0))],
-    ids=["grows with the load", "does not", "does not, one payload"],
+    [
+        pytest.param(*LOADED, (1.0, 4.0, 10.0), id="grows with the load"),
+        pytest.param(*EVEN, (1.0, 4.0, 10.0), id="does not"),
+        pytest.param(*EVEN, (4.0, 4.0), id="does not, one payload"),
+    ],
 )
 def test_friction_that_grows_with_the_load_is_named_where_it_does(
     effect: str, own: Mapping[str, float], payloads: tuple[float, ...]

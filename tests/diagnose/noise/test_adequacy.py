@@ -22,6 +22,8 @@ from rigsight.records.record import Record
 from rigsight.rigs import AXIS, RIGS
 from rigsight.simulate import compose, simulate
 
+from ...tiers import slow_but
+
 DT, NOISE = 0.01, 2e-5
 VALUES = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
 
@@ -63,7 +65,8 @@ def asked(context: FitContext, model: Scored) -> Adequacy:
     return adequacy(context, model, np.random.default_rng(1))
 
 
-@pytest.mark.parametrize("disturbance", [0.0, 0.05, 0.5], ids=["white noise", "disturbed", "much disturbed"])
+@pytest.mark.slow
+@pytest.mark.parametrize("disturbance", [0.0, 0.05, 0.5])
 def test_p_values_of_noise_and_disturbance_are_uniform(disturbance: float) -> None:
     """A disturbing force of 0.5 leaves 80 times the noise, most of it at the resonance."""
     benches = [axis_bench(seed=seed, disturbance=disturbance) for seed in range(16)]
@@ -79,7 +82,9 @@ HIDDEN = [
 ]
 
 
-@pytest.mark.parametrize(("name", "values", "what"), HIDDEN, ids=[name for name, _, _ in HIDDEN])
+@pytest.mark.parametrize(
+    ("name", "values", "what"), slow_but(HIDDEN[0], HIDDEN[3], of=HIDDEN), ids=[name for name, _, _ in HIDDEN]
+)
 def test_a_missing_effect_is_what_the_remainder_goes_with(
     name: str, values: dict[str, float], what: str
 ) -> None:
@@ -251,7 +256,7 @@ def test_noise_that_only_motion_makes_is_no_noise_of_a_sensor() -> None:
     assert found.goes_with == "how far dynamics moves"
 
 
-@pytest.mark.parametrize("disturbance", [0.0, 0.5], ids=["white noise", "much disturbed"])
+@pytest.mark.parametrize("disturbance", slow_but(0.5, of=[0.0, 0.5]))
 def test_noise_and_disturbance_are_as_large_where_nothing_moves(disturbance: float) -> None:
     adequate = []
     for seed in range(8):

@@ -81,6 +81,7 @@ def test_a_rival_beside_wrong_numbers_of_the_rig_gets_those_of_the_best(bench: F
     assert found.error_over_noise < 1.2 * right.error_over_noise
 
 
+@pytest.mark.slow
 def test_a_rival_of_several_effects_gets_the_effect_that_both_have(bench: FitContext) -> None:
     def both(other: str, own: Mapping[str, float], evaluations: int) -> Scored:
         effects = (STRIBECK, effect_named(other))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
@@ -52,6 +53,7 @@ unit = "rad"
 """
 
 
+@pytest.mark.slow
 def test_a_law_about_zero_does_no_harm_to_a_pendulum_that_hangs_at_pi(tmp_path: Path) -> None:
     path = tmp_path / "pendulum.toml"
     path.write_text(PENDULUM, encoding="utf-8")

@@ -45,6 +45,7 @@ def test_the_place_comes_first(train: Any, name: str, place: str, values: dict[s
     assert len(search.effects) + len(search.others) == len(effects)
 
 
+@pytest.mark.slow
 def test_effect_and_place_are_named(train: Any) -> None:
     records = train.records([placed(effect_named("quadratic_damping"), "load_bearing")], {"c_2": 2e-4})
     found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, records), EFFECTS[:2])
@@ -57,8 +58,9 @@ def test_effect_and_place_are_named(train: Any) -> None:
     assert abs(c_2.value - 2e-4) < 5.0 * c_2.std
 
 
+@pytest.mark.slow
 def test_a_record_may_lack_a_sensor(train: Any) -> None:
-    records = train.records()
+    records = replace(train, n_samples=300).records()
     partial = replace(records[1], signals={n: s for n, s in records[1].signals.items() if n != "motor_angle"})
     found = diagnose(
         Campaign("train", TRAIN, {"k_t": 0.05}, {}, (records[0], partial, records[2])), EFFECTS[:1]
@@ -67,9 +69,10 @@ def test_a_record_may_lack_a_sensor(train: Any) -> None:
     assert np.isfinite(found.gap["motor_angle"].after)
 
 
+@pytest.mark.slow
 def test_a_sensor_may_stand_still_in_the_validation_record(train: Any) -> None:
     """Relative to a motion of nothing no error has a size."""
-    records = train.records()
+    records = replace(train, n_samples=300).records()
     still = records[2].with_signals(load_angle=np.zeros(records[2].n_samples))
     found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, (*records[:2], still)), EFFECTS[:1])
     assert found.gap["load_angle"].noise_floor == np.inf

@@ -20,6 +20,8 @@ from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
 
+from ...tiers import slow_but
+
 DT, N, NOISE = 5e-3, 2000, 2e-5
 VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
 HIDDEN: list[tuple[str, Mapping[str, float]]] = [
@@ -61,7 +63,7 @@ def looked_at(name: str, values: Mapping[str, float]) -> tuple[Search, list[Effe
     return search_places(context, reidentify(context, VALUES), offered), offered
 
 
-@pytest.mark.parametrize(("name", "values"), HIDDEN, ids=str)
+@pytest.mark.parametrize(("name", "values"), slow_but(HIDDEN[0], HIDDEN[3], of=HIDDEN), ids=str)
 def test_the_true_one_is_looked_at_first_and_its_push_tells_its_size(
     name: str, values: Mapping[str, float]
 ) -> None:
@@ -90,6 +92,7 @@ def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:
     assert all(suspect.share < 0.1 for suspect in lineup.suspects(at_the_drive))
 
 
+@pytest.mark.slow
 def test_the_others_follow_where_none_explains_the_records() -> None:
     tried = ("quadratic_damping", "input_saturation", "sensor_lag", "free_play", "coulomb_friction")
     found = diagnosed(["cubic_stiffness"], {"k_3": 5e6}, tried)
@@ -97,7 +100,11 @@ def test_the_others_follow_where_none_explains_the_records() -> None:
 
 
 @pytest.mark.parametrize(
-    ("at_once", "values"), [("input_dead_zone", {"u_0": 0.4}), ("input_saturation", {"u_max": 2.2})]
+    ("at_once", "values"),
+    slow_but(
+        ("input_dead_zone", {"u_0": 0.4}),
+        of=[("input_dead_zone", {"u_0": 0.4}), ("input_saturation", {"u_max": 2.2})],
+    ),
 )
 def test_a_lag_beside_a_limited_drive_is_no_other_form_of_it(
     at_once: str, values: Mapping[str, float]

@@ -150,7 +150,16 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
+ONE_OF_EACH_PLACE = {"speed_limit on axis", "power_law_stiffness on axis", "inertia on element"}
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=str(case), marks=() if str(case) in ONE_OF_EACH_PLACE else pytest.mark.slow)
+        for case in CASES
+    ],
+)
 def test_it_is_told_from_its_relatives(case: Case) -> None:
     order = ranked(case, (case.effect, *case.relatives, *case.generalizations))
     found = {model.names[0]: model for model in order}

@@ -51,6 +51,7 @@ def of_play() -> tuple[Record, ...]:
     return measured(["backlash"], {"g": 1.35e-4})
 
 
+@pytest.mark.slow
 def test_the_play_is_named_in_windows_down_to_the_noise(of_play: tuple[Record, ...]) -> None:
     diagnosis = diagnosed(of_play, [PLAY, effect_named("free_play")])
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("backlash",))
@@ -62,6 +63,7 @@ def test_the_play_is_named_in_windows_down_to_the_noise(of_play: tuple[Record, .
     assert not any("{" in note or "}" in note for note in diagnosis.notes)
 
 
+@pytest.mark.slow
 def test_windows_do_not_make_a_wrong_effect_right(of_play: tuple[Record, ...]) -> None:
     diagnosis = diagnosed(of_play, RIVALS)
     assert diagnosis.verdict == "unknown"

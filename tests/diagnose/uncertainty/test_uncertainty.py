@@ -21,6 +21,8 @@ from rigsight.rigs import AXIS, Rig
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.input_hold import Hold
 
+from ...tiers import slow_but
+
 DT, N = 0.01, 2000
 VALUES = {"gain": 1.0, "m": 1.0, "d": 0.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
 FRICTION = effect_named("coulomb_friction")
@@ -111,7 +113,7 @@ def test_what_the_records_do_not_determine_stays_undetermined() -> None:
     assert all(np.isfinite(found.std[name]) for name in fit.free[1:])
 
 
-@pytest.mark.parametrize(("noise", "force"), [(1e-3, 0.0), (1e-5, 0.02)])
+@pytest.mark.parametrize(("noise", "force"), slow_but((1e-5, 0.02), of=[(1e-3, 0.0), (1e-5, 0.02)]))
 def test_an_observer_has_errors_of_the_size_that_fits_scatter_by(noise: float, force: float) -> None:
     """A cart without a spring: an observer follows noise too, and its own errors die away."""
     off, errors = [], []

@@ -32,6 +32,7 @@ def without(record: Record, sensor: str) -> Record:
     return replace(record, signals={n: s for n, s in record.signals.items() if n != sensor})
 
 
+@pytest.mark.slow
 def test_a_missing_force_is_traced_to_its_joint(train: Any) -> None:
     """Neither candidate is the quadratic damping of the load; no push of theirs takes much of the gap away."""
     records = replace(train, n_samples=240).records(HIDDEN, {"c_2": 1e-3})

@@ -57,6 +57,7 @@ def test_pairs_compose_in_either_order(pair, axis_values, make_record):
     assert np.ptp(simulated["x"]) > 1e-4
 
 
+@pytest.mark.slow
 def test_every_pair_has_equations():
     for rig in (RUNNING_GEAR, AXIS, ELEMENT):
         offered = [effect for effect in CATALOGUE if rig.offers(effect)]

@@ -31,6 +31,8 @@ from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.linearization import linearize
 
+from ...tiers import slow_but
+
 DT, N = 5e-3, 160
 VALUES: Mapping[str, Mapping[str, float]] = {
     "drive_train": {
@@ -85,7 +87,7 @@ def assert_same(found: NDArray[np.float64], expected: NDArray[np.float64], limit
     assert np.max(np.abs(found - expected)) <= limit * np.max(np.abs(expected))
 
 
-@pytest.mark.parametrize(("name", "effects", "hold"), CASES)
+@pytest.mark.parametrize(("name", "effects", "hold"), slow_but(CASES[0], CASES[3], CASES[5], of=CASES))
 def test_the_motion_is_the_same(
     monkeypatch: pytest.MonkeyPatch, name: str, effects: tuple[str, ...], hold: Hold
 ) -> None:

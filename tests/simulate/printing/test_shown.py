@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from functools import cache
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.printing.names import declared_name, output_symbol, rate_symbol
 from rigsight.simulate.printing.shown import ShownEquation, shown_equations
 
+from ...tiers import slow_but
+
 _TOGETHER = (
     ("backlash", "bouc_wen_hysteresis"),
     ("free_play", "backlash", "iwan_hysteresis"),
@@ -32,7 +35,9 @@ _TOGETHER = (
     ("coulomb_friction", "stribeck_friction", "end_stop"),
     ("creep_saturation", "conicity_variation"),
 )
-ONE_MOTION = [name for name, rig in RIGS.items() if rig.has_one_motion]
+ONE_MOTION = sorted(
+    (name for name, rig in RIGS.items() if rig.has_one_motion), key=lambda name: name != "axis"
+)
 LARGER = [name for name in RIGS if name not in ONE_MOTION]
 _TOGETHER_AT_PLACES = (
     ("drive_train", "backlash@shaft", "coulomb_friction@load_bearing", "coulomb_friction@motor_bearing"),
@@ -216,11 +221,23 @@ def _number(expression: sp.Expr, known: dict[sp.Symbol, float]) -> float:
     return float(_function(expression, symbols)(*(known[s] for s in symbols)))
 
 
+def _of_tiers(cases: Sequence[tuple[str, Sequence[str]]]) -> list[Any]:
+    """Return cases of which `make test` takes each rig, and each effect or company of effects on one rig."""
+    seen: set[tuple[str, ...]] = set()
+    found = []
+    for case, label in zip(cases, _ids(cases), strict=True):
+        kinds = tuple(name.partition("@")[0] for name in case[1])
+        marks = pytest.mark.slow if kinds and kinds in seen else ()
+        found.append(pytest.param(*case, id=label, marks=marks))
+        seen.add(kinds)
+    return found
+
+
 def _ids(cases: Sequence[tuple[str, Sequence[str]]]) -> list[str]:
     return ["+".join([rig, *names]) for rig, names in cases]
 
 
-@pytest.mark.parametrize(("rig", "names"), [*CASES, *AT_PLACES], ids=_ids([*CASES, *AT_PLACES]))
+@pytest.mark.parametrize(("rig", "names"), _of_tiers([*CASES, *AT_PLACES]))
 def test_what_is_shown_is_what_is_simulated(simulated_instant, rig: str, names: Sequence[str]) -> None:
     structure = composed(rig, names)
     rng = np.random.default_rng(5)
@@ -234,7 +251,7 @@ def test_what_is_shown_is_what_is_simulated(simulated_instant, rig: str, names: 
             assert reader.output(name, read_at) == pytest.approx(value, rel=1e-9, abs=1e-12), name
 
 
-@pytest.mark.parametrize(("rig", "names"), KERNELS, ids=_ids(KERNELS))
+@pytest.mark.parametrize(("rig", "names"), _of_tiers(KERNELS))
 def test_the_compiled_kernel_moves_as_shown(rig: str, names: Sequence[str]) -> None:
     """Over a step so short that nothing but the rates at its start matters."""
     structure = composed(rig, names)
@@ -274,14 +291,14 @@ def test_the_compiled_kernel_moves_as_shown(rig: str, names: Sequence[str]) -> N
             assert out[0, i] == pytest.approx(shown, rel=1e-9, abs=1e-12), signal.name
 
 
-@pytest.mark.parametrize("rig", ONE_MOTION)
+@pytest.mark.parametrize("rig", slow_but("axis", of=ONE_MOTION))
 def test_no_two_symbols_of_an_equation_have_the_same_name(rig: str) -> None:
     offered = [effect for effect in CATALOGUE if RIGS[rig].offers(effect)]
     for pair in combinations(offered, 2):
         assert_names_differ(compose(RIGS[rig], pair))
 
 
-@pytest.mark.parametrize(("rig", "names"), AT_PLACES, ids=_ids(AT_PLACES))
+@pytest.mark.parametrize(("rig", "names"), _of_tiers(AT_PLACES))
 def test_no_two_symbols_of_a_larger_rig_have_the_same_name(rig: str, names: Sequence[str]) -> None:
     assert_names_differ(composed(rig, names))
 

@@ -15,6 +15,7 @@ from rigsight.workflow.identify import run_identify
 from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
+from ...tiers import slow_but
 from ..virtual_campaign import CONSTANTS, NOISE, TRUTH, jump, sweep, write_campaign
 
 
@@ -171,7 +172,7 @@ def test_no_set_serves_a_hardening_spring_and_its_lateral_part_stays_clean(harde
         assert hardening.model["parameters"][name] == joint.pooled.values[name]
 
 
-@pytest.mark.parametrize("method", ["local_polynomial", "h1", "thesis"])
+@pytest.mark.parametrize("method", slow_but("thesis", of=["local_polynomial", "h1", "thesis"]))
 def test_every_method_comes_near_the_truth(method: str, linear_folder: Path) -> None:
     found = run_identify(linear_folder, method=method)
     record = found.records[1]
@@ -189,15 +190,14 @@ def test_an_unknown_method_and_a_senseless_resolution_are_refused(linear_folder:
         run_identify(linear_folder, resolution=-1.0)
 
 
-def test_nothing_half_written_is_left(
-    linear_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_half_written_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
+    campaign = write_campaign(tmp_path / "c", [sweep("one", 0.5, seconds=12.0)])
     monkeypatch.setattr("rigsight.workflow.run.results.os.fsync", broken)
     with pytest.raises(InputError, match="disk is full"):
-        run_identify(linear_folder, tmp_path / "new" / "out")
+        run_identify(campaign, tmp_path / "new" / "out")
     assert not (tmp_path / "new").exists()
 
 

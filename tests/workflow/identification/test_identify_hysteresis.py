@@ -107,6 +107,7 @@ def test_the_hysteresis_of_an_axis_comes_back(axis: Identification) -> None:
     check_recovered(axis, OF_AXIS, {"m", "k", "d", "x_off", "a", "beta", "gamma", "n"})
 
 
+@pytest.mark.slow
 def test_the_hysteresis_of_a_running_gear_comes_back_beside_its_lateral_path(gear: Identification) -> None:
     expected = {"J_z", "k_c", "k_d", "psi_off", "l_0", "c_y", "y_off", "a", "beta", "gamma", "n"}
     check_recovered(gear, OF_GEAR, expected)

@@ -17,6 +17,8 @@ from rigsight.rigs import RUNNING_GEAR
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.identify import run_identify
 
+from ...tiers import slow_but
+
 DT, SAMPLES = 0.01, 1500
 NOISE = 1e-5
 
@@ -78,6 +80,7 @@ def test_a_negative_stiffness_comes_back(tmp_path: Path, truth: dict[str, float]
     assert found.joint.scores[-1].nrmse["x"] < 0.01
 
 
+@pytest.mark.slow
 def test_no_sign_is_to_be_changed_where_the_stiffness_is_negative() -> None:
     signals = in_a_loop(2.0, 5.0, -30.0, 0)
     turned = {"u": signals["u"], "psi": signals["x"]}
@@ -119,7 +122,7 @@ def test_a_spring_that_is_given_as_absent_is_weighed(tmp_path: Path, k: float, r
         assert differs(found, {"k": k})["k"] < 4.0
 
 
-@pytest.mark.parametrize("parameters", ["k = 0.0", ""])
+@pytest.mark.parametrize("parameters", slow_but("k = 0.0", of=["k = 0.0", ""]))
 def test_a_double_integrator_is_identified(tmp_path: Path, parameters: str) -> None:
     records = {name: in_a_loop(2.0, 0.0, 0.0, seed=seed) for seed, name in enumerate("ab")}
     found = run_identify(campaign_of(tmp_path, records, parameters))

@@ -62,6 +62,7 @@ def test_finished_fits_are_recalled_and_the_result_is_the_same(
     assert again.to_json() == whole.to_json()
 
 
+@pytest.mark.slow
 def test_it_is_said_once_that_a_diagnosis_goes_on(axis_campaign: Path, journals: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         diagnosed(axis_campaign, stop_at="cubic_stiffness")
@@ -109,6 +110,7 @@ def test_a_cache_that_cannot_be_written_stops_nothing(
     assert diagnosed(axis_campaign).verdict
 
 
+@pytest.mark.slow
 def test_fits_are_kept_where_the_disk_does_not_take_the_result(
     axis_campaign: Path, journals: Path, counted: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -84,6 +84,7 @@ def test_a_strength_of_nearly_nothing_leaves_nearly_nothing(effect: str) -> None
     assert all(little[name] == pytest.approx(1.0, abs=1e-5) for name in shape.elastic)
 
 
+@pytest.mark.slow
 def test_forms_are_no_starts_of_the_search() -> None:
     """As they would be if forms were drawn from what the search begins with, spread or not."""
     cell = Cell("single", "running_gear", "bouc_wen_hysteresis", "yaw_dynamics")

@@ -154,7 +154,15 @@ def test_two_sources_of_each_rig_move_alike(name: str) -> None:
     assert apart(*both(name, None), inside) < 1e-6
 
 
-@pytest.mark.parametrize(("name", "effect"), PAIRS, ids=lambda v: v if isinstance(v, str) else v.name)
+@pytest.mark.parametrize(
+    ("name", "effect"),
+    [
+        # Equations of the larger rigs take seconds to be composed and compiled.
+        pytest.param(*pair, marks=pytest.mark.slow if pair[0] in ("drive_train", "two_link_arm") else ())
+        for pair in PAIRS
+    ],
+    ids=lambda v: v if isinstance(v, str) else v.name,
+)
 def test_two_sources_of_each_effect_move_alike(name: str, effect: Effect) -> None:
     shown, composed = both(name, effect)
     linear = without_effect(name, "").readings

@@ -32,6 +32,7 @@ def nothing(drawn: Callable[[int, int], Trial]) -> Trial:
     return drawn(SEED, first_trial(lambda s: s.kind == "none"))
 
 
+@pytest.mark.slow
 def test_a_trial_drawn_twice_is_the_same(nothing: Trial) -> None:
     again = draw_trial("standard", SEED, nothing.key["trial"])
     assert again.key == nothing.key
@@ -41,6 +42,7 @@ def test_a_trial_drawn_twice_is_the_same(nothing: Trial) -> None:
         assert all(np.array_equal(one[name], other[name]) for name in one.signals)
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_leaves_a_gap_of_about_the_wished_size(cubic: Trial) -> None:
     low, high = TIERS["clear"]
     assert low / 2.0 < cubic.key["gap"] < high * 1.5
@@ -48,6 +50,7 @@ def test_a_hidden_effect_leaves_a_gap_of_about_the_wished_size(cubic: Trial) -> 
     assert cubic.key["values"]["k_3"] != 0.0
 
 
+@pytest.mark.slow
 def test_the_given_simulation_fits_the_one_sweep_it_was_identified_from_and_no_other_as_well(
     cubic: Trial,
 ) -> None:
@@ -68,6 +71,7 @@ def test_without_an_effect_nothing_but_noise_is_left(nothing: Trial) -> None:
             assert nothing.given[name] == pytest.approx(nothing.key["values"][name], rel=0.01)
 
 
+@pytest.mark.slow
 def test_wrong_parameters_are_off_by_what_a_data_sheet_is(cubic: Trial) -> None:
     trial = draw_trial("standard", SEED, first_trial(lambda s: s.kind == "parameters"))
     assert trial.key["gap"] == pytest.approx(1.0, abs=0.05)
@@ -79,6 +83,7 @@ def test_wrong_parameters_are_off_by_what_a_data_sheet_is(cubic: Trial) -> None:
     assert all(0.049 < error < 0.201 for error in off)
 
 
+@pytest.mark.slow
 def test_records_look_alike_whatever_is_hidden(cubic: Trial, nothing: Trial) -> None:
     for one, two in zip(cubic.records, nothing.records, strict=True):
         assert (one.name, one.role, one.kind, one.hold, one.n_samples, one.dt) == (

@@ -88,6 +88,7 @@ def test_three_effects_are_found_where_the_second_closes_less_than_half():
     assert sum(share["x"] for share in found.effect_shares.values()) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_more_general_law_that_led_alone_gives_way_to_its_special_case_in_a_pair() -> None:
     campaign = measured({"coulomb_friction": {"T_c": 0.05}, "quadratic_damping": {"c_2": 5.0}}, seed=0)
     tried = ("coulomb_friction", "stribeck_friction", "quadratic_damping")

@@ -35,6 +35,7 @@ def benches() -> tuple[FitContext, FitContext]:
     return made[0], made[1]
 
 
+@pytest.mark.slow
 def test_a_pair_that_stopped_short_reaches_the_noise(benches: tuple[FitContext, FitContext]) -> None:
     whole, windows = benches
     reidentified = reidentify(whole, RIG)

@@ -29,6 +29,7 @@ def measured(role: str, amplitude: float, rng: np.random.Generator) -> Record:
     return clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size))
 
 
+@pytest.mark.slow
 def test_three_effects_are_fitted_from_where_the_screening_puts_them() -> None:
     rng = np.random.default_rng(0)
     fitted = (measured("estimation", 0.4, rng), measured("estimation", 1.0, rng))
