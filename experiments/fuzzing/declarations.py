@@ -112,7 +112,8 @@ def _expression(tree: Any, depth: int) -> Any:
         return tree
     sign, *parts = tree
     made = [_expression(one, depth + 1) for one in parts]
-    return _applied(sign, made)
+    # Of a mapping, sympy would run the texts.
+    return _applied(sign, made) if not any(isinstance(one, dict) for one in made) else tree
 
 
 def _applied(sign: Any, parts: list[Any]) -> Any:

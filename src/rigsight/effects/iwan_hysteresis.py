@@ -5,10 +5,11 @@ Equation
 ``spring torque = a k x + (1 - a) k sum_i w_i z_i``,  ``z_i' = x'`` within ``-s_i <= z_i <= s_i`` (held at the ends),
 ``s_i = x_s 10^(-2.7 (11 - 2 i) / 12)``, i = 0 to 5,  ``w_i = s_i^q / sum_j s_j^q``
 
-===  ===================================================================================== a    ratio of the post-yield stiffness
-to k, 0 to 1; the effect vanishes at 1 x_s  deflection at which (nearly) all elements slip q    which elements are stiff: below 0
-those that slip early, above 0 those that slip late ===
-=====================================================================================
+===  ======================================================================================
+a    ratio of the post-yield stiffness to k, 0 to 1; the effect vanishes at 1
+x_s  deflection at which (nearly) all elements slip
+q    which elements are stiff: below 0 those that slip early, above 0 those that slip late
+===  ======================================================================================
 
 k is the stiffness at very small motion, where nothing slips.
 

@@ -4,9 +4,10 @@ Equation
 --------
 ``drive = u`` limited from above to ``u_s - c_u x'`` and from below to ``-u_s - c_u x'``
 
-===  =============================================================================================== u_s  largest drive input at
-standstill (stall); the effect vanishes where it is beyond all inputs c_u  drive input that is lost per speed (back-EMF); ``u_s /
-c_u`` is the no-load speed ===  ===============================================================================================
+===  ==================================================================================================
+u_s  largest drive input at standstill (stall); the effect vanishes where it is beyond all inputs
+c_u  drive input that is lost per speed (back-EMF); ``u_s / c_u`` is the no-load speed
+===  ==================================================================================================
 
 Applies to motors under current or torque control whose supply voltage is used up by back-EMF, and to hydraulic drives at full
 flow. At c_u = 0 this is input saturation. The back-EMF of a voltage-driven motor reduces the torque at every input; that is the
@@ -55,6 +56,9 @@ SPEED_LIMIT = Effect(
     drive=u - beyond(u + c_u * v, u_s),
     starts=(
         *(Start({"u_s": reach * input_size, "c_u": 0.5 * input_size / v_size}) for reach in (0.9, 1.8)),
-        Start({"u_s": u_max, "c_u": 0.2 * u_max / v_size}, parent="input_saturation"),
+        *(
+            Start({"u_s": u_max, "c_u": lost * u_max / v_size}, parent="input_saturation")
+            for lost in (0.2, 0.0)
+        ),
     ),
 )

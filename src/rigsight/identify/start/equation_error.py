@@ -152,7 +152,8 @@ def _weighted_solution(
         normal += np.real(weighted.conj().T @ weighted)
         right += np.real(weighted.conj().T @ goal)
         energy += float(np.sum(np.abs(goal) ** 2))
-    size = np.sqrt(np.diag(normal)) + 1e-300
+    # A term that is zero in all records, such as a stop that is never reached, has no scale, and gets no coefficient.
+    size = np.sqrt(np.where(np.diag(normal) > 0.0, np.diag(normal), 1.0))
     scaled = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-14)[0]
     solution = scaled / size
     return solution, float(np.sqrt(max(energy - float(solution @ right), 0.0)))
