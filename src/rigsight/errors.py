@@ -59,13 +59,7 @@ def nearest(name: str, allowed: Iterable[str]) -> str:
 
 
 def check_option(what: str, value: str, allowed: Iterable[str]) -> str:
-    """Return `value` if it is one of `allowed`.
-
-    Raises
-    ------
-    InputError
-        Naming what was got, the nearest allowed value and all allowed values.
-    """
+    """Return `value` if it is one of `allowed`."""
     options = sorted(allowed)
     if value in options:
         return value
@@ -74,13 +68,7 @@ def check_option(what: str, value: str, allowed: Iterable[str]) -> str:
 
 
 def check_in_range(what: str, value: Any, lower: float, upper: float, unit: str = "") -> float:
-    """Return `value` as a float if it lies in [lower, upper].
-
-    Raises
-    ------
-    InputError
-        Naming the range and what was got; NaN and non-numbers are outside every range.
-    """
+    """Return `value` as a float if it lies in [lower, upper]."""
     try:
         number = float(value)
     except (TypeError, ValueError):

@@ -14,61 +14,30 @@ from rigsight.errors import InputError, check_in_range, nearest
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a model.
+    """One number of a model."""
 
-    Attributes
-    ----------
-    name
-        Identifier, the symbol of the equations (``k_c``).
-    unit
-        SI unit as text (``"N m/rad"``), ``"1"`` if dimensionless.
-    description
-        What the number means, one line.
-    lower, upper
-        Physically admissible range. That the simulation stays finite is checked over `search`.
-    null
-        Value at which the effect that owns the parameter vanishes; None if another of its parameters does that.
-    default
-        Value used when none is given; a fit leaves a parameter with ``fitted=False`` there.
-    dimension
-        Product of powers of base quantities (`rigsight.units`); gives unit and characteristic size on any rig.
-    starts
-        Start values for a search, in characteristic units.
-    search
-        Range that a search explores, in characteristic units, inside [lower, upper].
-    logarithmic
-        True for positive quantities that are searched over decades.
-    fitted
-        False for a redundant or purely conventional number that no record can determine. A fit leaves it at its first start, if
-        it has one, else at its default.
-    """
-
-    name: str
-    description: str
+    name: str  # identifier, the symbol of the equations (``k_c``)
+    description: str  # what the number means, one line
+    # Product of powers of base quantities (`rigsight.units`); gives unit and characteristic size on any rig.
     dimension: str = ""
-    unit: str = ""
+    unit: str = ""  # SI unit as text (``"N m/rad"``), ``"1"`` if dimensionless
+    # Physically admissible range. That the simulation stays finite is checked over `search`.
     lower: float = -math.inf
     upper: float = math.inf
+    # Value at which the effect that owns the parameter vanishes; None if another of its parameters does that.
     null: float | None = None
+    # Value used when none is given; a fit leaves a parameter with ``fitted=False`` there.
     default: float | None = None
-    starts: tuple[float, ...] = ()
+    starts: tuple[float, ...] = ()  # start values for a search, in characteristic units
+    # Range that a search explores, in characteristic units, inside [lower, upper].
     search: tuple[float, float] = (-math.inf, math.inf)
-    logarithmic: bool = False
+    logarithmic: bool = False  # true for positive quantities that are searched over decades
+    # False for a redundant or purely conventional number that no record can determine. A fit leaves it at its
+    # first start, if it has one, else at its default.
     fitted: bool = True
 
     def held_at(self, size: float) -> float:
-        """Return where a fit leaves a number that it does not move.
-
-        Parameters
-        ----------
-        size
-            Characteristic size of the number, see `rigsight.units.characteristic_value`.
-
-        Raises
-        ------
-        ValueError
-            If it has neither a start nor a default.
-        """
+        """Return where a fit leaves a number that it does not move."""
         if self.starts:
             return self.starts[0] * size
         if self.default is None:
@@ -76,13 +45,7 @@ class Parameter:
         return self.default
 
     def check(self, value: float) -> float:
-        """Return `value` as a float.
-
-        Raises
-        ------
-        InputError
-            If it lies outside the admissible range.
-        """
+        """Return `value` as a float."""
         return check_in_range(f"Parameter '{self.name}'", value, self.lower, self.upper, self.unit)
 
 
@@ -95,13 +58,7 @@ class ParameterSet:
 
     @classmethod
     def from_mapping(cls, parameters: Iterable[Parameter], values: Mapping[str, float]) -> ParameterSet:
-        """Order `values` as `parameters` are.
-
-        Raises
-        ------
-        InputError
-            Listing every missing and every unknown name, or a value outside its range.
-        """
+        """Order `values` as `parameters` are."""
         parameters = tuple(parameters)
         names = [parameter.name for parameter in parameters]
         missing = [name for name in names if name not in values]
@@ -127,13 +84,7 @@ class ParameterSet:
         return dict(zip(self.names, self.values, strict=True))
 
     def replace(self, **values: float) -> ParameterSet:
-        """Return a copy with some values changed.
-
-        Raises
-        ------
-        InputError
-            If a name is unknown or a value is out of range.
-        """
+        """Return a copy with some values changed."""
         return ParameterSet.from_mapping(self.parameters, {**self.to_mapping(), **values})
 
     def __getitem__(self, name: str) -> float:

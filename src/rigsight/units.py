@@ -26,20 +26,7 @@ def parse_dimension(dimension: str) -> dict[str, int]:
 
 
 def unit_text(dimension: str, units: Mapping[str, str]) -> str:
-    """Return the unit of a dimension, e.g. ``"N m/rad^3"`` for ``"force x^-3"``.
-
-    Parameters
-    ----------
-    dimension
-        Product of powers of base quantities, see `parse_dimension`.
-    units
-        Unit of each base quantity, e.g. ``{"force": "N m", "x": "rad"}``.
-
-    Raises
-    ------
-    KeyError
-        If a base quantity has no unit.
-    """
+    """Return the unit of a dimension, e.g. ``"N m/rad^3"`` for ``"force x^-3"``."""
     above: list[str] = []
     below: list[str] = []
     for base, exponent in parse_dimension(dimension).items():
@@ -56,15 +43,7 @@ def unit_text(dimension: str, units: Mapping[str, str]) -> str:
 
 
 def at_place(dimension: str, place: str) -> str:
-    """Return a dimension whose base quantities are those at a place: ``"force@shaft x@shaft^-1"``.
-
-    Parameters
-    ----------
-    dimension
-        Product of powers of base quantities, see `parse_dimension`.
-    place
-        Name of a joint, drive or sensor.
-    """
+    """Return a dimension whose base quantities are those at a place: ``"force@shaft x@shaft^-1"``."""
     return " ".join(
         f"{base}@{place}^{exponent}" if exponent != 1 else f"{base}@{place}"
         for base, exponent in parse_dimension(dimension).items()
@@ -77,15 +56,7 @@ def size_of(name: str) -> str:
 
 
 def characteristic_value(dimension: str, scales: Mapping[str, float]) -> float:
-    """Return the size that a quantity of this dimension naturally has in a record.
-
-    Parameters
-    ----------
-    dimension
-        Product of powers of base quantities, see `parse_dimension`.
-    scales
-        Size of each base quantity in the record (peak displacement, peak drive force, ...).
-    """
+    """Return the size that a quantity of this dimension naturally has in a record."""
     value = 1.0
     for base, exponent in parse_dimension(dimension).items():
         value *= float(scales[base]) ** exponent

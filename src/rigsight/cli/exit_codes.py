@@ -34,20 +34,7 @@ GOES_ON = f"{_NOTHING}; the same command continues from there"
 
 @contextlib.contextmanager
 def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
-    """Map errors of a command to one message on stderr and an exit code.
-
-    Parameters
-    ----------
-    debug
-        If True, errors pass with their traceback.
-    left
-        What an interruption leaves behind, for its message.
-
-    Raises
-    ------
-    SystemExit
-        With the exit code, after an error.
-    """
+    """Map errors of a command to one message on stderr and an exit code."""
     if debug:
         yield
         return
@@ -121,13 +108,7 @@ def _leave_defect(error: Exception) -> NoReturn:
 
 @contextlib.contextmanager
 def report_output_errors() -> Iterator[None]:
-    """Map errors outside `report_errors`, while a finished command prints its results, to a message and an exit code.
-
-    Raises
-    ------
-    SystemExit
-        After an error.
-    """
+    """Map errors outside `report_errors`, while a finished command prints its results, to a message and an exit code."""
     try:
         yield
         if sys.stdout is not None:
@@ -177,13 +158,7 @@ def _forget_output() -> None:
 
 
 def leave(message: str, code: int, is_of_the_machine: bool = False) -> NoReturn:
-    """Print on stderr why the command ends, and end it.
-
-    Raises
-    ------
-    SystemExit
-        Always, with the exit code.
-    """
+    """Print on stderr why the command ends, and end it."""
     with contextlib.suppress(OSError):
         typer.echo(f"rigsight: {message}", err=True)
     raise CommandExit(code, is_of_the_machine)

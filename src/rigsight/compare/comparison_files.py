@@ -18,15 +18,7 @@ _HEAD = (
 
 
 def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[str, Any]:
-    """Return the content of ``comparison.json``.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    figures
-        File -> what it shows.
-    """
+    """Return the content of ``comparison.json``."""
     overall = comparison.overall()
     return {
         "schema_version": SCHEMA_VERSION,

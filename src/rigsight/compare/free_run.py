@@ -27,45 +27,20 @@ _STATE_ACCURACY = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class FreeRun:
-    """A model on a record.
+    """A model on a record."""
 
-    Attributes
-    ----------
-    simulated
-        The whole record with simulated outputs, from the estimated first state.
-    estimated
-        True if the initial states were fitted; False where the fixed steps of a fit cannot follow the model, so that the states
-        are those guessed from the first samples.
-    nrmse
-        Output -> RMS(measured - simulated) / RMS(measured - mean), over all windows, each from its own state.
-    """
-
-    simulated: Record
+    simulated: Record  # the whole record with simulated outputs, from the estimated first state
+    # True if the initial states were fitted; False where the fixed steps of a fit cannot follow the model, so
+    # that the states are those guessed from the first samples.
     estimated: bool
+    # Output -> RMS(measured - simulated) / RMS(measured - mean), over all windows, each from its own state.
     nrmse: dict[str, float]
 
 
 def free_run(
     model: Model, record: Record, windows: Sequence[Record], output_noise: Mapping[str, float]
 ) -> FreeRun:
-    """Simulate a record and score it.
-
-    Parameters
-    ----------
-    model
-        The model; the record's hold is used.
-    record
-        A measured record.
-    windows
-        Its parts with their own initial states; the record itself where it is run as a whole.
-    output_noise
-        Standard deviation of each output's noise, by which the outputs are weighed when states are estimated.
-
-    Raises
-    ------
-    SimulationError
-        If the motion leaves the range of numbers or the model is too stiff.
-    """
+    """Simulate a record and score it."""
     structure, rig = model.structure, model.structure.rig
     scales = characteristic_scales(rig, windows, model.values)
     found = GreyBoxFit(structure, windows, scales, output_noise, _STATE_ACCURACY).fit(

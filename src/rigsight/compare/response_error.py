@@ -116,17 +116,7 @@ def signal_paths(rig: Rig) -> tuple[SignalPath, ...]:
 def measured_responses(
     record: Record, paths: tuple[SignalPath, ...], method: Method
 ) -> tuple[dict[str, FrequencyResponse], list[str]]:
-    """Return the response of each path by its name, at the lines that stand out of their noise, and what is in the way.
-
-    Parameters
-    ----------
-    record
-        A measured record; a step, or one that lacks the response, has none.
-    paths
-        Paths of its rig; a path behind the first is read where the first stands out, since its source drowns elsewhere.
-    method
-        Estimator.
-    """
+    """Return the response of each path by its name, at the lines that stand out of their noise, and what is in the way."""
     found: dict[str, FrequencyResponse] = {}
     problems: list[str] = []
     if record.kind == "step":
@@ -194,13 +184,7 @@ def _measured(record: Record, path: SignalPath, method: Method) -> FrequencyResp
 def simulated_response(
     simulated: Record, path: SignalPath, method: Method, measured: FrequencyResponse
 ) -> FrequencyResponse:
-    """Return the response of a simulated record by the estimator of the measured one, at the lines of that.
-
-    Raises
-    ------
-    InputError
-        If the simulation does not excite any of these lines, or the estimator cannot read it.
-    """
+    """Return the response of a simulated record by the estimator of the measured one, at the lines of that."""
     whole = _response(simulated, path, method, 0.0, measured.omega)
     return whole.at(among(whole.omega, measured.omega), "of those measured")
 

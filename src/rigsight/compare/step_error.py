@@ -57,15 +57,7 @@ class StepWindow:
 
 
 def stepping_input(record: Record, sources: Sequence[str]) -> str:
-    """Return the input that steps first; the first of all where none moves.
-
-    Parameters
-    ----------
-    record
-        A record whose input steps; the others may be measured, and their noise is no step.
-    sources
-        Names of its inputs, at least one.
-    """
+    """Return the input that steps first; the first of all where none moves."""
     moving = [name for name in sources if not is_constant(record[name])]
     jumping = [name for name in moving if _exceeds_noise(record[name])]
     return min(jumping or moving, key=lambda name: _first_jump(record[name]), default=sources[0])

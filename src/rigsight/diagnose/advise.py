@@ -33,23 +33,16 @@ class _Experiment:
 
 @dataclass(frozen=True)
 class Advice:
-    """The experiment that would distinguish a rival from the named effects.
+    """The experiment that would distinguish a rival from the named effects."""
 
-    Attributes
-    ----------
-    rival
-        Names of the rival's effects.
-    waveform, source, amplitude, band
-        Waveform of which input: amplitude in the unit of the input, band [rad/s] where the waveform has one.
-    output, separation
-        Where the two differ most, and the RMS difference of their predictions there in standard deviations of the noise.
-    """
-
-    rival: tuple[str, ...]
+    rival: tuple[str, ...]  # names of the rival's effects
+    # Waveform of which input: amplitude in the unit of the input, band [rad/s] where the waveform has one.
     waveform: str
     source: str
     amplitude: float
     band: tuple[float, float] | None
+    # Where the two differ most, and the RMS difference of their predictions there in standard deviations of
+    # the noise.
     output: str
     separation: float
 
@@ -61,17 +54,6 @@ def advise(
 
     The separation is the RMS difference of the two predictions, in standard deviations of the noise, at the output where it is
     largest. Both models keep their fitted parameters, so that it is an upper bound: refitting may reduce it.
-
-    Parameters
-    ----------
-    context
-        Records and scales.
-    chosen
-        The named model.
-    rivals
-        The models that the records cannot distinguish from it.
-    noise
-        Noise floor of each output.
     """
     found = []
     menu = list(_menu(context))

@@ -37,48 +37,27 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class Examination:
-    """All models, fitted and scored on the same records.
+    """All models, fitted and scored on the same records."""
 
-    Attributes
-    ----------
-    floors
-        Noise floor of each output.
-    context
-        Records, scales and noise.
-    windowing
-        How records were cut.
-    before, reidentified
-        The given simulation, and its equations with refitted parameters.
-    ranking
-        The candidates.
-    judgement
-        The verdict.
-    quality
-        Quality of the data.
-    imitations
-        Pairs with a low error that do not compete, because other laws fit equally well.
-    places
-        Share of the gap that a push explains, by place; empty on a rig with one motion.
-    adequacy
-        Whether the residual of the diagnosed model is correlated with anything; None where that model could not be scored.
-    doubts
-        Implausible parameters of the diagnosed model.
-    gap_at
-        For an unknown cause the joint, drive or sensor whose signals correlate most with the gap; empty where none is known.
-    """
-
-    floors: tuple[NoiseFloor, ...]
-    context: FitContext
-    windowing: Windowing
+    floors: tuple[NoiseFloor, ...]  # noise floor of each output
+    context: FitContext  # records, scales and noise
+    windowing: Windowing  # how records were cut
+    # The given simulation, and its equations with refitted parameters.
     before: Scored
     reidentified: Scored
-    ranking: Ranking
-    judgement: Judgement
-    quality: DataQuality
+    ranking: Ranking  # the candidates
+    judgement: Judgement  # the verdict
+    quality: DataQuality  # quality of the data
+    # Pairs with a low error that do not compete, because other laws fit equally well.
     imitations: tuple[Scored, ...] = ()
+    # Share of the gap that a push explains, by place; empty on a rig with one motion.
     places: tuple[SuspectedPlace, ...] = ()
+    # Whether the residual of the diagnosed model is correlated with anything; None where that model could not
+    # be scored.
     adequacy: Adequacy | None = None
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # implausible parameters of the diagnosed model
+    # For an unknown cause the joint, drive or sensor whose signals correlate most with the gap; empty where
+    # none is known.
     gap_at: str = ""
 
 
@@ -92,28 +71,7 @@ def examine(
     memory: FitMemory | None,
     at_rest: bool = True,
 ) -> Examination:
-    """Fit the given simulation, its equations and every candidate; rank and judge them.
-
-    Parameters
-    ----------
-    campaign
-        Records and the given simulation.
-    effects
-        Candidates.
-    rng
-        Source of the resampling behind probabilities.
-    n_jobs, say, prepare, memory
-        As of `diagnose`.
-    at_rest
-        As of `noise_floors`.
-
-    Raises
-    ------
-    InputError
-        If the given simulation cannot be run.
-    SimulationError
-        If the rig's own equations cannot be simulated near the records.
-    """
+    """Fit the given simulation, its equations and every candidate; rank and judge them."""
     floors, windowing = _floors(campaign, n_jobs, at_rest)
     say("noise floor")
     noise = {floor.output: floor.std for floor in floors}

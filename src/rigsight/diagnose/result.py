@@ -38,26 +38,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class OutputGap:
-    """Gap budget of one output on the validation records, as NRMSE = RMS(measured - simulated) / RMS(measured - mean).
+    """Gap budget of one output on the validation records, as NRMSE = RMS(measured - simulated) / RMS(measured - mean)."""
 
-    Attributes
-    ----------
-    before
-        The simulation as given; what was not given is identified.
-    reidentified
-        The same equations with refitted parameters.
-    after
-        With the effects of the verdict added.
-    noise_floor
-        Error of a perfect model.
-    intervals
-        95 % limits by stage and of ``"closed"``, see `quantify.gap_intervals`.
-    """
-
-    before: float
-    reidentified: float
-    after: float
-    noise_floor: float
+    before: float  # the simulation as given; what was not given is identified
+    reidentified: float  # the same equations with refitted parameters
+    after: float  # with the effects of the verdict added
+    noise_floor: float  # error of a perfect model
+    # 95 % limits by stage and of ``"closed"``, see `quantify.gap_intervals`.
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property

@@ -35,24 +35,13 @@ _FULL = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One polished support with its held-out score.
+    """One polished support with its held-out score."""
 
-    Attributes
-    ----------
-    support
-        Names of the effects.
-    fit
-        Output-error fit to the estimation records.
-    error_over_noise
-        RMS of the first output's held-out free-run error in units of the noise floor.
-    residuals
-        Held-out errors of the first output in units of the noise floor, all records one after the other; empty if a rough
-        score was sufficient.
-    """
-
-    support: Support
-    fit: FitResult
-    error_over_noise: float
+    support: Support  # names of the effects
+    fit: FitResult  # output-error fit to the estimation records
+    error_over_noise: float  # RMS of the first output's held-out free-run error in units of the noise floor
+    # Held-out errors of the first output in units of the noise floor, all records one after the other; empty
+    # if a rough score was sufficient.
     residuals: NDArray[np.float64]
 
     @property
@@ -63,27 +52,15 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A support and the start of its fit.
+    """A support and the start of its fit."""
 
-    Attributes
-    ----------
-    support
-        Names of the effects.
-    release
-        Parameters that are not held at their special values.
-    start
-        Start values; None for those of the regression.
-    left_out
-        Rig parameters that are held at their start values.
-    to_beat
-        Cost of the fit of the same terms, if they have been scored already; infinite if that equation has other parameters. A
-        new fit whose cost is not lower, or much higher than the best, is not scored. None if they have not been scored.
-    """
-
-    support: Support
-    release: Release = frozenset()
-    start: Mapping[str, float] | None = None
-    left_out: Support = frozenset()
+    support: Support  # names of the effects
+    release: Release = frozenset()  # parameters that are not held at their special values
+    start: Mapping[str, float] | None = None  # start values; None for those of the regression
+    left_out: Support = frozenset()  # rig parameters that are held at their start values
+    # Cost of the fit of the same terms, if they have been scored already; infinite if that equation has other
+    # parameters. A new fit whose cost is not lower, or much higher than the best, is not scored. None if they
+    # have not been scored.
     to_beat: float | None = None
 
     @property
@@ -121,43 +98,24 @@ class _RoughTrial:
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """Data and settings with which every support is polished and scored.
+    """Data and settings with which every support is polished and scored."""
 
-    Attributes
-    ----------
-    rig
-        The rig, reduced to its first output.
-    estimation, held_out
-        Records to fit and records to score, of the first output alone.
-    values
-        Constants, and linear parameters as start values.
-    scales, noise
-        Size of each base quantity, noise floor of each output.
-    held
-        Parameters of the rig that are not fitted.
-    candidates
-        The library, by name.
-    projected
-        The regression.
-    own_terms
-        Columns of the rig's own terms that compete (full form), by parameter.
-    threads
-        Threads that fit supports, and the records of a fit, in parallel.
-    trials
-        The supports polished so far.
-    """
-
-    rig: Rig
+    rig: Rig  # the rig, reduced to its first output
+    # Records to fit and records to score, of the first output alone.
     estimation: tuple[Record, ...]
     held_out: tuple[Record, ...]
-    values: Mapping[str, float]
+    values: Mapping[str, float]  # constants, and linear parameters as start values
+    # Size of each base quantity, noise floor of each output.
     scales: Mapping[str, float]
     noise: Mapping[str, float]
-    held: frozenset[str]
-    candidates: Mapping[str, Candidate]
-    projected: Projected
+    held: frozenset[str]  # parameters of the rig that are not fitted
+    candidates: Mapping[str, Candidate]  # the library, by name
+    projected: Projected  # the regression
+    # Columns of the rig's own terms that compete (full form), by parameter.
     own_terms: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    # Threads that fit supports, and the records of a fit, in parallel.
     threads: IdleThreads = field(default_factory=IdleThreads)
+    # The supports polished so far.
     trials: dict[tuple[Support, Release, Support], Trial] = field(default_factory=dict)
 
     @property
@@ -212,15 +170,7 @@ class Bench:
         return self.trials_of([attempt])[0]
 
     def trials_of(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
-        """Polish supports in parallel and score them; an attempt that was made before is not repeated.
-
-        Parameters
-        ----------
-        attempts
-            Supports with the start of each fit.
-        progress
-            Called with every support that is polished.
-        """
+        """Polish supports in parallel and score them; an attempt that was made before is not repeated."""
         new = list({attempt.key: attempt for attempt in attempts if attempt.key not in self.trials}.values())
         polished = self._polished(new, progress)
         self.trials.update({attempt.key: trial for attempt, trial in zip(new, polished, strict=True)})

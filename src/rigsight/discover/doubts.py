@@ -32,19 +32,7 @@ _NEAR = 1.5
 
 
 def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, same: Sequence[str]) -> str:
-    """Return the reasons to doubt a kept term; empty if there are none.
-
-    Parameters
-    ----------
-    effect
-        The term.
-    own
-        Its coefficients.
-    inclusion
-        Its inclusion probability.
-    same
-        Terms that the records do not distinguish from it.
-    """
+    """Return the reasons to doubt a kept term; empty if there are none."""
     found = []
     for name, coefficient in own.items():
         # Beside another effect with such a parameter its name is qualified.
@@ -131,13 +119,7 @@ def warnings_of(
 
 
 def still_missing(error_over_noise: float) -> list[str]:
-    """Return a warning about an error that the noise does not explain; empty if it does.
-
-    Parameters
-    ----------
-    error_over_noise
-        RMS of the held-out free-run error in units of the noise floor.
-    """
+    """Return a warning about an error that the noise does not explain; empty if it does."""
     if error_over_noise <= _FLOOR:
         return []
     return [

@@ -15,13 +15,7 @@ _HELD_BACK = 0.3
 
 
 def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
-    """Return the records to fit, those to score, and a sentence on the choice of the latter (empty for validation records).
-
-    Raises
-    ------
-    InputError
-        If there is no estimation record, or one is too short.
-    """
+    """Return the records to fit, those to score, and a sentence on the choice of the latter (empty for validation records)."""
     estimation = tuple(r for r in data.records if r.role == "estimation")
     validation = tuple(r for r in data.records if r.role == "validation")
     if not estimation:

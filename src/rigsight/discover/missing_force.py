@@ -30,24 +30,13 @@ _WORTH_TELLING = 0.02
 
 @dataclass(frozen=True)
 class ShapeTerm:
-    """A term of the missing force.
+    """A term of the missing force."""
 
-    Attributes
-    ----------
-    term
-        Its expression without the coefficient, in displacement x and velocity v about the rest position.
-    coefficient
-        Of the resisting force [unit].
-    unit
-        Of the coefficient.
-    inclusion
-        Share of resampled data sets in which sparse regression selects the term.
-    """
-
+    # Its expression without the coefficient, in displacement x and velocity v about the rest position.
     term: str
-    coefficient: float
-    unit: str
-    inclusion: float
+    coefficient: float  # of the resisting force [unit]
+    unit: str  # of the coefficient
+    inclusion: float  # share of resampled data sets in which sparse regression selects the term
 
 
 @dataclass(frozen=True)

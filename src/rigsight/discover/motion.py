@@ -87,19 +87,7 @@ class Carrier:
 
 
 def motion_of(rig: Rig, record: Record, values: Mapping[str, float], noise: float) -> Motion:
-    """Return the smoothed motion of a record.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    record
-        Contains the input and the first output.
-    values
-        Constants and linear parameters by name.
-    noise
-        Standard deviation of the first output's noise.
-    """
+    """Return the smoothed motion of a record."""
     source, response = record[rig.inputs[0].name], record[rig.outputs[0].name]
     if not rig.is_driven:
         x, v = smooth_motion(source, record.dt)

@@ -27,24 +27,7 @@ def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> 
 
 
 def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], rows: Rows) -> Projected:
-    """Return the regression of acceleration (or force, if the motion is prescribed) on the rig's own terms.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    has_stiffness
-        False for an axis without a spring.
-    motions
-        Of all records.
-    rows
-        The form of the rows.
-
-    Raises
-    ------
-    InputError
-        If the records are too short: they give no more rows than there are terms.
-    """
+    """Return the regression of acceleration (or force, if the motion is prescribed) on the rig's own terms."""
     order = 2 if rig.is_driven else 0
     rests = all(is_constant(motion.u) for motion in motions)
     blocks, targets = [], []

@@ -32,21 +32,11 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Projected:
-    """A regression with some columns projected out of the target and of all other columns.
+    """A regression with some columns projected out of the target and of all other columns."""
 
-    Attributes
-    ----------
-    base
-        Columns that are always included, shape (n_rows, n_base).
-    target
-        Shape (n_rows,).
-    independent
-        Number of independent rows; less than n_rows, because windows overlap.
-    """
-
-    base: NDArray[np.float64]
-    target: NDArray[np.float64]
-    independent: float
+    base: NDArray[np.float64]  # columns that are always included, shape (n_rows, n_base)
+    target: NDArray[np.float64]  # shape (n_rows,)
+    independent: float  # number of independent rows; less than n_rows, because windows overlap
 
     @cached_property
     def _directions(self) -> NDArray[np.float64]:
@@ -85,13 +75,6 @@ def sparse_path(projected: Projected, columns: NDArray[np.float64]) -> list[tupl
     """Return supports of every size, smallest first: those that remain when pysindy's SSR drops term after term.
 
     The supports of FROLS, which adds terms instead, are included; the two differ if columns are similar.
-
-    Parameters
-    ----------
-    projected
-        The target, and the columns that do not compete.
-    columns
-        Shape (n_rows, n_terms).
     """
     matrix, target = _compressed(projected.rest_of(columns), projected.rest)
     paths = [_shrinking(matrix, target), _growing(matrix, target)]

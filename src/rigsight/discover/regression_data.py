@@ -51,11 +51,5 @@ class RegressionData:
 
 
 def has_stiffness(campaign: Campaign) -> bool:
-    """Return False for one motion that is given without a spring.
-
-    Parameters
-    ----------
-    campaign
-        The campaign.
-    """
+    """Return False for one motion that is given without a spring."""
     return campaign.absent_spring is None

@@ -38,33 +38,15 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Term:
-    """A term of the equation, or one that was offered but not selected.
+    """A term of the equation, or one that was offered but not selected."""
 
-    Attributes
-    ----------
-    name
-        Name of the effect.
-    summary
-        Its description in one sentence.
-    kept
-        True if it is part of the equation.
-    inclusion
-        Share of resampled data sets in which sparse regression selects the term.
-    coefficients
-        Its parameters; empty if it is not kept.
-    doubt
-        Reasons to doubt the term; empty if there are none.
-    where
-        Joint at which it acts; empty for a rig with one joint.
-    """
-
-    name: str
-    summary: str
-    kept: bool
-    inclusion: float
-    coefficients: Mapping[str, Coefficient]
-    doubt: str = ""
-    where: str = ""
+    name: str  # name of the effect
+    summary: str  # its description in one sentence
+    kept: bool  # true if it is part of the equation
+    inclusion: float  # share of resampled data sets in which sparse regression selects the term
+    coefficients: Mapping[str, Coefficient]  # its parameters; empty if it is not kept
+    doubt: str = ""  # reasons to doubt the term; empty if there are none
+    where: str = ""  # joint at which it acts; empty for a rig with one joint
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -81,23 +63,12 @@ class Term:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A support that was polished and scored.
+    """A support that was polished and scored."""
 
-    Attributes
-    ----------
-    terms
-        Names of the effects.
-    n_parameters
-        Number of fitted parameters.
-    held_out
-        Free-run error on the held-out records in units of the noise floor.
-    aic, bic
-        Information criteria of that error with the number of independent samples.
-    """
-
-    terms: tuple[str, ...]
-    n_parameters: int
-    held_out: float
+    terms: tuple[str, ...]  # names of the effects
+    n_parameters: int  # number of fitted parameters
+    held_out: float  # free-run error on the held-out records in units of the noise floor
+    # Information criteria of that error with the number of independent samples.
     aic: float
     bic: float
 

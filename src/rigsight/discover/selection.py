@@ -67,41 +67,16 @@ def criterion(trial: Trial, independent: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The chosen support, and all that were tried.
+    """The chosen support, and all that were tried."""
 
-    Attributes
-    ----------
-    best
-        The chosen support.
-    trials
-        All polished supports, best first.
-    criteria
-        Information criterion of each.
-    independent
-        Number of independent samples of the held-out errors.
-    """
-
-    best: Trial
-    trials: tuple[Trial, ...]
-    criteria: tuple[float, ...]
-    independent: float
+    best: Trial  # the chosen support
+    trials: tuple[Trial, ...]  # all polished supports, best first
+    criteria: tuple[float, ...]  # information criterion of each
+    independent: float  # number of independent samples of the held-out errors
 
 
 def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
-    """Search for the support with the lowest held-out criterion: seeds from the regression, then steps of one term.
-
-    Parameters
-    ----------
-    bench
-        Library, records and scales.
-    progress
-        Called with the terms of each support that has been polished.
-
-    Raises
-    ------
-    SimulationError
-        If no equation can be simulated on the held-out records.
-    """
+    """Search for the support with the lowest held-out criterion: seeds from the regression, then steps of one term."""
 
     def tried(supports: Sequence[Support]) -> list[Trial]:
         trials = bench.trials_of(

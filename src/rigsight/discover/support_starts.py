@@ -21,35 +21,15 @@ _SMALL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class SupportStarts:
-    """Start values of supports.
-
-    Attributes
-    ----------
-    rig
-        The rig.
-    values
-        Constants, and linear parameters.
-    candidates
-        The library, by name.
-    projected
-        The regression.
-    """
+    """Start values of supports."""
 
     rig: Rig
-    values: Mapping[str, float]
-    candidates: Mapping[str, Candidate]
-    projected: Projected
+    values: Mapping[str, float]  # constants, and linear parameters
+    candidates: Mapping[str, Candidate]  # the library, by name
+    projected: Projected  # the regression
 
     def regressed(self, structure: Structure, support: frozenset[str]) -> dict[str, float]:
-        """Return the values of the regression for a support, in SI.
-
-        Parameters
-        ----------
-        structure
-            Its equations.
-        support
-            Names of its terms.
-        """
+        """Return the values of the regression for a support, in SI."""
         chosen = [self.candidates[name] for name in sorted(support)]
         columns = (
             np.column_stack([c.column for c in chosen])
@@ -69,15 +49,6 @@ class SupportStarts:
 
         The coefficients of the terms that it lacks are zero, so that the fit begins where the shorter one ended. Nonlinear
         parameters of these terms, and the division of a spring into parts with and without memory, come from the regression.
-
-        Parameters
-        ----------
-        structure
-            Equations of the longer support.
-        support
-            Names of its terms.
-        shorter
-            Fit of the shorter one.
         """
         values = self.regressed(structure, support)
         carried = carried_over(shorter.values, shorter.structure, structure)

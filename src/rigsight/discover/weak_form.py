@@ -26,18 +26,12 @@ _LEAST_WIDTH = 11
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Test functions for one sample time.
+    """Test functions for one sample time."""
 
-    Attributes
-    ----------
-    weights
-        Test function and its first two derivatives with respect to time, integration weights included, shape (3, width).
-    step
-        Samples from row to row.
-    """
-
+    # Test function and its first two derivatives with respect to time, integration weights included, shape
+    # (3, width).
     weights: NDArray[np.float64]
-    step: int
+    step: int  # samples from row to row
 
     def against(self, signal: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """Return the integrals of a signal with the test function or one of its derivatives, shape (n_rows,).
@@ -52,18 +46,10 @@ class Windows:
 
 @dataclass(frozen=True)
 class Rows:
-    """How signals of records, each with its own sample time, are turned into rows.
+    """How signals of records, each with its own sample time, are turned into rows."""
 
-    Attributes
-    ----------
-    width
-        Width of the windows [s]; None for point-wise rows.
-    step
-        Samples from row to row of point-wise rows.
-    """
-
-    width: float | None
-    step: int = 1
+    width: float | None  # width of the windows [s]; None for point-wise rows
+    step: int = 1  # samples from row to row of point-wise rows
 
     @classmethod
     def weak(cls, width: float) -> Rows:

@@ -10,18 +10,7 @@ from rigsight.simulate.input_hold import HeldInput, hold_input, together
 
 
 def state_at_rest(exported: Exported) -> tuple[float, ...]:
-    """Return the states at the static equilibrium without input, in order.
-
-    Parameters
-    ----------
-    exported
-        The model.
-
-    Raises
-    ------
-    InputError
-        If the engine's kernels cannot be kept on disk.
-    """
+    """Return the states at the static equilibrium without input, in order."""
     if exported.rest is None:
         return tuple(0.0 for _ in exported.states)
     rest = rest_state(exported.structure, np.array(exported.values), no_input(exported.structure))
@@ -29,11 +18,5 @@ def state_at_rest(exported: Exported) -> tuple[float, ...]:
 
 
 def no_input(structure: Structure) -> HeldInput:
-    """Return inputs that are zero, of one piece.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    """
+    """Return inputs that are zero, of one piece."""
     return together([hold_input(np.zeros(2), 1.0, "foh")] * max(1, len(structure.rig.inputs)))

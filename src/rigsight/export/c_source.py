@@ -171,29 +171,13 @@ _AS_MEASURED = """    {{
 
 
 def macros(name: str) -> frozenset[str]:
-    """Return the macros of a file, which replace even the names of members.
-
-    Parameters
-    ----------
-    name
-        What every name that others see begins with.
-    """
+    """Return the macros of a file, which replace even the names of members."""
     own = "ACCURACY DECLARATIONS DECLARED HISTORY MAIN N_INPUTS N_OUTPUTS N_STATES"
     return _MACROS_OF_HEADERS | {f"{name.upper()}_{word}" for word in own.split()}
 
 
 def c_source(exported: Exported, source: str, name: str) -> str:
-    """Return the text of a C file.
-
-    Parameters
-    ----------
-    exported
-        The model.
-    source
-        The file it comes from.
-    name
-        What every name that others see begins with.
-    """
+    """Return the text of a C file."""
     structure, upper = exported.structure, name.upper()
     equations = KernelEquations(structure)
     delayed, late = structure.delay is not None, structure.first_shown_late is not None

@@ -27,17 +27,7 @@ _SMOOTH = "Its equations are smooth."
 
 
 def control_system(exported: Exported, source: str, name: str) -> str:
-    """Return the text of a Python file that defines ``system``.
-
-    Parameters
-    ----------
-    exported
-        The model; the sticking of dry friction and delays have no place in it.
-    source
-        The file it comes from.
-    name
-        Name of the system.
-    """
+    """Return the text of a Python file that defines ``system``."""
     structure = exported.structure
     inputs = [quantity.name for quantity in exported.inputs]
     unpack = indented(unpacked_parameters(exported, _own_words(exported)))

@@ -91,17 +91,7 @@ def parameter_lines(exported: Exported) -> list[str]:
 
 
 def header_lines(exported: Exported, source: str, *, with_parameters: bool = True) -> list[str]:
-    """Return what stands at the head of every exported file.
-
-    Parameters
-    ----------
-    exported
-        The model.
-    source
-        The file it comes from.
-    with_parameters
-        False where the parameters stand below with their units.
-    """
+    """Return what stands at the head of every exported file."""
     lines = [f"{made_by(source)}; SI units.", "", "Equations:"]
     lines += [f"  {line}" for line in (*equation_lines(exported), *signal_lines(exported))]
     if with_parameters:

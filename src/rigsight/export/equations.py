@@ -36,18 +36,10 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Source:
-    """An input of the rig as an export is fed with it.
+    """An input of the rig as an export is fed with it."""
 
-    Attributes
-    ----------
-    value
-        Its samples.
-    rate
-        Samples of its rate, where it prescribes a motion; else None.
-    """
-
-    value: Quantity
-    rate: Quantity | None
+    value: Quantity  # its samples
+    rate: Quantity | None  # samples of its rate, where it prescribes a motion; else None
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -57,56 +49,32 @@ class Source:
 
 @dataclass(frozen=True)
 class Rest:
-    """What the static equilibrium of one mass at the first input is found with; expressions of parameters.
+    """What the static equilibrium of one mass at the first input is found with; expressions of parameters."""
 
-    Attributes
-    ----------
-    displacement, inertia, stiffness
-        Rest position, inertia and stiffness of the moving mass.
-    damping
-        Name of the damping parameter, raised to the critical value on the way to rest.
-    silenced
-        Names of the parameters of disturbances, zero on the way to rest.
-    """
-
+    # Rest position, inertia and stiffness of the moving mass.
     displacement: sp.Expr
     inertia: sp.Expr
     stiffness: sp.Expr
-    damping: str
-    silenced: tuple[str, ...]
+    damping: str  # name of the damping parameter, raised to the critical value on the way to rest
+    silenced: tuple[str, ...]  # names of the parameters of disturbances, zero on the way to rest
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A model in the form that every target prints.
+    """A model in the form that every target prints."""
 
-    Attributes
-    ----------
-    structure
-        Rig and effects, without those that have vanished.
-    frozen
-        The same with the sign of every kink as a mode that rests between events.
-    hold
-        How the input behaves between its samples.
-    step
-        Longest internal step [s] of a fixed-step integrator.
-    parameters, values
-        The parameters and their numbers.
-    states, sources, outputs
-        The signals.
-    rest
-        How the equilibrium is found; None for an element, which has no motion of its own.
-    """
-
-    structure: Structure
-    frozen: FrozenStructure
-    hold: Hold
-    step: float
+    structure: Structure  # rig and effects, without those that have vanished
+    frozen: FrozenStructure  # the same with the sign of every kink as a mode that rests between events
+    hold: Hold  # how the input behaves between its samples
+    step: float  # longest internal step [s] of a fixed-step integrator
+    # The parameters and their numbers.
     parameters: tuple[Quantity, ...]
     values: tuple[float, ...]
+    # The signals.
     states: tuple[Quantity, ...]
     sources: tuple[Source, ...]
     outputs: tuple[Quantity, ...]
+    # How the equilibrium is found; None for an element, which has no motion of its own.
     rest: Rest | Balance | None
 
     @property
@@ -165,26 +133,7 @@ def _check_delays(structure: Structure) -> None:
 def exported(
     model: Model, hold: Hold, step: float, reserved: Set[str], of_inputs: Set[str] = frozenset()
 ) -> Exported:
-    """Return a model in the form that every target prints.
-
-    Parameters
-    ----------
-    model
-        The model; effects whose parameters have their null values are left out.
-    hold
-        How the input behaves between its samples.
-    step
-        Longest internal step [s].
-    reserved
-        Words that no name can be.
-    of_inputs
-        Words that the name of an input cannot be, either.
-
-    Raises
-    ------
-    InputError
-        If a parameter has no value, or something is late for which no target has a memory.
-    """
+    """Return a model in the form that every target prints."""
     structure, values = without_vanished_effects(model.structure, model.values)
     _check_delays(structure)
     names = _Names(reserved)

@@ -17,37 +17,21 @@ NO_START = "with friction or hysteresis the equilibrium is known only for zero i
 
 @dataclass(frozen=True)
 class Balance:
-    """What is zero at the static equilibrium, of unknown states, inputs and parameters.
+    """What is zero at the static equilibrium, of unknown states, inputs and parameters."""
 
-    Attributes
-    ----------
-    unknown
-        Indices of the states that are sought: all but the velocities and those that the rig's file gives.
-    residuals
-        For each of them what has to vanish at rest.
-    slopes
-        Derivatives of the residuals by the unknown states, row by row.
-    start
-        Expression of parameters of each state that is given, by its index; the others start at 0.
-    remembers
-        True where friction or hysteresis holds what the way of the inputs left: then only that without input is known.
-    """
-
+    # Indices of the states that are sought: all but the velocities and those that the rig's file gives.
     unknown: tuple[int, ...]
-    residuals: tuple[sp.Expr, ...]
-    slopes: tuple[tuple[sp.Expr, ...], ...]
+    residuals: tuple[sp.Expr, ...]  # for each of them what has to vanish at rest
+    slopes: tuple[tuple[sp.Expr, ...], ...]  # derivatives of the residuals by the unknown states, row by row
+    # Expression of parameters of each state that is given, by its index; the others start at 0.
     start: dict[int, sp.Expr]
+    # True where friction or hysteresis holds what the way of the inputs left: then only that without input is
+    # known.
     remembers: bool
 
 
 def balance(structure: Structure) -> Balance | None:
-    """Return what is zero at the equilibrium of a rig, as `rigsight.simulate.equilibrium` has it; None without a state.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    """
+    """Return what is zero at the equilibrium of a rig, as `rigsight.simulate.equilibrium` has it; None without a state."""
     motion, states = structure.tree.motion, structure.states
     if not states:
         return None

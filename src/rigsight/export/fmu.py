@@ -40,26 +40,7 @@ _CONSTANT = "Derivatives of the inputs are not read."
 def fmu(
     exported: Exported, source: str, name: str, *, version: Version = 2, source_only: bool = False
 ) -> bytes:
-    """Return the bytes of an FMU; the same model gives the same bytes with the same compiler.
-
-    Parameters
-    ----------
-    exported
-        The model.
-    source
-        The file it comes from.
-    name
-        Identifier of the model.
-    version
-        Of FMI.
-    source_only
-        True for sources without a binary.
-
-    Raises
-    ------
-    InputError
-        If there is no C compiler, or it fails, or there is no room for its files.
-    """
+    """Return the bytes of an FMU; the same model gives the same bytes with the same compiler."""
     model = c_source(exported, source, name)
     guid = f"{{{uuid.uuid5(_NAMESPACE, model)}}}"
     fragments = {

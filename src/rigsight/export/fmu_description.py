@@ -39,21 +39,7 @@ def needs_constant_step(exported: Exported) -> bool:
 def model_description(
     exported: Exported, source: str, name: str, guid: str, version: Literal[2, 3] = 2
 ) -> str:
-    """Return the text of the description.
-
-    Parameters
-    ----------
-    exported
-        The model.
-    source
-        The file it comes from.
-    name
-        Identifier of the model.
-    guid
-        What ties description and binary together.
-    version
-        Of FMI.
-    """
+    """Return the text of the description."""
     variables = _unique([*_common(exported), *(_of_version_3(exported) if version == 3 else ())])
     root = ET.Element("fmiModelDescription", fmiVersion=f"{version}.0", modelName=name)
     root.set("guid" if version == 2 else "instantiationToken", guid)
@@ -100,13 +86,7 @@ def model_description(
 
 
 def build_description(name: str) -> str:
-    """Return how the sources of an FMI 3.0 FMU are compiled.
-
-    Parameters
-    ----------
-    name
-        Identifier of the model.
-    """
+    """Return how the sources of an FMI 3.0 FMU are compiled."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     build = ET.SubElement(root, "BuildConfiguration", modelIdentifier=name)
     files = ET.SubElement(build, "SourceFileSet", language="C99")

@@ -35,11 +35,6 @@ def internal_step(model: Model) -> float:
 
     It follows from the eigenvalues about the rest position, with every kink to either side: what a stop or a play changes
     is seen, what a smooth nonlinearity does at large motions is not.
-
-    Parameters
-    ----------
-    model
-        The model.
     """
     structure, values = without_vanished_effects(model.structure, model.values)
     if not structure.states:

@@ -13,15 +13,7 @@ _THIN = r"\,"
 
 
 def latex(exported: Exported, source: str) -> str:
-    r"""Return equations as an ``align*`` (package amsmath), and a table of symbols, values and units.
-
-    Parameters
-    ----------
-    exported
-        The model.
-    source
-        The file it comes from.
-    """
+    r"""Return equations as an ``align*`` (package amsmath), and a table of symbols, values and units."""
     shown = shown_equations(exported.structure)
     table = [
         f"  ${latex_name(shown.names[symbol])}$ & ${_number(value)}$ & ${_unit(q.unit)}$ & "

@@ -218,17 +218,7 @@ end
 
 
 def matlab_function(exported: Exported, source: str, name: str) -> str:
-    """Return the text of a function file.
-
-    Parameters
-    ----------
-    exported
-        The model.
-    source
-        The file it comes from.
-    name
-        Name of the function; its file must have the same.
-    """
+    """Return the text of a function file."""
     structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
     constants = {symbol: f"p.{name}" for symbol, name in constant_names(equations).items()}
     names = _names(exported) | constants

@@ -25,17 +25,7 @@ FUNCTIONS = words("Real acos asin atan atan2 cos cosh entry exp log log10 sin si
 
 
 def modelica(exported: Exported, source: str, name: str) -> str:
-    """Return the text of one model without a library.
-
-    Parameters
-    ----------
-    exported
-        The model; the sticking of dry friction has no place in it.
-    source
-        The file it comes from.
-    name
-        Name of the model.
-    """
+    """Return the text of one model without a library."""
     structure, names = exported.structure, exported.names()
     used = {q.name for q in (*exported.parameters, *exported.states, *exported.inputs)}
     declared = [

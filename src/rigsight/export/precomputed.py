@@ -11,23 +11,15 @@ from rigsight.export.equations import Exported
 
 @dataclass(frozen=True)
 class Equations:
-    """What an integrator evaluates.
+    """What an integrator evaluates."""
 
-    Attributes
-    ----------
-    rates, switches, outputs
-        Expressions of states, inputs, modes, parameters and `constants`; an output that shows what dry friction holds with reads
-        the friction's sign, or its multiplier while it sticks.
-    constants
-        Symbol -> the expression of parameters that it stands for.
-    steps, shown_steps
-        What is computed before the rates, and before the outputs, as `Structure.steps`.
-    """
-
+    # Expressions of states, inputs, modes, parameters and `constants`; an output that shows what dry friction
+    # holds with reads the friction's sign, or its multiplier while it sticks.
     rates: tuple[sp.Expr, ...]
     switches: tuple[sp.Expr, ...]
     outputs: tuple[sp.Expr, ...]
-    constants: dict[sp.Symbol, sp.Expr]
+    constants: dict[sp.Symbol, sp.Expr]  # symbol -> the expression of parameters that it stands for
+    # What is computed before the rates, and before the outputs, as `Structure.steps`.
     steps: dict[sp.Symbol, sp.Expr]
     shown_steps: dict[sp.Symbol, sp.Expr]
 
@@ -36,11 +28,6 @@ def equations_of(exported: Exported) -> Equations:
     """Return a model's equations with powers and functions of parameters as symbols.
 
     Sums and products of parameters stay: they cost little, and a reader looks for them.
-
-    Parameters
-    ----------
-    exported
-        The model.
     """
     fixed = set(exported.structure.parameter_symbols)
     found: dict[sp.Expr, sp.Symbol] = {}

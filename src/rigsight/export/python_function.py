@@ -112,15 +112,7 @@ def min_steps(exported: Exported) -> int:
 
 
 def python_function(exported: Exported, source: str) -> str:
-    """Return the text of a Python file with a function ``simulate``.
-
-    Parameters
-    ----------
-    exported
-        The model.
-    source
-        The file it comes from.
-    """
+    """Return the text of a Python file with a function ``simulate``."""
     structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
     own = _own_words_of_equations(exported)
     constants = constant_names(equations)

@@ -21,26 +21,14 @@ def pair_unit(record: Record, source: str, response: str) -> str:
 
 
 def ratio_unit(above: str, below: str) -> str:
-    """Return the unit of a ratio, ``"1"`` where both are dimensionless.
-
-    Parameters
-    ----------
-    above, below
-        Units; an empty one is dimensionless.
-    """
+    """Return the unit of a ratio, ``"1"`` where both are dimensionless."""
     if (below or "1") == "1":
         return above or "1"
     return f"{above or '1'}/({below})" if " " in below else f"{above or '1'}/{below}"
 
 
 def check_alike(records: Sequence[Record], source: str, response: str) -> None:
-    """Check that the records can be averaged.
-
-    Raises
-    ------
-    InputError
-        If there are none, or sample times or units differ.
-    """
+    """Check that the records can be averaged."""
     if not records:
         raise InputError("A frequency response needs at least one record, got none.")
     first = records[0]
@@ -68,15 +56,7 @@ def line_frequencies(n_samples: int, dt: float) -> NDArray[np.float64]:
 
 
 def among(omega: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which frequencies are lines of another spectrum of records of the same length, shape (n_frequencies,).
-
-    Parameters
-    ----------
-    omega
-        Angular frequencies [rad/s], shape (n_frequencies,).
-    wanted
-        Those of the other spectrum, ascending, shape (n_wanted,).
-    """
+    """Return which frequencies are lines of another spectrum of records of the same length, shape (n_frequencies,)."""
     nearest = wanted[np.clip(np.searchsorted(wanted, omega) - np.array([[1], [0]]), 0, wanted.size - 1)]
     return np.asarray(np.min(np.abs(nearest - omega), axis=0) <= 1e-6 * omega)
 
@@ -118,22 +98,6 @@ def excited(
 ) -> NDArray[np.bool_]:
     """Return which frequencies can be estimated, shape (n_frequencies,).
 
-    Parameters
-    ----------
-    omega
-        Angular frequencies [rad/s], shape (n_frequencies,).
-    power
-        Power density of the source, shape (n_frequencies,).
-    band
-        Requested lower and upper limit [rad/s]; None takes all that the source excites.
-    what
-        Names record and source in the message.
-
-    Raises
-    ------
-    InputError
-        If the source is silent, or silent in a part of `band`.
-
     Notes
     -----
     A frequency is silent if its power is 40 dB below the strongest both per rad/s and per octave: neither the falling
@@ -170,25 +134,7 @@ def excited(
 
 
 def check_resolution(resolution: float, duration: float, needed: float, what: str) -> None:
-    """Check that a record is long enough for a resolution.
-
-    Parameters
-    ----------
-    resolution
-        Requested width [rad/s].
-    duration
-        Length of the record [s].
-    needed
-        Spectral lines of the record that must fit into that width.
-    what
-        Names the record in the message.
-
-    Raises
-    ------
-    InputError
-        If it is too short, or the resolution is not a positive number. The message states the necessary length and the
-        possible resolution.
-    """
+    """Check that a record is long enough for a resolution."""
     if not (math.isfinite(resolution) and resolution > 0.0):
         raise InputError(f"A resolution must be a positive number of rad/s, got {resolution!r}.")
     line = 2.0 * math.pi / duration

@@ -12,17 +12,7 @@ _LISTED = 5
 
 
 def closed_loop_notes(records: Sequence[Record], rig: Rig, used: str) -> list[str]:
-    """Return notes on the records that are treated as closed-loop records; empty if none contains a reference.
-
-    Parameters
-    ----------
-    records
-        Records of a campaign.
-    rig
-        Their rig; if one of its own signals is named `reference`, there are no notes.
-    used
-        The use of the reference, in one or more sentences.
-    """
+    """Return notes on the records that are treated as closed-loop records; empty if none contains a reference."""
     own = [signal.name for signal in (*rig.inputs, *rig.outputs)]
     if not signals_beside(own):
         return []

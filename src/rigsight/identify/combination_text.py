@@ -12,30 +12,14 @@ fraction."""
 
 
 def product_text(factors: Sequence[tuple[str, int]]) -> str:
-    """Return a product of powers, as in ``k*m^2/d``.
-
-    Parameters
-    ----------
-    factors
-        Name and power of each.
-    """
+    """Return a product of powers, as in ``k*m^2/d``."""
     above = [_power(text, power) for text, power in factors if power > 0]
     below = [_power(text, -power) for text, power in factors if power < 0]
     return "*".join(above) + "".join(f"/{text}" for text in below)
 
 
 def sum_text(first: str, weight: float, second: str, same_unit: bool) -> str:
-    """Return ``first + weight second``; the weight is left out if it is one and both have the same unit.
-
-    Parameters
-    ----------
-    first, second
-        Names.
-    weight
-        Weight of the second.
-    same_unit
-        Whether both have the same unit.
-    """
+    """Return ``first + weight second``; the weight is left out if it is one and both have the same unit."""
     factor = "" if same_unit and abs(abs(weight) - 1.0) < ONE else f"{abs(weight):.3g} "
     return f"{first} {'-' if weight < 0.0 else '+'} {factor}{second}"
 

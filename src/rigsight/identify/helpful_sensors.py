@@ -25,19 +25,7 @@ def helpful_sensors(
     noise: Mapping[str, float],
     result: FitResult,
 ) -> tuple[str, ...]:
-    """Return a sentence for each unrecorded sensor with which fewer directions of the parameters would be undetermined.
-
-    Parameters
-    ----------
-    structure
-        The rig.
-    records
-        The fitted records.
-    scales, noise
-        As in the fit.
-    result
-        The fit.
-    """
+    """Return a sentence for each unrecorded sensor with which fewer directions of the parameters would be undetermined."""
     lacking = [s.name for s in structure.rig.outputs if not any(s.name in record for record in records)]
     before = free_directions(information(GreyBoxFit(structure, records, scales, noise), result))
     if not lacking or not before:

@@ -41,56 +41,28 @@ _UNCHANGED = 0.005
 
 @dataclass(frozen=True)
 class Combination:
-    """A combination of parameters that the records determine although they do not determine its members.
+    """A combination of parameters that the records determine although they do not determine its members."""
 
-    Attributes
-    ----------
-    text
-        The combination, as in ``J_m/k_t``.
-    members
-        Names of the parameters.
-    value
-        Value of the combination.
-    std
-        Its standard error.
-    unit
-        Unit if it is that of the members, else empty.
-    """
-
-    text: str
-    members: tuple[str, ...]
-    value: float
-    std: float
-    unit: str = ""
+    text: str  # the combination, as in ``J_m/k_t``
+    members: tuple[str, ...]  # names of the parameters
+    value: float  # value of the combination
+    std: float  # its standard error
+    unit: str = ""  # unit if it is that of the members, else empty
 
 
 @dataclass(frozen=True)
 class Identifiability:
-    """Identifiability of parameters from some records.
+    """Identifiability of parameters from some records."""
 
-    Attributes
-    ----------
-    relative_errors
-        Relative standard error by parameter, infinite if nothing is known; relative to its size in the records for a parameter
-        that may be zero.
-    determined
-        Names of the parameters that the records determine.
-    combinations
-        Combinations of the others that the records determine.
-    statements
-        Sentences on parameters that the records do not determine.
-    free_directions
-        Number of independent changes of parameters that leave the outputs within the noise.
-    remedies
-        Sentences on measures with which more parameters would be determined.
-    """
-
+    # Relative standard error by parameter, infinite if nothing is known; relative to its size in the records
+    # for a parameter that may be zero.
     relative_errors: dict[str, float]
-    determined: tuple[str, ...]
-    combinations: tuple[Combination, ...]
-    statements: tuple[str, ...]
+    determined: tuple[str, ...]  # names of the parameters that the records determine
+    combinations: tuple[Combination, ...]  # combinations of the others that the records determine
+    statements: tuple[str, ...]  # sentences on parameters that the records do not determine
+    # Number of independent changes of parameters that leave the outputs within the noise.
     free_directions: int
-    remedies: tuple[str, ...] = ()
+    remedies: tuple[str, ...] = ()  # sentences on measures with which more parameters would be determined
 
     @property
     def sentence(self) -> str:
@@ -108,13 +80,7 @@ class Identifiability:
 
 
 def identifiability(found: Information) -> Identifiability:
-    """Return the parameters that the records determine, and the combinations of the others.
-
-    Parameters
-    ----------
-    found
-        Information of the records on the parameters.
-    """
+    """Return the parameters that the records determine, and the combinations of the others."""
     errors, search = relative_errors(found), _Search(found)
     statements = tuple(search.statements())
     return Identifiability(
@@ -132,13 +98,7 @@ def free_directions(found: Information) -> int:
 
 
 def relative_errors(found: Information) -> dict[str, float]:
-    """Return the relative standard error of each parameter, see `Identifiability`.
-
-    Parameters
-    ----------
-    found
-        Information of the records on the parameters.
-    """
+    """Return the relative standard error of each parameter, see `Identifiability`."""
     errors = conditional_errors(found.root)
     # A parameter with almost no influence is held, so that its uncertainty does not affect the others.
     held = errors >= POORLY_KNOWN
@@ -148,27 +108,17 @@ def relative_errors(found: Information) -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Quantity:
-    """A parameter or a combination of parameters.
+    """A parameter or a combination of parameters."""
 
-    Attributes
-    ----------
-    text, members, unit
-        Its text, the parameters in it, and its unit.
-    value, size
-        Its value, and the reference of its relative changes.
-    direction
-        Relative change of the parameters when it alone grows by its size, shape (n,).
-    power
-        Power of the changed parameter in this quantity.
-    """
-
+    # Its text, the parameters in it, and its unit.
     text: str
     members: tuple[str, ...]
     unit: str
+    # Its value, and the reference of its relative changes.
     value: float
     size: float
-    direction: Floats
-    power: int = 1
+    direction: Floats  # relative change of the parameters when it alone grows by its size, shape (n,)
+    power: int = 1  # power of the changed parameter in this quantity
 
     def step(self, factor: float) -> Floats:
         """Return the relative change of the parameters when it alone grows by a factor, shape (n,)."""

@@ -19,68 +19,34 @@ from rigsight.records.record import Record
 
 @dataclass(frozen=True, eq=False)
 class PathIdentification:
-    """One signal path of one record.
+    """One signal path of one record."""
 
-    Attributes
-    ----------
-    source, response
-        The signals.
-    measured
-        Frequency response; None for a step, or if there is none.
-    coherence
-        H1 with its coherence; None if it was not estimated.
-    fit
-        PT2 or PT1; None if it failed.
-    physical
-        Physical parameters of the fit; None if it failed.
-    problem
-        Reason why there is no fit, in words; empty if there is one.
-    """
-
+    # The signals.
     source: str
     response: str
-    measured: FrequencyResponse | None = None
-    coherence: FrequencyResponse | None = None
-    fit: TransferFit | None = None
-    physical: PhysicalEstimates | None = None
-    problem: str = ""
+    measured: FrequencyResponse | None = None  # frequency response; None for a step, or if there is none
+    coherence: FrequencyResponse | None = None  # h1 with its coherence; None if it was not estimated
+    fit: TransferFit | None = None  # PT2 or PT1; None if it failed
+    physical: PhysicalEstimates | None = None  # physical parameters of the fit; None if it failed
+    problem: str = ""  # reason why there is no fit, in words; empty if there is one
 
 
 @dataclass(frozen=True, eq=False)
 class RecordIdentification:
-    """Results of one estimation record alone.
-
-    Attributes
-    ----------
-    record
-        The record.
-    amplitude
-        Amplitude of its input, as given or measured; for a free motion that of its output.
-    paths
-        The path to the motion first, then the paths from the motion.
-    offsets
-        Rest positions by (2.26) and (2.27); None if there are none.
-    conicity
-        delta_0 with its statement; None if c_y is not known.
-    resonance
-        Angular frequency at which the measured magnitude is largest [rad/s]; None if it has no peak.
-    warnings
-        Warnings for the user, a sentence each.
-    own
-        Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it failed.
-    moved
-        The output to which the amplitude of a free motion refers.
-    """
+    """Results of one estimation record alone."""
 
     record: Record
-    amplitude: float
-    paths: tuple[PathIdentification, ...]
-    offsets: PhysicalEstimates | None = None
-    conicity: ConicityEstimate | None = None
+    amplitude: float  # amplitude of its input, as given or measured; for a free motion that of its output
+    paths: tuple[PathIdentification, ...]  # the path to the motion first, then the paths from the motion
+    offsets: PhysicalEstimates | None = None  # rest positions by (2.26) and (2.27); None if there are none
+    conicity: ConicityEstimate | None = None  # delta_0 with its statement; None if c_y is not known
+    # Angular frequency at which the measured magnitude is largest [rad/s]; None if it has no peak.
     resonance: float | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # warnings for the user, a sentence each
+    # Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it
+    # failed.
     own: PhysicalEstimates | None = None
-    moved: str = ""
+    moved: str = ""  # the output to which the amplitude of a free motion refers
 
     @property
     def is_identified(self) -> bool:
@@ -110,164 +76,81 @@ class RecordIdentification:
 
 @dataclass(frozen=True)
 class RecordScore:
-    """Free-run error of the joint model on one record.
+    """Free-run error of the joint model on one record."""
 
-    Attributes
-    ----------
-    record, role
-        Name and role of the record.
-    amplitude
-        Amplitude of its input.
-    nrmse
-        RMS of measured minus simulated over the RMS of the measured about its mean, by output.
-    own_nrmse
-        The same for the fit of this record alone; empty for a validation record.
-    """
-
+    # Name and role of the record.
     record: str
     role: str
-    amplitude: float
+    amplitude: float  # amplitude of its input
+    # RMS of measured minus simulated over the RMS of the measured about its mean, by output.
     nrmse: dict[str, float]
-    own_nrmse: dict[str, float]
+    own_nrmse: dict[str, float]  # the same for the fit of this record alone; empty for a validation record
 
 
 @dataclass(frozen=True, eq=False)
 class JointIdentification:
-    """One parameter set for all estimation records.
+    """One parameter set for all estimation records."""
 
-    Attributes
-    ----------
-    fit
-        The joint fit, with a fit of each record alone.
-    names
-        The fitted parameters.
-    pooled
-        Lateral parameters that the fit held at the mean of the single records' estimates: if no set fits all records, a wrong yaw
-        angle would bias them. None if they were fitted with the others, or not at all.
-    statement
-        Whether one set fits all records, and which records differ, in words.
-    conicity
-        delta_0 with its statement; None if c_y is not known.
-    scores
-        Score of every record.
-    left_out
-        Estimation records that the fit did not use.
-    """
-
-    fit: JointFit
-    names: tuple[str, ...]
+    fit: JointFit  # the joint fit, with a fit of each record alone
+    names: tuple[str, ...]  # the fitted parameters
+    # Lateral parameters that the fit held at the mean of the single records' estimates: if no set fits all
+    # records, a wrong yaw angle would bias them. None if they were fitted with the others, or not at all.
     pooled: PhysicalEstimates | None
-    statement: str
-    conicity: ConicityEstimate | None
-    scores: tuple[RecordScore, ...]
-    left_out: tuple[str, ...]
+    statement: str  # whether one set fits all records, and which records differ, in words
+    conicity: ConicityEstimate | None  # delta_0 with its statement; None if c_y is not known
+    scores: tuple[RecordScore, ...]  # score of every record
+    left_out: tuple[str, ...]  # estimation records that the fit did not use
 
 
 @dataclass(frozen=True)
 class EffectScore:
-    """Free-run error on one record without and with effects.
+    """Free-run error on one record without and with effects."""
 
-    Attributes
-    ----------
-    record, role
-        Name and role of the record.
-    without
-        NRMSE of the joint fit of the rig alone, by output.
-    nrmse
-        The same with the effects.
-    """
-
+    # Name and role of the record.
     record: str
     role: str
-    without: dict[str, float]
-    nrmse: dict[str, float]
+    without: dict[str, float]  # NRMSE of the joint fit of the rig alone, by output
+    nrmse: dict[str, float]  # the same with the effects
 
 
 @dataclass(frozen=True, eq=False)
 class HysteresisIdentification:
-    """The rig with hysteresis effects, calibrated to the records of the joint fit.
+    """The rig with hysteresis effects, calibrated to the records of the joint fit."""
 
-    Attributes
-    ----------
-    effects
-        Names of the effects, along the signal path.
-    calibration
-        Parameters of rig and effects, and quantities derived from them.
-    held
-        Values of parameters of effects that were not fitted, or that the fit left at their special values.
-    units
-        Unit of every parameter.
-    meanings
-        Meaning of each parameter.
-    statement
-        Reduction of the error by the effects, in words.
-    scores
-        Score of every record.
-    """
-
-    effects: tuple[str, ...]
-    calibration: Calibration
+    effects: tuple[str, ...]  # names of the effects, along the signal path
+    calibration: Calibration  # parameters of rig and effects, and quantities derived from them
+    # Values of parameters of effects that were not fitted, or that the fit left at their special values.
     held: dict[str, float]
-    units: dict[str, str]
-    meanings: dict[str, str]
-    statement: str
-    scores: tuple[EffectScore, ...]
+    units: dict[str, str]  # unit of every parameter
+    meanings: dict[str, str]  # meaning of each parameter
+    statement: str  # reduction of the error by the effects, in words
+    scores: tuple[EffectScore, ...]  # score of every record
 
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """The result of ``rigsight identify``.
+    """The result of ``rigsight identify``."""
 
-    Attributes
-    ----------
-    title
-        Title of the campaign.
-    rig
-        Name of the rig.
-    method
-        Method by which frequency responses were estimated.
-    units
-        Unit by parameter and signal.
-    records
-        Estimation records in the order of the campaign.
-    amplitude_statement
-        Whether the parameters change with the amplitude, in one sentence.
-    changing
-        Names of those that do.
-    joint
-        One set for all records.
-    model
-        Content of ``model.json``.
-    warnings
-        All warnings, each with the name of its record.
-    reached
-        Parameters of the joint fit that stand at a bound which the records ask them to pass.
-    views
-        The linearized rig, for each set of constants of the records; empty for the built-in rigs with one motion, whose transfer
-        functions are fitted record by record.
-    identifiability
-        Parameters that the records determine together; None for these built-in rigs.
-    meanings
-        Meaning of each parameter, by name; empty for these built-in rigs.
-    hysteresis
-        The rig with hysteresis effects; None if not requested. If there is one, it is the `model`.
-    given
-        Parameter values of the given simulation, to compare with.
-    """
-
-    title: str
+    title: str  # title of the campaign
     rig: str
-    method: str
-    units: dict[str, str]
-    records: tuple[RecordIdentification, ...]
-    amplitude_statement: str
-    changing: tuple[str, ...]
-    joint: JointIdentification
-    model: dict[str, Any]
-    warnings: tuple[str, ...]
+    method: str  # method by which frequency responses were estimated
+    units: dict[str, str]  # unit by parameter and signal
+    records: tuple[RecordIdentification, ...]  # estimation records in the order of the campaign
+    amplitude_statement: str  # whether the parameters change with the amplitude, in one sentence
+    changing: tuple[str, ...]  # names of those that do
+    joint: JointIdentification  # one set for all records
+    model: dict[str, Any]  # content of ``model.json``
+    warnings: tuple[str, ...]  # all warnings, each with the name of its record
+    # Parameters of the joint fit that stand at a bound which the records ask them to pass.
     reached: tuple[ReachedBound, ...] = ()
+    # The linearized rig, for each set of constants of the records; empty for the built-in rigs with one
+    # motion, whose transfer functions are fitted record by record.
     views: tuple[LinearView, ...] = ()
+    # Parameters that the records determine together; None for these built-in rigs.
     identifiability: Identifiability | None = None
+    # Meaning of each parameter, by name; empty for these built-in rigs.
     meanings: dict[str, str] = field(default_factory=dict)
+    # The rig with hysteresis effects; None if not requested. If there is one, it is the `model`.
     hysteresis: HysteresisIdentification | None = None
+    # Parameter values of the given simulation, to compare with.
     given: dict[str, float] = field(default_factory=dict)

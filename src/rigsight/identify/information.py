@@ -28,48 +28,28 @@ _FOLLOWED = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """Response of the outputs to relative changes of parameters, with the initial states projected out.
+    """Response of the outputs to relative changes of parameters, with the initial states projected out."""
 
-    Attributes
-    ----------
-    names, units
-        Of the fitted parameters.
-    values
-        Their values, shape (n,).
-    sizes
-        Reference of the relative changes, shape (n,): the value, or the size in the records for a parameter that may be zero: one
-        of either sign, and one that cannot be distinguished from its bound zero.
-    lower, upper
-        Their bounds, shape (n,).
-    asked
-        The values after one step to the minimum without bounds, shape (n,); at a minimum inside the bounds `values`.
-    root
-        ``root.T @ root`` is the information matrix in units of the noise, shape (m, n).
-    change
-        Length of the change of all outputs, in units of the noise, when parameters take other values.
-    """
-
+    # Of the fitted parameters.
     names: tuple[str, ...]
     units: tuple[str, ...]
-    values: Floats
+    values: Floats  # their values, shape (n,)
+    # Reference of the relative changes, shape (n,): the value, or the size in the records for a parameter
+    # that may be zero: one of either sign, and one that cannot be distinguished from its bound zero.
     sizes: Floats
+    # Their bounds, shape (n,).
     lower: Floats
     upper: Floats
+    # The values after one step to the minimum without bounds, shape (n,); at a minimum inside the bounds
+    # `values`.
     asked: Floats
-    root: Floats
+    root: Floats  # ``root.T @ root`` is the information matrix in units of the noise, shape (m, n)
+    # Length of the change of all outputs, in units of the noise, when parameters take other values.
     change: Callable[[Mapping[str, float]], float]
 
 
 def information(fit: GreyBoxFit, result: FitResult) -> Information:
-    """Return the information of the records of a fit on its parameters.
-
-    Parameters
-    ----------
-    fit
-        Structure, records and noise.
-    result
-        Its result; colored residuals reduce the information, in accordance with the standard errors.
-    """
+    """Return the information of the records of a fit on its parameters."""
     parameters = [p for p in fit.structure.parameters if p.name in result.free]
     values = np.array([result.values[p.name] for p in parameters])
     scales = np.array([abs(characteristic_value(p.dimension, fit.scales)) for p in parameters])

@@ -34,53 +34,32 @@ _POLES = {"local_rational": 2, "local_polynomial": 0}
 
 @dataclass(frozen=True)
 class Mode:
-    """One pole, or a pair of conjugate ones.
+    """One pole, or a pair of conjugate ones."""
 
-    Attributes
-    ----------
-    pole
-        The pole, of a pair that with positive imaginary part [1/s].
-    natural_frequency, damping_ratio
-        Its size [rad/s], and its damping ratio; NaN for a pole at zero.
-    frequency_std, damping_std
-        Their standard errors.
-    """
-
-    pole: complex
+    pole: complex  # the pole, of a pair that with positive imaginary part [1/s]
+    # Its size [rad/s], and its damping ratio; NaN for a pole at zero.
     natural_frequency: float
     damping_ratio: float
+    # Their standard errors.
     frequency_std: float
     damping_std: float
 
 
 @dataclass(frozen=True, eq=False)
 class LinearView:
-    """A fitted rig linearized at equilibrium, for records with the same constants.
+    """A fitted rig linearized at equilibrium, for records with the same constants."""
 
-    Attributes
-    ----------
-    constants
-        The records' own constants.
-    records
-        Names of the records.
-    linearization
-        About the equilibrium under the mean inputs of these records.
-    modes
-        Its poles by their size, with standard errors.
-    measured
-        Frequency responses of these records together; None if no input moves.
-    model
-        The linearized response at the measured frequencies with its standard error, shape (n,) each, by (source, response).
-    images
-        Contribution of a held input to the measured response, shape (n,), by (source, response); none for a prescribed motion.
-    """
-
-    constants: dict[str, float]
+    constants: dict[str, float]  # the records' own constants
     records: tuple[str, ...]
-    linearization: Linearization
-    modes: tuple[Mode, ...]
+    linearization: Linearization  # about the equilibrium under the mean inputs of these records
+    modes: tuple[Mode, ...]  # its poles by their size, with standard errors
+    # Frequency responses of these records together; None if no input moves.
     measured: ResponsesOfInputs | None
+    # The linearized response at the measured frequencies with its standard error, shape (n,) each, by
+    # (source, response).
     model: Mapping[tuple[str, str], tuple[NDArray[np.complex128], Floats]]
+    # Contribution of a held input to the measured response, shape (n,), by (source, response); none for a
+    # prescribed motion.
     images: Mapping[tuple[str, str], NDArray[np.complex128]]
 
     def misfit(self, source: str, response: str) -> float:
@@ -100,19 +79,7 @@ class LinearView:
 def measured_responses(
     records: Sequence[Record], rig: Rig, method: Method, resolution: float | None
 ) -> ResponsesOfInputs | None:
-    """Return the frequency responses of all sensors to all inputs, None if no input moves.
-
-    Parameters
-    ----------
-    records
-        Records with the same constants.
-    rig
-        Their rig.
-    method
-        A local method.
-    resolution
-        Width of a local band [rad/s]; None takes the narrowest for each record.
-    """
+    """Return the frequency responses of all sensors to all inputs, None if no input moves."""
     if all(is_constant(record[signal.name]) for record in records for signal in rig.inputs):
         return None
     return responses_of_inputs(
@@ -126,15 +93,7 @@ def measured_responses(
 
 
 def longest_free_run(poles: NDArray[np.complex128], records: Sequence[Record]) -> float | None:
-    """Return how long a rig can run free before errors of its initial state hide the motion [s]; None for whole records.
-
-    Parameters
-    ----------
-    poles
-        Of the rig near its rest [1/s].
-    records
-        The records.
-    """
+    """Return how long a rig can run free before errors of its initial state hide the motion [s]; None for whole records."""
     growth = float(np.max(poles.real, initial=0.0))
     longest = max(record.n_samples * record.dt for record in records)
     return _GROWTHS / growth if growth * longest > _GROWTHS else None
@@ -152,20 +111,6 @@ def near_rest(structure: Structure, values: Mapping[str, float], records: Sequen
     """Return the linearization about the equilibrium under the mean inputs that is closest to the mean sensor readings.
 
     If the records are close to different equilibria, the most stable one is used, because a rig stays only at a stable one.
-
-    Parameters
-    ----------
-    structure
-        The rig, with effects or without.
-    values
-        Value of every parameter.
-    records
-        The records.
-
-    Raises
-    ------
-    SimulationError
-        If the equations have no derivative there.
     """
     inputs = {
         signal.name: _mean([record[signal.name] for record in records]) for signal in structure.rig.inputs
@@ -187,26 +132,7 @@ def linear_view(
     measured: ResponsesOfInputs | None,
     known: Information,
 ) -> LinearView:
-    """Return a fitted rig, linearized at its equilibrium in some records.
-
-    Parameters
-    ----------
-    structure
-        The rig.
-    values
-        Fitted values by name.
-    records
-        Records with the same constants.
-    measured
-        Their frequency responses.
-    known
-        Information of the records on the parameters.
-
-    Raises
-    ------
-    SimulationError
-        If the equations have no derivative there.
-    """
+    """Return a fitted rig, linearized at its equilibrium in some records."""
     constants = dict(records[0].constants)
     found = near_rest(structure, {**values, **constants}, records)
     inputs = dict(zip(found.inputs, map(float, found.at_inputs), strict=True))
@@ -253,10 +179,6 @@ def images_of_held_input(
     The steps or lines of a hold have a spectrum there. In samples of a response that falls off slowly, such as that of a pressure
     or a speed, it appears at low frequencies (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, Prentice Hall 1997).
     Zero if the records differ in sample time or hold, or the input has no content there.
-
-    Returns
-    -------
-    Shape (n_frequencies, n_outputs, n_inputs).
     """
     none = np.zeros((omega.size, len(linear.outputs), len(linear.inputs)), dtype=np.complex128)
     holds, times = {record.hold for record in records}, [record.dt for record in records]

@@ -14,17 +14,6 @@ def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
 
     This is the height of a step, or half the range of another input (the first that moves of several); for a free motion, half
     the range of the first recorded output.
-
-    Parameters
-    ----------
-    record
-        A record.
-    rig
-        The rig whose signals it contains.
-
-    Returns
-    -------
-    The amplitude [unit of the signal], and the name of the signal.
     """
     inputs = [signal.name for signal in rig.inputs]
     outputs = [signal.name for signal in rig.outputs if signal.name in record]

@@ -17,23 +17,16 @@ _STOPPED = 0.1
 
 @dataclass(frozen=True)
 class ReachedBound:
-    """A parameter at a bound that the records ask it to pass.
+    """A parameter at a bound that the records ask it to pass."""
 
-    Attributes
-    ----------
-    name, unit
-        The parameter.
-    side, bound
-        ``"lower"`` or ``"upper"``, and its value.
-    asked, std
-        Value that the records ask for, by one step without the bound, and its standard error; a rough value, because the other
-        parameters are those beside the bound.
-    """
-
+    # The parameter.
     name: str
     unit: str
+    # ``"lower"`` or ``"upper"``, and its value.
     side: str
     bound: float
+    # Value that the records ask for, by one step without the bound, and its standard error; a rough value,
+    # because the other parameters are those beside the bound.
     asked: float
     std: float
 
@@ -53,13 +46,6 @@ def reached_bounds(found: Information, standard_errors: Mapping[str, float]) -> 
     """Return the parameters that stand at a bound and would pass it significantly.
 
     A parameter whose interval contains the bound, such as a damping that is zero within its error, is not among them.
-
-    Parameters
-    ----------
-    found
-        Information of the records at the end of the fit.
-    standard_errors
-        Of the fit, before undetermined parameters were marked.
     """
     width = float(norm.ppf(0.5 + 0.5 * LEVEL))
     reached = []

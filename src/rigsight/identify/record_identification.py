@@ -48,42 +48,16 @@ _WELL_BELOW = 0.5
 
 @dataclass(frozen=True)
 class EstimationOptions:
-    """Settings of the identification of records.
+    """Settings of the identification of records."""
 
-    Attributes
-    ----------
-    method
-        Estimator of the frequency responses.
-    resolution
-        Requested width [rad/s]; None takes the default of each record.
-    """
-
-    method: Method = "local_rational"
-    resolution: float | None = None
+    method: Method = "local_rational"  # estimator of the frequency responses
+    resolution: float | None = None  # requested width [rad/s]; None takes the default of each record
 
 
 def identify_record(
     record: Record, rig: Rig, constants: Mapping[str, float], options: EstimationOptions
 ) -> RecordIdentification:
-    """Identify the rig from one record.
-
-    Parameters
-    ----------
-    record
-        An estimation record.
-    rig
-        Its rig. The parameters of an element follow from its motion in the time domain; only its dynamic stiffness is estimated
-        here.
-    constants
-        The rig's constants by name.
-    options
-        Settings.
-
-    Raises
-    ------
-    InputError
-        If the record is too short for the requested resolution. All other problems are reported in the result.
-    """
+    """Identify the rig from one record."""
     amplitude = record.amplitude if record.amplitude is not None else measured_amplitude(record, rig)[0]
     if not rig.is_driven:
         return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, options),))
@@ -243,13 +217,7 @@ def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> Tr
 
 
 def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float]:
-    """Return the values of a fit, with a negative gain if the phases show that the response is opposite to the source.
-
-    Raises
-    ------
-    InputError
-        If it is opposite at low frequencies only: then the stiffness is negative.
-    """
+    """Return the values of a fit, with a negative gain if the phases show that the response is opposite to the source."""
     break_frequency = fit.values["omega_b"]
 
     def agreement(lines: NDArray[np.bool_]) -> float:

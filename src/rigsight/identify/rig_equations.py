@@ -175,11 +175,6 @@ class RigEquations:
         """Return the size of the largest part of each equation, and the derivatives of the equations by the parameters.
 
         The equations are those of motion (as forces), of the own states (as rates) and of the sensors.
-
-        Returns
-        -------
-        The largest part of each equation at each sample, shape (n_equations, n_samples), and the derivatives by the parameters,
-        shape (n_equations, n_parameters, n_samples).
         """
         parts, slopes, ends = self._of_parameters
         arguments = [*z, *u, 0.0, *p, *accelerations]
@@ -251,19 +246,7 @@ class RigEquations:
         further: Sequence[sp.Symbol] = (),
         beside: Sequence[sp.Expr] = (),
     ) -> Any:
-        """Return a function for the derivatives of expressions, expression by expression.
-
-        Parameters
-        ----------
-        expressions
-            Expressions in arguments, further symbols, and symbols of `Structure.steps`.
-        by
-            The symbols with respect to which derivatives are taken.
-        further
-            Arguments after `arguments`.
-        beside
-            Expressions whose values are returned before the derivatives.
-        """
+        """Return a function for the derivatives of expressions, expression by expression."""
         elimination = self.structure.elimination
         if elimination is None:
             return self._function([*beside, *(derivative(e, s) for e in expressions for s in by)], *further)

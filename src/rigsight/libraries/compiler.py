@@ -38,18 +38,10 @@ NO_COMPILER = (
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler.
+    """A C compiler."""
 
-    Attributes
-    ----------
-    command
-        Program and arguments that stand before all others.
-    identity
-        What changes when the program does: its path, size and time of change.
-    """
-
-    command: tuple[str, ...]
-    identity: str
+    command: tuple[str, ...]  # program and arguments that stand before all others
+    identity: str  # what changes when the program does: its path, size and time of change
 
     @property
     def name(self) -> str:
@@ -58,13 +50,7 @@ class Compiler:
 
 
 def c_compilers() -> tuple[Compiler, ...]:
-    """Return the C compilers of this machine, best first: the one that the variable CC names alone, or all that are found.
-
-    Raises
-    ------
-    InputError
-        If the variable names a program that does not exist.
-    """
+    """Return the C compilers of this machine, best first: the one that the variable CC names alone, or all that are found."""
     return _found(os.environ.get(VARIABLE, ""), os.environ.get("PATH", ""))
 
 
@@ -99,13 +85,7 @@ def _identity(program: str) -> str:
 
 
 def library_suffix() -> str:
-    """Return the suffix of a shared library on this system.
-
-    Raises
-    ------
-    InputError
-        If no library can be made for it.
-    """
+    """Return the suffix of a shared library on this system."""
     return _system()[0]
 
 
@@ -117,22 +97,7 @@ def _system() -> tuple[str, tuple[str, ...]]:
 
 
 def first_library(sources: Mapping[str, str], flags: Sequence[str]) -> tuple[Compiler, bytes]:
-    """Return a shared library and the first of this machine's compilers that can make it.
-
-    Parameters
-    ----------
-    sources
-        File name -> C text; the first is compiled, the others it may include.
-    flags
-        Options of the compiler beside those that make a library.
-
-    Raises
-    ------
-    InputError
-        If there is no compiler, or the variable CC names a program that does not exist.
-    MachineError
-        If every compiler fails, with what the first one said, or there is no room for its files.
-    """
+    """Return a shared library and the first of this machine's compilers that can make it."""
     failed: MachineError | None = None
     for compiler in c_compilers():
         try:
@@ -143,22 +108,7 @@ def first_library(sources: Mapping[str, str], flags: Sequence[str]) -> tuple[Com
 
 
 def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]) -> bytes:
-    """Return the bytes of a shared library; the same text gives the same bytes with the same compiler.
-
-    Parameters
-    ----------
-    compiler
-        From `c_compilers`.
-    sources
-        File name -> C text; the first is compiled, the others it may include.
-    flags
-        Options of the compiler beside those that make a library.
-
-    Raises
-    ------
-    MachineError
-        If the compiler fails or there is no room for its files.
-    """
+    """Return the bytes of a shared library; the same text gives the same bytes with the same compiler."""
     suffix, shared = _system()
     try:
         with tempfile.TemporaryDirectory(prefix="rigsight-", ignore_cleanup_errors=True) as place:

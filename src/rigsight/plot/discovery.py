@@ -26,13 +26,7 @@ _SURE = 0.9
 
 @in_style
 def discovery_figure(found: Discovery) -> Figure:
-    """Draw the terms and the free runs of a discovery.
-
-    Parameters
-    ----------
-    found
-        The result.
-    """
+    """Draw the terms and the free runs of a discovery."""
     terms = found.terms[:_MOST_TERMS]
     runs = found.runs[:_MOST_RUNS]
     numbers = _numbers(found)

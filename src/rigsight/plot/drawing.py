@@ -213,17 +213,7 @@ def set_margins(
     top: float,
     between: tuple[float, float] = (0.0, 0.0),
 ) -> None:
-    """Place axes and their labels by the room around them; to find it by drawing takes as long as the drawing itself.
-
-    Parameters
-    ----------
-    figure
-        With a regular grid of axes and no layout engine.
-    left, right, bottom, top
-        Around all axes [inch].
-    between
-        Between columns and between rows [inch].
-    """
+    """Place axes and their labels by the room around them; to find it by drawing takes as long as the drawing itself."""
     width, height = (float(size) for size in figure.get_size_inches())
     shape = figure.axes[0].get_subplotspec()
     assert shape is not None

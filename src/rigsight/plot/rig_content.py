@@ -21,28 +21,15 @@ _LONGEST = 32
 
 @dataclass(frozen=True)
 class Body:
-    """A row of the picture: a degree of freedom, a prescribed motion, or a state.
+    """A row of the picture: a degree of freedom, a prescribed motion, or a state."""
 
-    Attributes
-    ----------
-    name, title
-        Its name, and with its unit.
-    kind
-        What it is.
-    lines
-        What else is said of it.
-    input
-        Input that prescribes it.
-    reads
-        Indices of the bodies that the rate of a state reads.
-    """
-
+    # Its name, and with its unit.
     name: str
     title: str
-    kind: Literal["free", "prescribed", "state"]
-    lines: tuple[str, ...]
-    input: str | None = None
-    reads: tuple[int, ...] = ()
+    kind: Literal["free", "prescribed", "state"]  # what it is
+    lines: tuple[str, ...]  # what else is said of it
+    input: str | None = None  # input that prescribes it
+    reads: tuple[int, ...] = ()  # indices of the bodies that the rate of a state reads
 
 
 @dataclass(frozen=True)
@@ -74,22 +61,14 @@ class Place:
 
 @dataclass(frozen=True)
 class RigContent:
-    """Everything that the picture shows.
+    """Everything that the picture shows."""
 
-    Attributes
-    ----------
-    bodies
-        From top to bottom.
-    joints, drives, sensors
-        In the order of the file.
-    couplings
-        Indices of two bodies next to each other whose motions the energies couple, and what does it.
-    """
-
-    bodies: tuple[Body, ...]
+    bodies: tuple[Body, ...]  # from top to bottom
+    # In the order of the file.
     joints: tuple[Place, ...]
     drives: tuple[Place, ...]
     sensors: tuple[Place, ...]
+    # Indices of two bodies next to each other whose motions the energies couple, and what does it.
     couplings: tuple[tuple[int, int, str], ...]
 
 

@@ -21,42 +21,18 @@ _LIGHTEST = 0.84
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One frequency response of the picture.
+    """One frequency response of the picture."""
 
-    Attributes
-    ----------
-    label
-        For the legend.
-    values
-        Complex, shape (n_frequencies,).
-    is_base
-        True for the model as it is; drawn black and wider.
-    """
-
-    label: str
-    values: NDArray[np.complex128]
-    is_base: bool = False
+    label: str  # for the legend
+    values: NDArray[np.complex128]  # complex, shape (n_frequencies,)
+    is_base: bool = False  # true for the model as it is; drawn black and wider
 
 
 @in_style
 def varied_responses(
     omega: NDArray[np.float64], curves: Sequence[Curve], pair: str, unit: str, title: str
 ) -> Figure:
-    """Draw magnitude [dB] and phase [deg] over angular frequency, one color and line style per curve.
-
-    Parameters
-    ----------
-    omega
-        Angular frequencies [rad/s], shape (n_frequencies,).
-    curves
-        In the order of their values: the color map (cividis, for color-blind readers) runs along it.
-    pair
-        Source and response, for the axis.
-    unit
-        Unit of the values.
-    title
-        What is varied.
-    """
+    """Draw magnitude [dB] and phase [deg] over angular frequency, one color and line style per curve."""
     import matplotlib as mpl
 
     figure = new_figure(7.4, 5.0)

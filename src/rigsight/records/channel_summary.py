@@ -18,50 +18,29 @@ _GAP = 1.5
 
 @dataclass(frozen=True)
 class ChannelSummary:
-    """Summary of a channel in `rigsight inspect`.
+    """Summary of a channel in `rigsight inspect`."""
 
-    Attributes
-    ----------
-    name, unit
-        As stated in the file; None for no unit.
-    n_samples
-        Number of samples.
-    dt, t0, t1
-        Median step, first and last stamp of its own time axis, in that axis' unit; None where it has none, or no finite one.
-    minimum, maximum
-        Of the finite samples; None without any.
-    n_not_finite
-        NaN, infinite or unreadable samples.
-    n_gaps
-        Places where its own time jumps; None where it has none.
-    n_stands
-        Number of steps without a change of the value.
-    remarks
-        What the numbers are beside the quantity itself: converted, codes, wrapped, held.
-    """
-
+    # As stated in the file; None for no unit.
     name: str
     unit: str | None
     n_samples: int
+    # Median step, first and last stamp of its own time axis, in that axis' unit; None where it has none, or
+    # no finite one.
     dt: float | None
     t0: float | None
     t1: float | None
+    # Of the finite samples; None without any.
     minimum: float | None
     maximum: float | None
-    n_not_finite: int
-    n_gaps: int | None
-    n_stands: int
+    n_not_finite: int  # NaN, infinite or unreadable samples
+    n_gaps: int | None  # places where its own time jumps; None where it has none
+    n_stands: int  # number of steps without a change of the value
+    # What the numbers are beside the quantity itself: converted, codes, wrapped, held.
     remarks: tuple[str, ...] = ()
 
 
 def summarize(channel: Channel) -> ChannelSummary:
-    """Return the summary of a channel of an open file.
-
-    Raises
-    ------
-    InputError
-        If its samples cannot be read.
-    """
+    """Return the summary of a channel of an open file."""
     samples = as_floats(channel.load())
     finite = samples[np.isfinite(samples)]
     dt = t0 = t1 = None

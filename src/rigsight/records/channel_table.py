@@ -33,26 +33,6 @@ def read_channels(
 
     Time is, in this order: `dt`; the channel that a signal's mapping names as its time; the time that the file shows to be the
     signal's own; the channel that was mapped to time, or has its name; the axis of the channel.
-
-    Parameters
-    ----------
-    path
-        A measurement file other than delimited text.
-    columns
-        Signal name, or `time`, -> its column.
-    time
-        Name of the time among them.
-    time_is_mapped
-        True if the user mapped it, so that the column must exist.
-    optional
-        Signals that may be missing.
-    dt
-        Sample time [s] where the file has no time.
-
-    Raises
-    ------
-    InputError
-        If a channel cannot be used; the message gives file, channel and the remedy.
     """
     with open_channels(path) as file:
         found = {
@@ -93,17 +73,7 @@ def read_channels(
 
 
 def unread_time(path: Path, dt: float, unread: Sequence[str]) -> tuple[str, ...]:
-    """Return a note that a sample time that was given replaces the time in a file, none where it has no time.
-
-    Parameters
-    ----------
-    path
-        The file.
-    dt
-        Sample time [s].
-    unread
-        Columns or channels of time that the file has.
-    """
+    """Return a note that a sample time that was given replaces the time in a file, none where it has no time."""
     if not unread:
         return ()
     return (

@@ -51,24 +51,12 @@ class UnknownUnitError(ValueError):
 
 
 def factor(unit: str, si: str) -> float:
-    """Return the factor from `unit` to `si`; angles are not treated as dimensionless.
-
-    Raises
-    ------
-    UnknownUnitError
-        If the unit is unknown or of another quantity.
-    """
+    """Return the factor from `unit` to `si`; angles are not treated as dimensionless."""
     return conversion(unit, si)[0]
 
 
 def conversion(unit: str, si: str) -> tuple[float, float]:
-    """Return scale and offset from `unit` to `si`; only units of temperature have an offset.
-
-    Raises
-    ------
-    UnknownUnitError
-        If the unit is unknown, of another quantity, or logarithmic.
-    """
+    """Return scale and offset from `unit` to `si`; only units of temperature have an offset."""
     unit = unit.strip()
     return (1.0, 0.0) if unit == si else _conversion(unit, si)
 
@@ -154,24 +142,7 @@ def units_of_columns(
     table: Columns,
     mappings: Mapping[str, ColumnMapping],
 ) -> tuple[dict[str, str], list[str]]:
-    """Return the units of all signals, of several sets the one that the columns state, and notes on columns that state none.
-
-    Parameters
-    ----------
-    file
-        How messages call the file.
-    units
-        Signal -> its SI unit, where the columns state nothing else.
-    others
-        Sets of units that some of the signals may have instead.
-    table, mappings
-        The columns as the file has them, and how the campaign maps them. A column with a scale may be of any unit.
-
-    Raises
-    ------
-    InputError
-        If the columns state units of different sets.
-    """
+    """Return the units of all signals, of several sets the one that the columns state, and notes on columns that state none."""
     sets = [dict(units), *({**units, **other} for other in others)]
     open_ones = [
         name for name in table.labels if len({one[name] for one in sets}) > 1 and mappings[name].scale is None
@@ -211,27 +182,7 @@ def units_of_columns(
 def si_mapping(
     file: str, signal: str, si: str, mapping: ColumnMapping, label: str, stated: str | None, gain: str = ""
 ) -> tuple[ColumnMapping, tuple[str, ...]]:
-    """Return a mapping with the scale from a column to SI, and notes on the conversion.
-
-    Parameters
-    ----------
-    file, label
-        How messages call the file and its column.
-    signal, si
-        The rig's signal and its unit.
-    mapping
-        Mapping in the campaign: its scale takes precedence, then its unit, then the unit of the file. An offset alone is added
-        to what the unit gives.
-    stated
-        Unit stated in the file, None if there is none.
-    gain
-        Constant of the rig that counts per unit of an input without a fixed unit, where the campaign gives its value.
-
-    Raises
-    ------
-    InputError
-        Naming file, column and unit, and what to write instead: it is unknown, or measures something else.
-    """
+    """Return a mapping with the scale from a column to SI, and notes on the conversion."""
     where = f"{file}, column '{label}'"
     if mapping.scale is not None:
         return mapping, ()

@@ -30,11 +30,6 @@ def own_clocks(names: Sequence[str]) -> Mapping[int, int]:
     A file shows it by names (``Time Force`` beside ``Force``), by groups (a time in the group of a channel, or in the nearest one
     around it), or by order (columns of time of one name, each in front of its signals). One time alone belongs to no one in
     particular.
-
-    Parameters
-    ----------
-    names
-        Of all channels, in the order of the file; ``group/channel`` where it has groups.
     """
     times = [number for number, name in enumerate(names) if is_time(name)]
     named = _by_name(names)
@@ -99,20 +94,7 @@ def possible_clocks(
     given: Mapping[str, int],
     declared: int | None,
 ) -> dict[str, list[int]]:
-    """Return the numbers of the times by which each signal may go, the first that increases is its own.
-
-    Parameters
-    ----------
-    names
-        Of all channels of the file.
-    signals
-        Signal -> number of its channel.
-    given
-        Signal -> number of the time that the campaign gives to it alone; it is the only one then.
-    declared
-        Number of the time that the campaign gives to all; a clock of its own that the file shows comes before it, because signals
-        on a foreign clock would be shifted in silence.
-    """
+    """Return the numbers of the times by which each signal may go, the first that increases is its own."""
     own = own_clocks(names)
     return {
         signal: [given[signal]]
@@ -129,45 +111,16 @@ def increases(stamps: NDArray[np.float64]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """The time of a signal.
+    """The time of a signal."""
 
-    Attributes
-    ----------
-    label
-        How it is called.
-    stamps
-        Time stamps, shape (n_samples,).
-    unit
-        Stated by the file; None where it is that of the campaign.
-    origin
-        Moment from which they count; None where the file does not say.
-    """
-
-    label: str
-    stamps: NDArray[np.float64]
-    unit: str | None = None
-    origin: np.datetime64 | None = None
+    label: str  # how it is called
+    stamps: NDArray[np.float64]  # time stamps, shape (n_samples,)
+    unit: str | None = None  # stated by the file; None where it is that of the campaign
+    origin: np.datetime64 | None = None  # moment from which they count; None where the file does not say
 
 
 def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock]) -> Columns:
-    """Return a table with the time of its signals: one for all where they share it, else the stamps of each.
-
-    Parameters
-    ----------
-    file
-        Name for messages.
-    time
-        Name of time among the signals.
-    table
-        What was read.
-    clocks
-        Signal -> its clock.
-
-    Raises
-    ------
-    InputError
-        If clocks differ, and do not count from the same moment or in the same unit.
-    """
+    """Return a table with the time of its signals: one for all where they share it, else the stamps of each."""
     chosen = list(clocks.values())
     shared = shared_clock(chosen)
     known = {signal: clock.origin for signal, clock in clocks.items() if clock.origin is not None}
@@ -213,22 +166,7 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
 
 
 def side_by_side(file: str, time: str, tables: Mapping[Path, Columns]) -> Columns:
-    """Return the signals of several files as those of one record, each with the time of its file.
-
-    Parameters
-    ----------
-    file
-        Name of the record for messages.
-    time
-        Name of time among the signals.
-    tables
-        File -> what was read from it.
-
-    Raises
-    ------
-    InputError
-        As `with_clocks`.
-    """
+    """Return the signals of several files as those of one record, each with the time of its file."""
     values, labels, units, clocks = {}, {}, {}, {}
     for path, table in tables.items():
         for signal, samples in table.values.items():

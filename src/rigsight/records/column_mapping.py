@@ -89,22 +89,7 @@ class ColumnMapping:
 def checked_columns(
     file: str, columns: Mapping[str, ColumnMapping | str | int], signals: Collection[str]
 ) -> dict[str, ColumnMapping]:
-    """Return the columns of signals as mappings.
-
-    Parameters
-    ----------
-    file
-        Name of the file in messages.
-    columns
-        Signal name -> its column; a name or a number alone is one without conversion.
-    signals
-        Signals that may have a column.
-
-    Raises
-    ------
-    InputError
-        Naming a signal that is none of them, or what is no column.
-    """
+    """Return the columns of signals as mappings."""
     checked = {}
     for signal, column in columns.items():
         if signal not in signals:
@@ -126,39 +111,21 @@ def checked_columns(
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Numbers of a file before scale and offset.
+    """Numbers of a file before scale and offset."""
 
-    Attributes
-    ----------
-    values
-        Signal name -> column, shape (n_samples,); all finite. Without time where `axes` has it.
-    labels
-        Signal name -> name of the column in the file.
-    lines
-        Number of every row for messages, shape (n_samples,).
-    notes
-        Assumptions made while reading.
-    units
-        Signal name -> unit stated in a dedicated field of the file.
-    axes
-        Signal name -> time stamps, shape (n_samples,), where the signals do not share one axis; else empty. In the unit of time.
-    clocks
-        Signal name -> how its time is called, where `axes` has it.
-    row
-        Name of a row in messages: ``"line"`` of a text, ``"sample"`` otherwise.
-    names
-        Names of all columns in the file.
-    origins
-        Signal name -> moment from which its time counts, where the file says so.
-    """
-
+    # Signal name -> column, shape (n_samples,); all finite. Without time where `axes` has it.
     values: Mapping[str, NDArray[np.float64]]
-    labels: Mapping[str, str]
-    lines: NDArray[np.int64]
-    notes: tuple[str, ...] = ()
+    labels: Mapping[str, str]  # signal name -> name of the column in the file
+    lines: NDArray[np.int64]  # number of every row for messages, shape (n_samples,)
+    notes: tuple[str, ...] = ()  # assumptions made while reading
+    # Signal name -> unit stated in a dedicated field of the file.
     units: Mapping[str, str] = field(default_factory=dict)
+    # Signal name -> time stamps, shape (n_samples,), where the signals do not share one axis; else empty. In
+    # the unit of time.
     axes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    # Signal name -> how its time is called, where `axes` has it.
     clocks: Mapping[str, str] = field(default_factory=dict)
-    row: str = "line"
-    names: tuple[str, ...] = ()
+    row: str = "line"  # name of a row in messages: ``"line"`` of a text, ``"sample"`` otherwise
+    names: tuple[str, ...] = ()  # names of all columns in the file
+    # Signal name -> moment from which its time counts, where the file says so.
     origins: Mapping[str, np.datetime64] = field(default_factory=dict)

@@ -38,28 +38,18 @@ ARITHMETIC = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class TimeBase:
-    """The even grid of a record.
+    """The even grid of a record."""
 
-    Attributes
-    ----------
-    t0, dt
-        First stamp and sample time, in the unit of the stamps.
-    n_samples
-        Number of stamps.
-    stamps
-        Measured stamps, shape (n_samples,), where the samples must be resampled; None where they lie on the grid.
-    jitter
-        Of these stamps, as a share of `dt`: how far they, or the steps between them, are from even at most.
-    notes
-        What was assumed.
-    """
-
+    # First stamp and sample time, in the unit of the stamps.
     t0: float
     dt: float
-    n_samples: int
+    n_samples: int  # number of stamps
+    # Measured stamps, shape (n_samples,), where the samples must be resampled; None where they lie on the
+    # grid.
     stamps: NDArray[np.float64] | None = None
+    # Of these stamps, as a share of `dt`: how far they, or the steps between them, are from even at most.
     jitter: float = 0.0
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what was assumed
 
     @property
     def end(self) -> float:
@@ -79,15 +69,7 @@ class TimeBase:
 
 
 def check_long_enough(file: str, n_samples: int) -> None:
-    """Raise InputError for a file with too few samples for a record.
-
-    Parameters
-    ----------
-    file
-        Name for messages.
-    n_samples
-        What it has.
-    """
+    """Raise InputError for a file with too few samples for a record."""
     if n_samples < FEWEST_SAMPLES:
         raise InputError(
             f"{file} has {n_samples} samples; at least {FEWEST_SAMPLES} are needed for a record."
@@ -97,24 +79,7 @@ def check_long_enough(file: str, n_samples: int) -> None:
 def time_base(
     stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str = "line"
 ) -> TimeBase:
-    """Return the even grid of the time stamps.
-
-    Parameters
-    ----------
-    stamps
-        Time stamps in the file, shape (n_samples,).
-    lines
-        Line number of every stamp, shape (n_samples,).
-    file
-        Name for messages.
-    row
-        Name of a row in messages.
-
-    Raises
-    ------
-    InputError
-        Naming the line: too few samples, time not increasing, duplicate stamps, gaps, or steps that differ by far.
-    """
+    """Return the even grid of the time stamps."""
     check_long_enough(file, stamps.size)
     span = abs(stamps[-1] - stamps[0])
     if not (span == 0.0 or span >= SHORTEST_TIME) or not np.max(np.abs(stamps)) <= LARGEST_NUMBER:
@@ -165,15 +130,7 @@ def time_base(
 
 
 def told_stamp(stamps: NDArray[np.float64], sample: int) -> str:
-    """Return a stamp as text that tells it from its neighbors.
-
-    Parameters
-    ----------
-    stamps
-        Time stamps, shape (n_samples,).
-    sample
-        Which of them.
-    """
+    """Return a stamp as text that tells it from its neighbors."""
     steps = np.abs(np.diff(stamps))
     finest = float(np.min(steps[steps > 0.0], initial=np.inf))
     return written_stamp(float(stamps[sample]), max(finest, 1e-3 * float(np.median(steps))), fewest=9)
@@ -185,11 +142,6 @@ def pauses(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
     A step is a gap if it is longer than the others vary by at least half a sample, if it is longer by whole samples (or by more
     than `LARGEST_JITTER`), and if the clock does not catch up behind it. Where too little would be left between gaps
     short enough to be interpolated, there are none.
-
-    Parameters
-    ----------
-    stamps
-        Time stamps, shape (n_samples,).
     """
     none, steps = np.zeros(0, dtype=np.intp), np.diff(stamps)
     if steps.size == 0 or np.any(steps <= 0.0):

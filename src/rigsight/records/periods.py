@@ -50,19 +50,7 @@ def repeated_period(samples: NDArray[np.float64]) -> int | None:
 
 
 def mean_period(record: Record, drives: Sequence[str]) -> tuple[Record, int]:
-    """Return the mean of all common periods of some inputs but the first, which holds the transient, and their number.
-
-    Parameters
-    ----------
-    record
-        A record.
-    drives
-        Its inputs that move.
-
-    Returns
-    -------
-    The record and 0 if they do not repeat.
-    """
+    """Return the mean of all common periods of some inputs but the first, which holds the transient, and their number."""
     period = 1
     for drive in drives:
         own = repeated_period(record[drive])
@@ -80,15 +68,7 @@ def mean_period(record: Record, drives: Sequence[str]) -> tuple[Record, int]:
 
 
 def differ_by_noise(first: NDArray[np.float64], second: NDArray[np.float64], size: float) -> bool:
-    """Return True if two signals of shape (n_samples,) are the same, or measured with small white noise on each.
-
-    Parameters
-    ----------
-    first, second
-        The signals.
-    size
-        Standard deviation of either.
-    """
+    """Return True if two signals of shape (n_samples,) are the same, or measured with small white noise on each."""
     difference = first - second
     if float(np.max(np.abs(difference), initial=0.0)) <= _SAME * size:
         return True
@@ -97,13 +77,7 @@ def differ_by_noise(first: NDArray[np.float64], second: NDArray[np.float64], siz
 
 
 def roughness(samples: NDArray[np.float64]) -> float:
-    """Return the standard deviation of white noise with the median size of third differences, which rare jumps leave alone.
-
-    Parameters
-    ----------
-    samples
-        Shape (n_samples,); infinite for fewer than four.
-    """
+    """Return the standard deviation of white noise with the median size of third differences, which rare jumps leave alone."""
     differences = np.diff(samples, 3)
     if differences.size == 0:
         return float("inf")
@@ -112,13 +86,7 @@ def roughness(samples: NDArray[np.float64]) -> float:
 
 
 def same_signal(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
-    """Return True if the shorter of two signals is a stretch of the longer one, amplitude and mean included.
-
-    Parameters
-    ----------
-    first, second
-        Samples, shape (n_samples,) each, at the same sample time.
-    """
+    """Return True if the shorter of two signals is a stretch of the longer one, amplitude and mean included."""
     # Loaded where it is used: the process that reads a file imports this package and needs none of it.
     from scipy.signal import correlate
 

@@ -113,53 +113,7 @@ def read_stretches(
     other_units: Sequence[Mapping[str, str]] = (),
     at_pauses: Literal["split", "refuse"] = "split",
 ) -> tuple[Record, ...]:
-    """Read, check and repair the stretches of a record between gaps in its time axis; usually there is only one.
-
-    Parameters
-    ----------
-    path
-        Delimited text, or a measurement file of a format in `channel_file`; its content decides, not its name.
-    inputs, outputs
-        Signals of the rig. Further outputs than the required ones are read where the file has them.
-    columns
-        Where signals and time ``t`` stand, as mappings, names or numbers; by default in columns of their own names.
-    require_outputs
-        False to simulate a record: its time and inputs suffice, and its inputs may be constant.
-    required_outputs
-        Names of the outputs that the file must have, by default the first; one output at all it must have in any case.
-    absent_inputs
-        Names of the inputs that are 0 where the file holds no input at all: a free motion.
-    constant_inputs
-        Input that the file does not hold -> its value throughout [SI].
-    moving_inputs
-        Names of the inputs that must change for an identification: a prescribed motion.
-    name
-        How results call the record, by default the file's name without its ending.
-    role, kind, amplitude, hold
-        See `Record`.
-    dt
-        Sample time [s] of a file without time; time that it has is not read then, with a note.
-    resample
-        Sample time [s] onto which signals are resampled, low-pass filtered where it is coarser than theirs. Without it, signals
-        with clocks of their own come onto the finest of them.
-    start, end
-        Stretch of the file that is the record, by its time [s]; by default all of it.
-    separator, decimal, header, comment
-        See `read_csv`; only delimited text has them.
-    constants
-        See `Record`.
-    gain, other_units
-        See `si_mapping`, and `others` of `units_of_columns`.
-    beside
-        Names of signals that do not belong to the rig; they are read if the file has them, in any unit.
-    at_pauses
-        Whether a gap splits the record, or makes the file unusable.
-
-    Raises
-    ------
-    InputError
-        If the record is unusable; the message gives file, line or column, and the remedy.
-    """
+    """Read, check and repair the stretches of a record between gaps in its time axis; usually there is only one."""
     known = [TIME, *(signal.name for signal in (*inputs, *outputs)), *beside]
     columns = checked_columns(path.name, columns or {}, known)
     time = columns.get(TIME, ColumnMapping(TIME))

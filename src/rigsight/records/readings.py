@@ -21,13 +21,7 @@ _ANGLE = "rad"
 
 
 def refuse_codes(path: Path, table: Columns) -> None:
-    """Refuse a signal among whose readings are codes for no reading.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the column, and the rows that hold a code.
-    """
+    """Refuse a signal among whose readings are codes for no reading."""
     for signal, samples in table.values.items():
         found = codes(samples)
         if not found:
@@ -48,25 +42,7 @@ def refuse_codes(path: Path, table: Columns) -> None:
 def unwrapped(
     path: Path, table: Columns, columns: Mapping[str, ColumnMapping], units: Mapping[str, str]
 ) -> tuple[Columns, tuple[str, ...]]:
-    """Return a table in which angles and counters go on at the end of their range, with a note for each.
-
-    Parameters
-    ----------
-    path
-        The file.
-    table
-        What was read.
-    columns
-        Signal -> its mapping, with the conversion to SI; its key `unwrap` decides where it is given.
-    units
-        Signal -> SI unit.
-
-    Raises
-    ------
-    InputError
-        If `unwrap = true` is asked of a signal that is no angle, a declared period is shorter than the range of the numbers, or
-        an angle is wrapped at 360 without a unit.
-    """
+    """Return a table in which angles and counters go on at the end of their range, with a note for each."""
     values, notes = dict(table.values), []
     for signal, mapping in columns.items():
         if signal not in values or mapping.unwrap is False:
@@ -127,17 +103,6 @@ def between_readings(
 
     What the rig did meanwhile is smooth; what stands in the file is the last reading, too late by up to the
     time between two of them. Rows before the first and behind the last reading are left out.
-
-    Parameters
-    ----------
-    path
-        The file.
-    time
-        Name of time in the table.
-    table
-        A stretch of the file without gaps.
-    sensors
-        Signals that are measured; a command may be held.
     """
     found = {s: slow for s in sensors if s in table.values and (slow := held(table.values[s])) is not None}
     if not found:

@@ -17,15 +17,7 @@ def signals_beside(own: Collection[str]) -> tuple[str, ...]:
 
 
 def instrument_of(record: Record, own: Collection[str]) -> str | None:
-    """Return the name of the reference signal of a record's control loop; None if there is none, or it never changes.
-
-    Parameters
-    ----------
-    record
-        The record.
-    own
-        Names of the signals of its rig.
-    """
+    """Return the name of the reference signal of a record's control loop; None if there is none, or it never changes."""
     if not signals_beside(own) or REFERENCE not in record or is_constant(record[REFERENCE]):
         return None
     return REFERENCE

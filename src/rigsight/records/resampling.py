@@ -29,27 +29,15 @@ _FILTER_LENGTH, _FILTER_SHAPE = 20, 6.0
 
 @dataclass(frozen=True, eq=False)
 class Resampled:
-    """Signals on one even clock.
+    """Signals on one even clock."""
 
-    Attributes
-    ----------
-    t0, dt
-        First stamp and sample time [s].
-    samples
-        Signal name -> samples, shape (n_samples,) each.
-    notes
-        What was interpolated, how, and at which cost.
-    is_filtered
-        Whether an input was filtered, so that it is held no more between the samples.
-    clock_uncertainty
-        Time [s] by which signals may be late against each other, as far as the clocks can tell.
-    """
-
+    # First stamp and sample time [s].
     t0: float
     dt: float
-    samples: Mapping[str, NDArray[np.float64]]
-    notes: tuple[str, ...] = ()
-    is_filtered: bool = False
+    samples: Mapping[str, NDArray[np.float64]]  # signal name -> samples, shape (n_samples,) each
+    notes: tuple[str, ...] = ()  # what was interpolated, how, and at which cost
+    is_filtered: bool = False  # whether an input was filtered, so that it is held no more between the samples
+    # Time [s] by which signals may be late against each other, as far as the clocks can tell.
     clock_uncertainty: float = 0.0
 
 
@@ -66,26 +54,6 @@ def joined(
     A held input (``"zoh"``) becomes its mean over each sample, which keeps its impulse; outputs and other inputs are interpolated
     by cubic splines, inputs of ``"foh"`` linearly where that predicts left out samples better. For a clock coarser than that of a
     signal, the signal is low-pass filtered first, without delay.
-
-    Parameters
-    ----------
-    file
-        Name for messages.
-    samples
-        Signal name -> samples, shape (n_samples,).
-    bases
-        Signal name -> its own clock [s]; the same object where signals share one.
-    clocks
-        Signal name -> how its time is called, where signals have clocks of their own.
-    step
-        Sample time asked for [s]; None for the finest of the signals.
-    holds
-        Hold of every input.
-
-    Raises
-    ------
-    InputError
-        If the signals overlap too little, or are too many samples of this step.
     """
     distinct = list({id(base): base for base in bases.values()}.values())
     dt = min(base.dt for base in distinct) if step is None else step

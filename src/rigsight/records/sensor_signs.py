@@ -110,18 +110,10 @@ def wrapping_counter(samples: NDArray[np.float64]) -> float | None:
 
 @dataclass(frozen=True)
 class Held:
-    """A reading that stands still between the samples of a slower device.
+    """A reading that stands still between the samples of a slower device."""
 
-    Attributes
-    ----------
-    rows
-        Usual number of rows from one reading to the next.
-    fresh
-        Rows with a reading of their own.
-    """
-
-    rows: int
-    fresh: NDArray[np.intp]
+    rows: int  # usual number of rows from one reading to the next
+    fresh: NDArray[np.intp]  # rows with a reading of their own
 
 
 def held(samples: NDArray[np.float64]) -> Held | None:

@@ -13,17 +13,7 @@ _MOST_DIGITS = 17
 
 
 def digits_for(stamp: float, resolution: float, fewest: int) -> int:
-    """Return how many significant digits tell a stamp from others at a distance.
-
-    Parameters
-    ----------
-    stamp
-        The largest one.
-    resolution
-        The distance.
-    fewest
-        Digits that are written in any case.
-    """
+    """Return how many significant digits tell a stamp from others at a distance."""
     stamp, resolution = abs(stamp), abs(resolution)
     if not (math.isfinite(stamp) and math.isfinite(resolution) and stamp > 0.0 and resolution > 0.0):
         return fewest
@@ -43,13 +33,7 @@ def written_span(begin: float, end: float) -> str:
 
 
 def time_origin(t: NDArray[np.float64]) -> float:
-    """Return the stamp that an axis counts from: 0, or the first one where stamps are far larger than the record is long.
-
-    Parameters
-    ----------
-    t
-        Increasing stamps [s], shape (n_samples,).
-    """
+    """Return the stamp that an axis counts from: 0, or the first one where stamps are far larger than the record is long."""
     if t.size < 2:
         return 0.0
     first, last = float(t[0]), float(t[-1])
@@ -57,13 +41,7 @@ def time_origin(t: NDArray[np.float64]) -> float:
 
 
 def time_label(t: NDArray[np.float64]) -> str:
-    """Return the label of a time axis that counts from `time_origin`.
-
-    Parameters
-    ----------
-    t
-        Increasing stamps [s], shape (n_samples,).
-    """
+    """Return the label of a time axis that counts from `time_origin`."""
     origin = time_origin(t)
     if not origin:
         return "time [s]"

@@ -29,43 +29,16 @@ from rigsight.records.stamps import written_span
 
 @dataclass(frozen=True, eq=False)
 class Stretches:
-    """A table split at the gaps of its time axis.
+    """A table split at the gaps of its time axis."""
 
-    Attributes
-    ----------
-    parts
-        The tables of the stretches; the whole table if there is no gap.
-    notes
-        Where it was cut, and what was left out.
-    """
-
-    parts: tuple[Columns, ...]
-    notes: tuple[str, ...] = ()
+    parts: tuple[Columns, ...]  # the tables of the stretches; the whole table if there is no gap
+    notes: tuple[str, ...] = ()  # where it was cut, and what was left out
 
 
 def between(
     file: str, time: str, table: Columns, scale: ColumnMapping, start: float | None, end: float | None
 ) -> Columns:
-    """Return the rows of a table from `start` to `end`.
-
-    Parameters
-    ----------
-    file
-        Name for messages.
-    time
-        Name of time in the table.
-    table
-        What was read.
-    scale
-        From stamps to seconds.
-    start, end
-        Time [s], as the clock of the file counts; None for its first or last stamp.
-
-    Raises
-    ------
-    InputError
-        If no clock of the table runs there.
-    """
+    """Return the rows of a table from `start` to `end`."""
     begin, stop = (-np.inf if start is None else start), (np.inf if end is None else end)
     clocks = table.axes or {time: table.values[time]}
     seconds = {signal: scale.to_si(stamps) for signal, stamps in clocks.items()}
@@ -88,24 +61,7 @@ def between(
 
 
 def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ()) -> Stretches:
-    """Return the stretches of a table between the gaps of its clocks.
-
-    Parameters
-    ----------
-    file
-        Name for messages.
-    time
-        Name of the time in the table.
-    table
-        What was read.
-    outputs
-        At least one of these must change in a stretch that becomes a record.
-
-    Raises
-    ------
-    InputError
-        If there is a gap, and too few samples are in stretches that are long enough.
-    """
+    """Return the stretches of a table between the gaps of its clocks."""
     clocks = table.axes or {time: table.values[time]}
     gaps = {signal: found for signal, stamps in clocks.items() if (found := _gaps(stamps)).size}
     if not gaps:
@@ -165,13 +121,7 @@ def _may_be_rounding(stamps: NDArray[np.float64]) -> bool:
 
 
 def one_stretch(file: str, found: Stretches) -> Columns:
-    """Return the table of a record that is to be one.
-
-    Raises
-    ------
-    InputError
-        If its time axis has gaps.
-    """
+    """Return the table of a record that is to be one."""
     if len(found.parts) == 1 and not found.notes:
         return found.parts[0]
     told = found.notes[0].removeprefix(f"{file}: ").partition(".")[0]

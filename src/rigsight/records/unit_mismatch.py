@@ -25,17 +25,6 @@ def unit_mismatch(
     """Return the two records whose gains differ most, and by what factor; None where no unit explains it.
 
     Gains are compared at frequencies that drive both, so that it does not matter which band a record sweeps.
-
-    Parameters
-    ----------
-    records
-        Records of one rig.
-    source, response
-        An input and an output.
-
-    Returns
-    -------
-    The record with the larger gain, the one with the smaller, and the ratio.
     """
     gains = [
         (record, gain)

@@ -34,34 +34,17 @@ class Cell:
 
 @dataclass(frozen=True)
 class View:
-    """A table of one record, or of all.
+    """A table of one record, or of all."""
 
-    Attributes
-    ----------
-    key, title
-        Anchor in the page, and what the table is of.
-    facts
-        Role, kind and amplitude of the record.
-    heads
-        Label of each column.
-    floor
-        Noise floor of each column.
-    rows
-        Model -> cells.
-    figures
-        What goes with it.
-    notes
-        What is to be known about it.
-    """
-
+    # Anchor in the page, and what the table is of.
     key: str
     title: str
-    facts: str
-    heads: list[str]
-    floor: list[str]
-    rows: dict[str, list[Cell]]
-    figures: list[PageFigure]
-    notes: list[str]
+    facts: str  # role, kind and amplitude of the record
+    heads: list[str]  # label of each column
+    floor: list[str]  # noise floor of each column
+    rows: dict[str, list[Cell]]  # model -> cells
+    figures: list[PageFigure]  # what goes with it
+    notes: list[str]  # what is to be known about it
 
 
 def render_comparison(
@@ -145,17 +128,7 @@ def _views(comparison: Comparison, figures: Sequence[ComparisonFigure]) -> Itera
 def comparison_view(
     comparison: Comparison, record: str | None, figures: Sequence[ComparisonFigure] = ()
 ) -> View:
-    """Return the table of one record, or of all of them where `record` is None.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    record
-        Name of the record, or None.
-    figures
-        Figures of the comparison; those of this record go with the table.
-    """
+    """Return the table of one record, or of all of them where `record` is None."""
     columns = comparison.columns(record)
     table = comparison.overall() if record is None else comparison.table(record)
     winners = {column: best(table, column) for column in columns}

@@ -15,15 +15,7 @@ def rig_of(diagnosis: Diagnosis) -> Rig | None:
 
 
 def effect_of(name: str, known: Mapping[str, Effect]) -> Effect | None:
-    """Return the effect of this name at its place, None where it is not known.
-
-    Parameters
-    ----------
-    name
-        Of an effect, or ``effect@place``.
-    known
-        Effects by name, without places.
-    """
+    """Return the effect of this name at its place, None where it is not known."""
     effect = known.get(kind_of(name))
     place = name.partition(AT)[2]
     return placed(effect, place) if effect is not None and place else effect

@@ -49,13 +49,7 @@ class DiscoverySummary:
 
 
 def discovery_summary(discovery: Discovery) -> DiscoverySummary:
-    """Return the discovery as a rich renderable.
-
-    Parameters
-    ----------
-    discovery
-        The result.
-    """
+    """Return the discovery as a rich renderable."""
     return DiscoverySummary(discovery)
 
 

@@ -31,15 +31,7 @@ def known_effects(own: Iterable[Effect] = ()) -> dict[str, Effect]:
 
 
 def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[EquationGroup]:
-    """Return the equations of the rig, then those of each effect of the diagnosed simulation, in the order of the signal path.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    known
-        Declared effects by name; nothing is returned where one of the simulation is missing.
-    """
+    """Return the equations of the rig, then those of each effect of the diagnosed simulation, in the order of the signal path."""
     rig = rig_of(diagnosis)
     # What the given simulation had already stands in the model beside what was added.
     names = dict.fromkeys([*diagnosis.model.get("effects", ()), *diagnosis.effects])
@@ -51,20 +43,7 @@ def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[E
 
 
 def equations_of(rig: Rig, effects: Sequence[Effect]) -> list[EquationGroup]:
-    """Return the equations of a rig, then those of each effect on it, in the order of the signal path.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    effects
-        Effects that act on it, in any order.
-
-    Raises
-    ------
-    InputError
-        If the rig does not offer one of the effects.
-    """
+    """Return the equations of a rig, then those of each effect on it, in the order of the signal path."""
     shown = shown_equations(compose(rig, effects), effect_label)
     return [
         EquationGroup(

@@ -19,13 +19,7 @@ ERROR_HEADS = ("record", "role", "NRMSE without the effects", "with the effects"
 
 
 def hysteresis_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]]:
-    """Yield subject and words: parameters, and what follows from them.
-
-    Parameters
-    ----------
-    found
-        The result.
-    """
+    """Yield subject and words: parameters, and what follows from them."""
     yield from parameter_rows(found)
     yield from derived_rows(found)
 

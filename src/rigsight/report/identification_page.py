@@ -51,23 +51,7 @@ def render_identification(
     versions: Mapping[str, str],
     seed: int | None = None,
 ) -> str:
-    """Return the page of an identification.
-
-    Parameters
-    ----------
-    identification
-        Of a rig that is not read record by record.
-    drawings
-        The responses of each of its views that has inputs, in their order.
-    amplitudes
-        Parameters over the amplitude; None where there is nothing to compare.
-    command
-        The command line that made it.
-    versions
-        Package -> version.
-    seed
-        Seed of the calibration.
-    """
+    """Return the page of an identification."""
     told = identification.identifiability
     assert told is not None
     names = identification.joint.names

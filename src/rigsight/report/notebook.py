@@ -37,13 +37,7 @@ class NotebookTable:
 
 
 def diagnosis_html(diagnosis: Diagnosis) -> str:
-    """Return verdict, gap, ranking and the numbers of the effect.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    """
+    """Return verdict, gap, ranking and the numbers of the effect."""
     sentences = [
         verdict_sentence(diagnosis),
         *fault_sentences(diagnosis),
@@ -59,13 +53,7 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
 
 
 def identification_html(identification: Identification) -> str:
-    """Return the parameters of each record in the order of amplitudes, and those of all records together.
-
-    Parameters
-    ----------
-    identification
-        The result.
-    """
+    """Return the parameters of each record in the order of amplitudes, and those of all records together."""
     records = sorted(identification.records, key=lambda record: record.amplitude)
     names = dict.fromkeys(name for record in records for name in record.estimates)
     alone = NotebookTable(
@@ -97,25 +85,13 @@ def identification_html(identification: Identification) -> str:
 
 
 def discovery_html(discovery: Discovery) -> str:
-    """Return the equations, their numbers and terms, and the error on the held-out records.
-
-    Parameters
-    ----------
-    discovery
-        The result.
-    """
+    """Return the equations, their numbers and terms, and the error on the held-out records."""
     rows = NotebookTable((), list(discovery_rows(discovery)))
     return _html(f"Discovered: {discovery.title}", discovery.equations, [rows], discovery.warnings)
 
 
 def comparison_html(comparison: Comparison) -> str:
-    """Return the errors of all models over all records, the smallest of each column marked with a star.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    """
+    """Return the errors of all models over all records, the smallest of each column marked with a star."""
     overall = comparison_view(comparison, None)
     rows = [
         (name, *(f"{cell.text}{' *' if cell.is_best else ''}" for cell in cells))

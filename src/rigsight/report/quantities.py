@@ -22,19 +22,12 @@ _QUANTITY_LABELS: dict[Quantity, str] = {
 
 @dataclass(frozen=True)
 class Written:
-    """A number as text: ``(value +/- std) * 10^exponent``.
+    """A number as text: ``(value +/- std) * 10^exponent``."""
 
-    Attributes
-    ----------
-    value, std
-        Digits; std is empty where there is none.
-    exponent
-        Power of ten outside the brackets, 0 for none.
-    """
-
+    # Digits; std is empty where there is none.
     value: str
     std: str
-    exponent: int
+    exponent: int  # power of ten outside the brackets, 0 for none
 
 
 def written(value: float, std: float | None = None) -> Written:

@@ -38,45 +38,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RecordView:
-    """One record.
+    """One record."""
 
-    Attributes
-    ----------
-    key
-        Anchor in the page.
-    title, facts
-        Name, and role, kind, amplitude, length in words.
-    rows
-        Output, and the error of each stage in words.
-    charts
-        Each output over time, then each signal path over frequency.
-    missing
-        Outputs that the record lacks.
-    is_open
-        False for records that are folded away at first.
-    """
-
-    key: str
+    key: str  # anchor in the page
+    # Name, and role, kind, amplitude, length in words.
     title: str
     facts: str
-    rows: list[tuple[str, str]]
-    charts: list[Chart]
-    missing: list[str] = field(default_factory=list)
-    is_open: bool = True
+    rows: list[tuple[str, str]]  # output, and the error of each stage in words
+    charts: list[Chart]  # each output over time, then each signal path over frequency
+    missing: list[str] = field(default_factory=list)  # outputs that the record lacks
+    is_open: bool = True  # false for records that are folded away at first
 
 
 def record_views(
     diagnosis: Diagnosis, responses: Mapping[str, tuple[PathResponse, ...]]
 ) -> Iterator[RecordView]:
-    """Yield the records, those that were scored first and open.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    responses
-        Frequency responses by record.
-    """
+    """Yield the records, those that were scored first and open."""
     names = curve_names(diagnosis)
     stages = stage_names(diagnosis)
     n_pictures = sum(len(trace.measured) for trace in diagnosis.traces)

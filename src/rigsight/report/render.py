@@ -127,13 +127,7 @@ def _content_hash(script: str) -> str:
 
 
 def environment(*packages: str) -> Environment:
-    """Return what all pages are rendered with.
-
-    Parameters
-    ----------
-    packages
-        Whose templates there are beside those of reports.
-    """
+    """Return what all pages are rendered with."""
     made = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in ("rigsight.report", *packages)]),
         autoescape=True,

@@ -36,24 +36,13 @@ _FEWEST_LINES = 8
 
 @dataclass(frozen=True, eq=False)
 class PathResponse:
-    """One signal path of one record.
+    """One signal path of one record."""
 
-    Attributes
-    ----------
-    path
-        As in ``"u -> psi"``.
-    measured
-        At the lines that stand out of their noise.
-    simulated
-        Stage of the diagnosis -> its response at lines of the measured one.
-    decibel
-        Stage -> RMS of the ratio of the magnitudes, measured over simulated [dB].
-    """
-
-    path: str
-    measured: FrequencyResponse
+    path: str  # as in ``"u -> psi"``
+    measured: FrequencyResponse  # at the lines that stand out of their noise
+    # Stage of the diagnosis -> its response at lines of the measured one.
     simulated: Mapping[str, FrequencyResponse]
-    decibel: Mapping[str, float]
+    decibel: Mapping[str, float]  # stage -> RMS of the ratio of the magnitudes, measured over simulated [dB]
 
 
 def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, ...]:
@@ -63,13 +52,6 @@ def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, 
     with the largest gaps.
 
     There are none of a rig that drifts: what follows the measured motion has the measured response.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    trace
-        One of its records.
     """
     rig = rig_of(diagnosis)
     signals = {*trace.inputs, *trace.measured}

@@ -37,25 +37,16 @@ _TWO_SIDED = 1.96
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One parameter of the diagnosed simulation.
+    """One parameter of the diagnosed simulation."""
 
-    Attributes
-    ----------
-    name, description, number, unit, remark
-        What it is; the remark stands where the records do not determine it.
-    interval
-        Its 95 % interval, empty where it was not fitted.
-    given
-        Its value in the given simulation, empty where that has none.
-    """
-
+    # What it is; the remark stands where the records do not determine it.
     name: str
     description: str
     number: Written
     unit: str
     remark: str
-    interval: tuple[Written, ...] = ()
-    given: str = ""
+    interval: tuple[Written, ...] = ()  # its 95 % interval, empty where it was not fitted
+    given: str = ""  # its value in the given simulation, empty where that has none
 
 
 @dataclass(frozen=True)

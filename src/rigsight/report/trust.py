@@ -48,13 +48,7 @@ class TrustView:
 
 
 def trust_view(diagnosis: Diagnosis) -> TrustView | None:
-    """Return what the section shows; None where the question was not asked.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    """
+    """Return what the section shows; None where the question was not asked."""
     if diagnosis.trust is None:
         return None
     figure = None
@@ -71,18 +65,7 @@ def trust_view(diagnosis: Diagnosis) -> TrustView | None:
 
 
 def trust_drawing(diagnosis: Diagnosis) -> Figure:
-    """Return the numbers by group: those that differ and those of the effects, six at most.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-
-    Raises
-    ------
-    InputError
-        If no number was estimated in two groups.
-    """
+    """Return the numbers by group: those that differ and those of the effects, six at most."""
     drawn = _drawn(diagnosis)
     if not drawn:
         raise InputError("No parameter of this diagnosis could be estimated from two groups of records.")
@@ -102,13 +85,7 @@ def trust_drawing(diagnosis: Diagnosis) -> Figure:
 
 
 def trust_line(diagnosis: Diagnosis) -> str:
-    """Return one line: that all numbers are the same, or which are not; empty where that was not asked.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    """
+    """Return one line: that all numbers are the same, or which are not; empty where that was not asked."""
     if diagnosis.trust is None or not diagnosis.trust.parameters:
         return ""
     differing = [number for number in diagnosis.trust.parameters if not number.stable]
@@ -122,13 +99,7 @@ def trust_line(diagnosis: Diagnosis) -> str:
 
 
 def trust_rows(diagnosis: Diagnosis) -> Iterator[dict[str, Any]]:
-    """Yield a row per number and group, with the columns `TRUST_COLUMNS`.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    """
+    """Yield a row per number and group, with the columns `TRUST_COLUMNS`."""
     for number in () if diagnosis.trust is None else diagnosis.trust.parameters:
         for kind, groups in number.groups.items():
             for one in groups:

@@ -150,15 +150,7 @@ def named_candidate(diagnosis: Diagnosis) -> Candidate | None:
 
 
 def error_over_noise(diagnosis: Diagnosis, stage: str) -> float:
-    """Return the RMS left over all outputs in units of the noise floor.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    stage
-        ``"before"``, ``"reidentified"`` or ``"after"``.
-    """
+    """Return the RMS left over all outputs in units of the noise floor."""
     ratios = [
         getattr(gap, stage) / gap.noise_floor for gap in diagnosis.gap.values() if gap.noise_floor > 0.0
     ]

@@ -45,15 +45,7 @@ def evaluated(expression: sp.Expr | None, values: Mapping[str, float]) -> float:
 def array_function(
     symbols: Sequence[sp.Symbol], expression: sp.Expr | sp.ImmutableMatrix
 ) -> Callable[..., Any]:
-    """Return a function of numbers or arrays for the value of an expression of a rig's declaration.
-
-    Parameters
-    ----------
-    symbols
-        Its arguments.
-    expression
-        Of these alone.
-    """
+    """Return a function of numbers or arrays for the value of an expression of a rig's declaration."""
     modules = [{"positive_part": lambda value: np.maximum(value, 0.0)}, "numpy"]
     function: Callable[..., Any] = sp.lambdify(symbols, expression, modules, cse=True)
     return function

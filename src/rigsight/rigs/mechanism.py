@@ -30,41 +30,27 @@ _LONGEST_SHORTENED = 100
 
 @dataclass(frozen=True)
 class Mechanism:
-    """The equations of a rig without effects, as declared.
+    """The equations of a rig without effects, as declared."""
 
-    Attributes
-    ----------
-    inputs
-        Names of the recorded signals that drive it.
-    coordinates, kinetic, potential
-        Degrees of freedom and energies.
-    joints, drives, sensors, states
-        What acts on the motion, and what reads it.
-    signals
-        Named values in an order in which each reads only those in front of it; drives and sensors are read by their names.
-    initial
-        Start values of coordinates, rates and states by symbol, where they are not those of rest.
-    order
-        Names of drives and sensors in an order in which none reads one behind it.
-    bodies
-        What another program simulates; its mass matrix and forces are added to those of the energies.
-    asked
-        Parameters and constants that the bodies read, in the order of theirs.
-    """
-
-    inputs: tuple[str, ...]
+    inputs: tuple[str, ...]  # names of the recorded signals that drive it
+    # Degrees of freedom and energies.
     coordinates: tuple[Coordinate, ...]
     kinetic: sp.Expr
     potential: sp.Expr
+    # What acts on the motion, and what reads it.
     joints: tuple[Joint, ...]
     drives: tuple[Drive, ...]
     sensors: tuple[Sensor, ...]
     states: tuple[RateState, ...] = ()
+    # Named values in an order in which each reads only those in front of it; drives and sensors are read by
+    # their names.
     signals: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    # Start values of coordinates, rates and states by symbol, where they are not those of rest.
     initial: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
-    order: tuple[str, ...] = ()
+    order: tuple[str, ...] = ()  # names of drives and sensors in an order in which none reads one behind it
+    # What another program simulates; its mass matrix and forces are added to those of the energies.
     bodies: Bodies | None = None
-    asked: tuple[sp.Symbol, ...] = ()
+    asked: tuple[sp.Symbol, ...] = ()  # parameters and constants that the bodies read, in the order of theirs
 
     @property
     def free(self) -> tuple[Coordinate, ...]:
@@ -207,11 +193,6 @@ class Mechanism:
 
         Of a joint along one coordinate that is all that acts along this coordinate while nothing moves. A joint between several
         coordinates carries the drives that push along its own motion; how weight is shared between such joints no equation says.
-
-        Parameters
-        ----------
-        joint
-            One of `joints`; its own spring and force are left out.
         """
         along = [c for c in self.coordinates if derivative(joint.motion, c.symbol) != 0]
         at_rest = {c.rate: sp.Integer(0) for c in self.coordinates}

@@ -119,24 +119,12 @@ class Sensor:
 
 @dataclass(frozen=True)
 class RateState:
-    """A first-order state: a filter, an integrator, a pressure.
+    """A first-order state: a filter, an integrator, a pressure."""
 
-    Attributes
-    ----------
-    symbol
-        The state.
-    rate
-        Its time derivative.
-    unit
-        SI unit.
-    about
-        What it is.
-    """
-
-    symbol: sp.Symbol
-    rate: sp.Expr
-    unit: str
-    about: str = ""
+    symbol: sp.Symbol  # the state
+    rate: sp.Expr  # its time derivative
+    unit: str  # SI unit
+    about: str = ""  # what it is
 
     @property
     def name(self) -> str:

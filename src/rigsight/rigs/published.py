@@ -20,42 +20,21 @@ _KEYS = ("title", "source", "rig", "amplitude", "notes", "constants", "parameter
 
 @dataclass(frozen=True)
 class PublishedSet:
-    """A published parameter set.
+    """A published parameter set."""
 
-    Attributes
-    ----------
-    name
-        Name of its file without the ending.
-    title
-        What it is, one line.
-    source
-        Publication and table.
-    rig
-        Name of the rig.
-    constants
-        Value of each constant of the rig.
-    parameters
-        Value of each parameter of the rig.
-    effects
-        Effect -> its parameter values.
-    given
-        Values as the source prints them, where it gives an alternative parameter (conicity instead of creep factor).
-    amplitude
-        Amplitude of the input the set was fitted at, None if it claims to hold at every one.
-    notes
-        What to know before using it.
-    """
-
-    name: str
-    title: str
-    source: str
+    name: str  # name of its file without the ending
+    title: str  # what it is, one line
+    source: str  # publication and table
     rig: str
-    constants: Mapping[str, float]
-    parameters: Mapping[str, float]
-    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    constants: Mapping[str, float]  # value of each constant of the rig
+    parameters: Mapping[str, float]  # value of each parameter of the rig
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # effect -> its parameter values
+    # Values as the source prints them, where it gives an alternative parameter (conicity instead of creep
+    # factor).
     given: Mapping[str, float] = field(default_factory=dict)
+    # Amplitude of the input the set was fitted at, None if it claims to hold at every one.
     amplitude: float | None = None
-    notes: str = ""
+    notes: str = ""  # what to know before using it
 
     def values(self) -> dict[str, float]:
         """Return all values by name, as a simulation of the rig with these effects takes them."""
@@ -80,20 +59,7 @@ def _name(file: Traversable) -> str:
 
 
 def parse_published_set(name: str, text: str) -> PublishedSet:
-    """Read a published set from TOML.
-
-    Parameters
-    ----------
-    name
-        How the set is called.
-    text
-        TOML with title, source, rig, and the tables constants, parameters and effects.
-
-    Raises
-    ------
-    InputError
-        If the text is no TOML, a key is missing or unknown, or a value is outside what rig and effects declare.
-    """
+    """Read a published set from TOML."""
     try:
         content = tomllib.loads(text)
         for key in content:

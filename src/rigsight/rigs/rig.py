@@ -23,21 +23,11 @@ from rigsight.units import unit_text
 
 @dataclass(frozen=True)
 class Alternative:
-    """A number that people know in the place of one of the rig's own.
-
-    Attributes
-    ----------
-    parameter
-        The number.
-    gives
-        Name of the parameter that follows from it.
-    value
-        That parameter, of the number and of constants.
-    """
+    """A number that people know in the place of one of the rig's own."""
 
     parameter: Parameter
-    gives: str
-    value: sp.Expr
+    gives: str  # name of the parameter that follows from it
+    value: sp.Expr  # that parameter, of the number and of constants
 
 
 @dataclass(frozen=True)

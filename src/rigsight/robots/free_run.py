@@ -30,24 +30,13 @@ _WAY = {False: 0.4, True: 0.05}
 
 @dataclass(frozen=True)
 class FreeRun:
-    """A run of both.
+    """A run of both."""
 
-    Attributes
-    ----------
-    duration
-        Of the run [s].
-    differences
-        Coordinate -> largest difference, relative to how far the coordinate moves.
-    left_out
-        Descriptions of what was switched off in both.
-    allowed
-        Largest difference of equations that are the same.
-    """
-
-    duration: float
+    duration: float  # of the run [s]
+    # Coordinate -> largest difference, relative to how far the coordinate moves.
     differences: dict[str, float]
-    left_out: tuple[str, ...]
-    allowed: float = ALLOWED
+    left_out: tuple[str, ...]  # descriptions of what was switched off in both
+    allowed: float = ALLOWED  # largest difference of equations that are the same
 
     @property
     def worst(self) -> float:
@@ -65,13 +54,6 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
 
     MuJoCo uses the Runge-Kutta method of fourth order with a small step. What is not in a rig file is switched off in it:
     contacts, ranges and equality constraints. Dry friction is off in both, because MuJoCo's creeps where it should stick.
-
-    Parameters
-    ----------
-    model
-        Compiled, with the second joint of each gear; it stays as it is.
-    draft
-        Its rig file.
     """
     import copy
 

@@ -17,26 +17,7 @@ _WHOLE = 1e-6
 
 
 def sensor_readings(model: mujoco.MjModel, controls: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
-    """Run a model by its own integrator from where it is drawn, at rest.
-
-    Parameters
-    ----------
-    model
-        Compiled.
-    controls
-        Shape (n_samples, n_actuators); each is held until the next.
-    dt
-        Sample time [s], a whole number of the model's steps.
-
-    Returns
-    -------
-    Shape (n_samples, n_readings): what the sensors show at each sample, before its control acts.
-
-    Raises
-    ------
-    InputError
-        If the controls are not as many as the actuators, or `dt` is no whole number of steps.
-    """
+    """Run a model by its own integrator from where it is drawn, at rest."""
     import mujoco
 
     controls = np.asarray(controls, dtype=np.float64)

@@ -17,40 +17,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RobotFile:
-    """A robot's model with its rig.
+    """A robot's model with its rig."""
 
-    Attributes
-    ----------
-    spec
-        What the file says; may be changed.
-    model
-        Compiled.
-    draft
-        Its rig file.
-    """
-
-    spec: mujoco.MjSpec
-    model: mujoco.MjModel
-    draft: RigDraft
+    spec: mujoco.MjSpec  # what the file says; may be changed
+    model: mujoco.MjModel  # compiled
+    draft: RigDraft  # its rig file
 
 
 def read_robot(path: Path, gears: Mapping[str, float] | None = None, *, as_it_is: bool = False) -> RobotFile:
-    """Read an MJCF or URDF file; a URDF, which has no actuators, gets a force or torque at every joint.
-
-    Parameters
-    ----------
-    path
-        The file.
-    gears
-        Name of a joint -> stiffness of its gear [N m/rad or N/m].
-    as_it_is
-        Leave the bodies to MuJoCo, with all that binds them.
-
-    Raises
-    ------
-    InputError
-        Naming the file, if MuJoCo is not installed or cannot read it, or its motion cannot be represented in a rig file.
-    """
+    """Read an MJCF or URDF file; a URDF, which has no actuators, gets a force or torque at every joint."""
     spec = load_spec(path)
     model = spec.compile()
     try:

@@ -19,15 +19,7 @@ _SINGULAR = 1e-9
 
 
 def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
-    """Return True if a rig can rest at different positions under the same force, and a sensor shows the difference.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    known
-        Values of constants and parameters; the others are drawn at random, since only zero values matter.
-    """
+    """Return True if a rig can rest at different positions under the same force, and a sensor shows the difference."""
     structure = compose(rig)
     motion = structure.tree.motion
     if not motion.coordinates:

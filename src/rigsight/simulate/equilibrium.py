@@ -37,21 +37,6 @@ def equilibrium(
     Without inputs the rig rests where its springs and weights are in balance without friction. From there, friction holds a joint
     until it is overcome. States on which no force acts stay at zero, and so do all states if there is no equilibrium.
 
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    p
-        Parameter values, shape (n_parameters,).
-    inputs
-        Inputs at the start, shape (n_inputs,).
-    given
-        Known states, by index; the others are in equilibrium with them. All velocities are zero.
-
-    Returns
-    -------
-    Shape (n_states,).
-
     References
     ----------
     M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for steps with multipliers instead of friction signs.
@@ -73,29 +58,16 @@ def equilibrium(
 
 @dataclass(frozen=True)
 class _Balance:
-    """Residuals of the equilibrium, as functions of (parameters, inputs, states, previous states, friction signs).
+    """Residuals of the equilibrium, as functions of (parameters, inputs, states, previous states, friction signs)."""
 
-    Attributes
-    ----------
-    rates
-        Balance of each state that can be unknown, shape (n_unknown,).
-    turned
-        Motion of the joints with dry friction since the previous states, shape (n_frictions,).
-    unknown
-        Indices of the states that can be unknown: all but the velocities.
-    n_frictions
-        Number of joints with dry friction.
-    remembers
-        Whether there are hysteresis states, which depend on the path and not on the forces.
-    one_sided
-        Null values, by parameter index, of directional friction, which would otherwise exert a force at sign zero.
-    """
-
-    rates: Callable[..., Any]
+    rates: Callable[..., Any]  # balance of each state that can be unknown, shape (n_unknown,)
+    # Motion of the joints with dry friction since the previous states, shape (n_frictions,).
     turned: Callable[..., Any]
-    unknown: tuple[int, ...]
-    n_frictions: int
-    remembers: bool
+    unknown: tuple[int, ...]  # indices of the states that can be unknown: all but the velocities
+    n_frictions: int  # number of joints with dry friction
+    remembers: bool  # whether there are hysteresis states, which depend on the path and not on the forces
+    # Null values, by parameter index, of directional friction, which would otherwise exert a force at sign
+    # zero.
     one_sided: Mapping[int, float]
 
 

@@ -33,25 +33,15 @@ _LONGEST_KEPT = 50_000
 
 @dataclass(frozen=True)
 class HeldInput:
-    """An input, or several, between its samples.
+    """An input, or several, between its samples."""
 
-    Attributes
-    ----------
-    coefficients
-        Shape (n_intervals + 1, 4), for several inputs (n_intervals + 1, n_inputs, 4): ``c0 + c1 tau + c2 tau^2 + c3 tau^3`` with
-        tau [s] from the start of each interval; row 0 is the input before the record, held at its first value.
-    interval
-        Length of an interval [s].
-    per_sample
-        Intervals per sample time.
-    continuous
-        False if the input jumps between intervals.
-    """
-
+    # Shape (n_intervals + 1, 4), for several inputs (n_intervals + 1, n_inputs, 4): ``c0 + c1 tau + c2 tau^2
+    # + c3 tau^3`` with tau [s] from the start of each interval; row 0 is the input before the record, held at
+    # its first value.
     coefficients: NDArray[np.float64]
-    interval: float
-    per_sample: int
-    continuous: bool
+    interval: float  # length of an interval [s]
+    per_sample: int  # intervals per sample time
+    continuous: bool  # false if the input jumps between intervals
 
     @property
     def n_pieces(self) -> int:
@@ -63,15 +53,7 @@ class HeldInput:
         return replace(self, coefficients=self.coefficients[: (n_samples - 1) * self.per_sample + 1])
 
     def with_input(self, column: int, held: HeldInput) -> HeldInput:
-        """Return the same inputs with another one in the place of one of them; longer pieces are divided.
-
-        Parameters
-        ----------
-        column
-            Index of the input that is replaced.
-        held
-            The other one, of the same record.
-        """
+        """Return the same inputs with another one in the place of one of them; longer pieces are divided."""
         ours, theirs = _alike_divided((self, held))
         rows = ours.coefficients.reshape(ours.n_pieces + 1, -1, 4).copy()
         rows[:, column] = theirs.coefficients
@@ -88,13 +70,6 @@ class HeldInput:
         """Return the same with one input advanced in time, with cubic Hermite interpolation between nodes.
 
         Beyond either end it is continued with its slope and curvature there.
-
-        Parameters
-        ----------
-        column
-            Index of the input.
-        by
-            Time by which it is advanced [s]; negative for a delay.
         """
         n, rows = self.n_pieces, self.coefficients.reshape(self.n_pieces + 1, -1, 4)
         if n == 0 or by == 0.0:
@@ -131,18 +106,7 @@ class HeldInput:
 
 
 def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput:
-    """Return the input between its samples.
-
-    Parameters
-    ----------
-    samples
-        Shape (n_samples,).
-    dt
-        Sample time [s].
-    hold
-        ``"zoh"`` (constant until the next sample), ``"foh"`` (linear) or ``"band_limited"`` (sampled analog signal: windowed
-        sinc interpolation; beyond the ends the signal is predicted).
-    """
+    """Return the input between its samples."""
     samples = np.ascontiguousarray(samples, dtype=np.float64)
     if samples.size > _LONGEST_KEPT:
         return _between(samples, dt, hold)

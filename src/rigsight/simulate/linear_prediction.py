@@ -18,17 +18,6 @@ def continued(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     A reflection about the last sample would reverse the curvature there: the slope at the end of an interpolation would be off by
     as much as a tenth of its size.
 
-    Parameters
-    ----------
-    samples
-        Shape (n_samples,).
-    count
-        Number of additional samples at either end.
-
-    Returns
-    -------
-    Shape (count + n_samples + count,).
-
     References
     ----------
     S. M. Kay, *Modern Spectral Estimation* (Prentice Hall 1988), chapter 7, for the modified covariance method.

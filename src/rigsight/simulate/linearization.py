@@ -36,26 +36,16 @@ _VANISHES = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class LateSignals:
-    """Delayed signals of a linearization: each is its signal v plus the change ``(e^(-s T) - 1) v``.
+    """Delayed signals of a linearization: each is its signal v plus the change ``(e^(-s T) - 1) v``."""
 
-    Attributes
-    ----------
-    delays
-        T [s], shape (n_late,).
-    on_states, on_outputs, on_signals
-        Effect of the changes on z', y and v, shapes (n_states, n_late), (n_outputs, n_late) and (n_late, n_late).
-    from_states
-        v by z, shape (n_late, n_states).
-    from_inputs
-        v by the inputs and their first and second derivatives, shape (3, n_late, n_inputs).
-    """
-
-    delays: Floats
+    delays: Floats  # T [s], shape (n_late,)
+    # Effect of the changes on z', y and v, shapes (n_states, n_late), (n_outputs, n_late) and (n_late,
+    # n_late).
     on_states: Floats
     on_outputs: Floats
     on_signals: Floats
-    from_states: Floats
-    from_inputs: Floats
+    from_states: Floats  # v by z, shape (n_late, n_states)
+    from_inputs: Floats  # v by the inputs and their first and second derivatives, shape (3, n_late, n_inputs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,35 +54,22 @@ class Linearization:
 
     If the equations contain rates of inputs (a prescribed motion), z is the state minus a part proportional to the inputs and
     their rates.
-
-    Attributes
-    ----------
-    inputs, states, outputs
-        Names.
-    at_inputs
-        The constant inputs, shape (n_inputs,).
-    at_state
-        The equilibrium under these inputs, shape (n_states,).
-    rests
-        False if there is no equilibrium: the equations were then linearized at the state closest to one.
-    state_matrix, input_matrix, output_matrix
-        A, B and C, shapes (n_states, n_states), (n_states, n_inputs) and (n_outputs, n_states).
-    feedthrough
-        D, D_1 and D_2, shape (3, n_outputs, n_inputs).
-    late
-        Signals with a delay; None if there are none. The matrices, and the poles, are those without delays.
     """
 
+    # Names.
     inputs: tuple[str, ...]
     states: tuple[str, ...]
     outputs: tuple[str, ...]
-    at_inputs: Floats
-    at_state: Floats
+    at_inputs: Floats  # the constant inputs, shape (n_inputs,)
+    at_state: Floats  # the equilibrium under these inputs, shape (n_states,)
+    # False if there is no equilibrium: the equations were then linearized at the state closest to one.
     rests: bool
+    # A, B and C, shapes (n_states, n_states), (n_states, n_inputs) and (n_outputs, n_states).
     state_matrix: Floats
     input_matrix: Floats
     output_matrix: Floats
-    feedthrough: Floats
+    feedthrough: Floats  # D, D_1 and D_2, shape (3, n_outputs, n_inputs)
+    # Signals with a delay; None if there are none. The matrices, and the poles, are those without delays.
     late: LateSignals | None = None
 
     @cached_property
@@ -133,13 +110,7 @@ class Linearization:
         return _ROUNDED * float(np.max(np.abs(self.poles), initial=0.0))
 
     def frequency_response(self, omega: Floats) -> NDArray[np.complex128]:
-        """Return the response of every output to every input, delays included, shape (n_frequencies, n_outputs, n_inputs).
-
-        Parameters
-        ----------
-        omega
-            Angular frequencies [rad/s], shape (n_frequencies,); none may be a pole.
-        """
+        """Return the response of every output to every input, delays included, shape (n_frequencies, n_outputs, n_inputs)."""
         s = np.asarray(1j * np.asarray(omega, dtype=np.float64)[:, None, None], dtype=np.complex128)
         inner = self._states_by(s, self.input_matrix)
 
@@ -190,13 +161,7 @@ class Linearization:
         return bool(abs(np.unwrap(np.angle(turned))[-1] - np.angle(turned[0])) > np.pi / 2.0)
 
     def transfer_function(self, source: str, response: str) -> TransferFunction:
-        """Return numerator and denominator from one input to one output, without zeros and poles that cancel.
-
-        Raises
-        ------
-        ValueError
-            If there is no such input or output.
-        """
+        """Return numerator and denominator from one input to one output, without zeros and poles that cancel."""
         column, row = self.inputs.index(source), self.outputs.index(response)
         b, c = self.input_matrix[:, column], self.output_matrix[row]
         direct = self.feedthrough[:, row, column]
@@ -213,22 +178,15 @@ class Linearization:
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """A ratio of polynomials in s.
+    """A ratio of polynomials in s."""
 
-    Attributes
-    ----------
-    source, response
-        Names of input and output.
-    numerator, denominator
-        Coefficients, the highest power first; the first of the denominator is 1.
-    zeros, poles
-        Their roots [1/s].
-    """
-
+    # Names of input and output.
     source: str
     response: str
+    # Coefficients, the highest power first; the first of the denominator is 1.
     numerator: Floats
     denominator: Floats
+    # Their roots [1/s].
     zeros: NDArray[np.complex128]
     poles: NDArray[np.complex128]
 
@@ -240,26 +198,7 @@ def linearize(
     state: Floats | None = None,
     near: Floats | None = None,
 ) -> Linearization:
-    """Return the linear system close to an equilibrium under constant inputs.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    values
-        Value of each of the structure's parameters, by name.
-    inputs
-        Constant value of each input; those left out are zero.
-    state
-        State at which to linearize instead of the equilibrium, shape (n_states,).
-    near
-        Of several equilibria, the one closest to this state is used, shape (n_states,); default is the start declared by the rig.
-
-    Raises
-    ------
-    SimulationError
-        If the mass matrix is singular or the equations have no finite derivative there.
-    """
+    """Return the linear system close to an equilibrium under constant inputs."""
     names = structure.rig.mechanism.inputs
     at_inputs = np.array([(inputs or {}).get(name, 0.0) for name in names], dtype=np.float64)
     p = parameter_vector(structure, values)
@@ -317,15 +256,7 @@ def linearize(
 
 
 def is_linear(structure: Structure, values: Mapping[str, float]) -> bool:
-    """Return True if the equations are linear and do not depend on time: the linearization is then the model itself.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    values
-        Value of each of the structure's parameters, by name.
-    """
+    """Return True if the equations are linear and do not depend on time: the linearization is then the model itself."""
     opened, _ = _opened(structure)
     tree, motion = opened.tree, opened.tree.motion
     triples = [input_symbols(index) for index in range(len(structure.rig.mechanism.inputs))]

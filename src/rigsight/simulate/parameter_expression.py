@@ -13,21 +13,7 @@ from rigsight.simulate.equations.structure import Structure
 
 
 def at_parameters(structure: Structure, expression: sp.Expr, p: NDArray[np.float64]) -> Any:
-    """Return the value of an expression.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    expression
-        Of the structure's parameters alone.
-    p
-        Parameter values in the order of the structure, shape (n_parameters,) or (n_parameters, n_sets).
-
-    Returns
-    -------
-    A number, or an array of shape (n_sets,); an expression without parameters has a number for all sets.
-    """
+    """Return the value of an expression."""
     return _function(structure.parameter_symbols, expression)(*p)
 
 

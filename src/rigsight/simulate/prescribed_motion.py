@@ -38,18 +38,6 @@ def smooth_motion(
     The amount of smoothing is chosen by generalized cross validation, so that noise and quantization of the sensor do not
     become velocity.
 
-    Parameters
-    ----------
-    displacement
-        Shape (n_samples,).
-    dt
-        Sample time [s].
-
-    Returns
-    -------
-    displacement, velocity
-        Shape (n_samples,) each; velocity per second.
-
     References
     ----------
     G. Wahba, *Spline Models for Observational Data* (SIAM 1990), chapter 4. D. Garcia, Comput. Stat. Data Anal. 54 (2010) 1167,
@@ -62,20 +50,7 @@ def smooth_motion(
 def accelerated_motion(
     displacement: NDArray[np.float64], dt: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return displacement and velocity of `smooth_motion`, and the acceleration.
-
-    Parameters
-    ----------
-    displacement
-        Shape (n_samples,).
-    dt
-        Sample time [s].
-
-    Returns
-    -------
-    displacement, velocity, acceleration
-        Shape (n_samples,) each; velocity and acceleration per second.
-    """
+    """Return displacement and velocity of `smooth_motion`, and the acceleration."""
     values, slopes, bends = _kept(displacement)
     return values, slopes / dt, bends / dt**2
 
@@ -105,20 +80,6 @@ def smoothed_noise(
 
     Each cosine of the noise is smoothed by itself: a hundred times as fast as another spline, with the same result except at the
     ends.
-
-    Parameters
-    ----------
-    displacement
-        Shape (n_samples,).
-    noise
-        Small compared to the noise that the displacement already contains, shape (n_samples,).
-    dt
-        Sample time [s].
-
-    Returns
-    -------
-    displacement, velocity
-        Shape (n_samples,) each; velocity per second.
     """
     n = noise.size
     weight = _penalty_kept(np.ascontiguousarray(displacement, dtype=np.float64).tobytes())

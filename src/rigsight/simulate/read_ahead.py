@@ -18,17 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def read_ahead(structure: Structure, held: HeldInput, p: Floats) -> tuple[HeldInput, Floats]:
-    """Return input and parameters, with the measured motion of delayed sensors advanced by the delays of the first set.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects; without an observer nothing is changed.
-    held
-        Recorded input, with the readings that the observer follows.
-    p
-        Shape (n_parameters,) or (n_parameters, n_sets).
-    """
+    """Return input and parameters, with the measured motion of delayed sensors advanced by the delays of the first set."""
     delays = structure.observed_delays
     if not delays:
         return held, p

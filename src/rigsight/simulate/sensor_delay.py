@@ -13,23 +13,7 @@ from rigsight.simulate.parameter_expression import at_parameters
 def as_measured(
     structure: Structure, p: NDArray[np.float64], out: NDArray[np.float64], held: HeldInput
 ) -> NDArray[np.float64]:
-    """Shift outputs by the delays of their sensors; beyond its ends the record is continued with its rates there.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    p
-        Parameter values, shape (n_parameters, n_sets).
-    out
-        Outputs of the kernel, shape (n_samples, n_computed, n_sets); the last columns are the rates of the delayed outputs.
-    held
-        Input of the simulation, for its sample time.
-
-    Returns
-    -------
-    Shape (n_samples, n_outputs, n_sets), by cubic Hermite interpolation: of fourth order in the sample time.
-    """
+    """Shift outputs by the delays of their sensors; beyond its ends the record is continued with its rates there."""
     if not structure.is_shifted:
         return out
     n_samples = out.shape[0]

@@ -49,12 +49,6 @@ class Substeps(int):
 
 
 def relative_needs(taken: NDArray[np.intc]) -> NDArray[np.float64]:
-    """Return the steps that pieces need, relative to a number that is sufficient for all but a few of them.
-
-    Parameters
-    ----------
-    taken
-        Steps of the accurate integrator in each piece, shape (n_pieces,).
-    """
+    """Return the steps that pieces need, relative to a number that is sufficient for all but a few of them."""
     place = int(_NEEDED_BY * (taken.size - 1))
     return np.asarray(taken / max(float(np.partition(taken, place)[place]), 1.0))

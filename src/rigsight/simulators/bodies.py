@@ -48,13 +48,7 @@ class Program(Protocol):
         """Connect a library that contains `c_text` with the program."""
 
     def check(self) -> None:
-        """Raise an error of the program that occurred during calls from C.
-
-        Raises
-        ------
-        InputError
-            If something did.
-        """
+        """Raise an error of the program that occurred during calls from C."""
 
 
 @dataclass(frozen=True)
@@ -168,20 +162,7 @@ class Answers:
         self._answer.argtypes = [ctypes.c_int, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
 
     def at(self, arguments: Floats, *, is_force: bool) -> Floats:
-        """Return the lower half of the mass matrix, or the forces, shape (n_values, n_places).
-
-        Parameters
-        ----------
-        arguments
-            Those of a leaf, shape (n_arguments, n_places).
-        is_force
-            Which of the two.
-
-        Raises
-        ------
-        InputError
-            If the program fails.
-        """
+        """Return the lower half of the mass matrix, or the forces, shape (n_values, n_places)."""
         n = self._bodies.n
         places = np.ascontiguousarray(arguments.T, dtype=np.float64)
         found = np.empty((places.shape[0], n if is_force else n * (n + 1) // 2))
@@ -225,13 +206,7 @@ def bodies_of(key: int) -> Bodies:
 
 
 def model_digest(kind: str, path: Path) -> str:
-    """Return the hash of a model: of MuJoCo's as it is compiled, with all files that it includes.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
+    """Return the hash of a model: of MuJoCo's as it is compiled, with all files that it includes."""
     try:
         content = path.read_bytes()
     except OSError as error:

@@ -160,13 +160,7 @@ class MujocoProgram:
 
 
 def opened(path: Path) -> mujoco.MjModel:
-    """Return a model.
-
-    Raises
-    ------
-    InputError
-        If MuJoCo is not installed or cannot read the file.
-    """
+    """Return a model."""
     try:
         import mujoco
     except ImportError:
@@ -178,13 +172,7 @@ def opened(path: Path) -> mujoco.MjModel:
 
 
 def compiled_model(path: Path) -> bytes:
-    """Return a model as MuJoCo compiles it.
-
-    Raises
-    ------
-    InputError
-        As `opened`.
-    """
+    """Return a model as MuJoCo compiles it."""
     model = opened(path)
     import mujoco
 
@@ -194,15 +182,7 @@ def compiled_model(path: Path) -> bytes:
 
 
 def bodies_alone(model: mujoco.MjModel, *, without_armature: bool) -> mujoco.MjModel:
-    """Return a model without what the rig declares itself: dampers, springs and dry friction of joints, and actuators.
-
-    Parameters
-    ----------
-    model
-        It is changed.
-    without_armature
-        Leave out the inertia of rotors as well.
-    """
+    """Return a model without what the rig declares itself: dampers, springs and dry friction of joints, and actuators."""
     import mujoco
 
     model.dof_damping[:] = 0.0

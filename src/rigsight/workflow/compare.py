@@ -51,36 +51,7 @@ def run_compare(
     listener: Listener = silent,
     command: str | None = None,
 ) -> Comparison:
-    """Score models on all records of a campaign.
-
-    Parameters
-    ----------
-    campaign
-        The toml file or its folder.
-    models
-        Each a ``model.json``, the folder that contains one, the name of a published set, or ``given`` for the
-        campaign's own simulation; ``NAME=MODEL`` gives it a name.
-    out
-        Folder for the results; None writes nothing.
-    method
-        Estimator of all frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
-    step_seconds
-        Seconds from a step in which it is compared; the thesis takes four.
-    own_effects, own_rigs
-        Effects and rigs that campaign and models may name beside those of the catalogue and the built-in ones.
-    n_jobs
-        Records compared at the same time; None for one per processor.
-    listener
-        Told of every finished record.
-    command
-        The command line that the page quotes.
-
-    Raises
-    ------
-    InputError
-        If the campaign or a model cannot be used, a model is of another rig, no model can be simulated on any record, or the
-        results cannot be written; nothing is written then.
-    """
+    """Score models on all records of a campaign."""
     _check_wishes(models, method, step_seconds)
     jobs = checked_jobs(n_jobs)
     if out is not None:
@@ -102,22 +73,7 @@ def compare_campaign(
     n_jobs: int = 1,
     listener: Listener = silent,
 ) -> Comparison:
-    """Score models on all records of a campaign that was read or made of records.
-
-    Parameters
-    ----------
-    campaign
-        The campaign.
-    competitors
-        Models of its rig.
-    method, step_seconds, n_jobs, listener
-        As in `run_compare`.
-
-    Raises
-    ------
-    InputError
-        If the method is unknown, the step window is no positive number, or no model can be simulated on any record.
-    """
+    """Score models on all records of a campaign that was read or made of records."""
     _check_wishes(competitors, method, step_seconds)
     if method == "thesis" and not campaign.rig.has_one_motion:
         raise InputError(
@@ -174,13 +130,7 @@ def _check_wishes(models: Sequence[object], method: str, step_seconds: float) ->
 
 
 def write_comparison(comparison: Comparison, out: Path, command: str) -> tuple[Path, ...]:
-    """Write all results of a comparison into a folder, all or none.
-
-    Raises
-    ------
-    InputError
-        If they cannot be written.
-    """
+    """Write all results of a comparison into a folder, all or none."""
     figures = comparison_figures(comparison)
     return write_together(
         out,
@@ -199,22 +149,7 @@ def named_competitors(
     own_effects: Sequence[Effect] = (),
     own_rigs: Sequence[Rig] = (),
 ) -> list[Competitor]:
-    """Return models with names of their own.
-
-    Parameters
-    ----------
-    models
-        As in `run_compare`.
-    campaign
-        The campaign on which they are to be compared.
-    own_effects, own_rigs
-        As in `run_compare`.
-
-    Raises
-    ------
-    InputError
-        If one cannot be read or is of another rig.
-    """
+    """Return models with names of their own."""
     found: list[Competitor] = []
     for text in map(str, models):
         name, source = _name_and_source(text)
@@ -228,13 +163,7 @@ def named_competitors(
 
 
 def given_model(campaign: Campaign) -> Model:
-    """Return the given simulation of a campaign as a model.
-
-    Raises
-    ------
-    InputError
-        If the campaign does not give all of its parameters.
-    """
+    """Return the given simulation of a campaign as a model."""
     structure = compose(campaign.rig, campaign.modelled)
     defaults = {p.name: p.default for p in structure.parameters if p.default is not None}
     values = {**defaults, **campaign.constants, **campaign.given}
@@ -248,13 +177,7 @@ def given_model(campaign: Campaign) -> Model:
 
 
 def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
-    """Return a model that can be compared on the records of a campaign.
-
-    Raises
-    ------
-    InputError
-        If it is of another rig.
-    """
+    """Return a model that can be compared on the records of a campaign."""
     own, rig = model.structure.rig, campaign.rig
     if own.name == rig.name and own.mechanism != rig.mechanism:
         raise InputError(

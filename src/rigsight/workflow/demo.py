@@ -76,26 +76,7 @@ def run_demo(
     listener: Listener = silent,
     command: str = "rigsight demo",
 ) -> Diagnosis:
-    """Measure a virtual running gear with a hidden hysteresis and diagnose the campaign.
-
-    Parameters
-    ----------
-    out
-        Folder for the results of the diagnosis; the campaign goes into its folder ``campaign``.
-    seed
-        Seed of the sensor noise and of the diagnosis.
-    n_jobs
-        Candidates fitted at the same time; None for one per processor.
-    listener
-        Told of every finished step.
-    command
-        The command line that the report quotes.
-
-    Raises
-    ------
-    InputError
-        If the results cannot be written.
-    """
+    """Measure a virtual running gear with a hidden hysteresis and diagnose the campaign."""
     out = Path(out)
     jobs = checked_jobs(n_jobs)
     check_writable(out)

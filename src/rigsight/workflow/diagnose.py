@@ -49,34 +49,6 @@ def run_diagnose(
     """Diagnose the gap between the simulation that a campaign gives and its records.
 
     Fits of an interrupted diagnosis of the same campaign are reused; the listener gets a step that says so.
-
-    Parameters
-    ----------
-    campaign
-        The toml file or its folder.
-    out
-        Folder for ``diagnosis.json``, ``model.json`` and ``report.html``; None writes nothing.
-    effects
-        Candidates.
-    own_effects
-        Effects beside those of the catalogue that the given simulation may have already.
-    own_rigs
-        Rigs that the campaign may name beside the built-in ones.
-    seed
-        Seed of the resampling behind probabilities.
-    n_jobs
-        Candidates fitted at the same time; None for one per processor.
-    listener
-        Told of every finished step.
-    command
-        The command line that a report quotes.
-
-    Raises
-    ------
-    InputError
-        If the campaign cannot be used or the results cannot be written; nothing is written then.
-    SimulationError
-        If the given simulation cannot be run.
     """
     jobs = checked_jobs(n_jobs)
     if out is not None:
@@ -100,26 +72,7 @@ def diagnose_campaign(
     listener: Listener = silent,
     keep: Callable[[Diagnosis], None] | None = None,
 ) -> Diagnosis:
-    """Diagnose the gap between the simulation that a campaign gives and its records.
-
-    Parameters
-    ----------
-    campaign
-        A campaign that was read or made from records; only one with a file is continued after an interruption.
-    effects
-        Candidates; those that do not apply to the rig, or that the simulation already has, are skipped.
-    seed, n_jobs, listener
-        As in `run_diagnose`.
-    keep
-        Called with the result before the stored fits are deleted, so that they are kept if it fails (as on a full disk).
-
-    Raises
-    ------
-    InputError
-        If a candidate is at a place that the rig does not have.
-    SimulationError
-        If the given simulation cannot be run.
-    """
+    """Diagnose the gap between the simulation that a campaign gives and its records."""
     tell(campaign.notes, listener)
     # An effect without a place is skipped if it does not apply; a place that was named must exist.
     named = [effect for effect in effects if effect.at is None] + [
@@ -160,13 +113,7 @@ def _tell_going_on(count: int, listener: Listener) -> None:
 def write_diagnosis(
     diagnosis: Diagnosis, out: Path, command: str, seed: int | None, effects: Iterable[Effect] = CATALOGUE
 ) -> tuple[Path, ...]:
-    """Write the three results of a diagnosis into a folder, all or none; the report shows the equations of these effects.
-
-    Raises
-    ------
-    InputError
-        If they cannot be written.
-    """
+    """Write the three results of a diagnosis into a folder, all or none; the report shows the equations of these effects."""
     return write_together(out, result_files(diagnosis, command, seed, effects))
 
 

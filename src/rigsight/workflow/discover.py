@@ -47,36 +47,7 @@ def run_discover(
     n_jobs: int | None = None,
     listener: Listener = silent,
 ) -> Discovery:
-    """Discover the governing equations behind the records of a campaign.
-
-    Parameters
-    ----------
-    campaign
-        The toml file or its folder.
-    out
-        Folder for ``discovery.json``, ``model.json`` and ``discovery.svg``; None writes nothing.
-    method
-        ``"discrepancy"``: the rig's own terms are kept and their residual is regressed; ``"full"``: the whole acceleration is.
-    pointwise
-        Regress sample by sample instead of in the weak form.
-    one_by_one
-        Also discover on each estimation record alone.
-    own_rigs
-        Rigs that the campaign may name beside the built-in ones.
-    seed
-        Seed of the ensembles.
-    n_jobs
-        Records discovered on at the same time; None for one per processor.
-    listener
-        Told of every finished step.
-
-    Raises
-    ------
-    InputError
-        If the campaign or its records cannot be used, or the results cannot be written; nothing is written then.
-    SimulationError
-        If the rig's own equations cannot be simulated near the records.
-    """
+    """Discover the governing equations behind the records of a campaign."""
     check_option("The method", method, METHODS)
     jobs = checked_jobs(n_jobs)
     if out is not None:
@@ -105,22 +76,7 @@ def discover_campaign(
     n_jobs: int = 1,
     listener: Listener = silent,
 ) -> Discovery:
-    """Discover the governing equations behind the records of a campaign that was read or made of records.
-
-    Parameters
-    ----------
-    campaign
-        The campaign.
-    method, pointwise, one_by_one, seed, n_jobs, listener
-        As in `run_discover`.
-
-    Raises
-    ------
-    InputError
-        If the method is unknown or the records cannot be used.
-    SimulationError
-        If the rig's own equations cannot be simulated near the records.
-    """
+    """Discover the governing equations behind the records of a campaign that was read or made of records."""
     chosen = cast("Method", check_option("The method", method, METHODS))
     data = regression_data(campaign)
     tell(campaign.notes, listener)
@@ -145,19 +101,7 @@ def discover_campaign(
 
 
 def regression_data(campaign: Campaign) -> RegressionData:
-    """Return the data of a campaign for the regression; records of a rig that drifts are cut into windows.
-
-    Parameters
-    ----------
-    campaign
-        A campaign that was read.
-
-    Raises
-    ------
-    InputError
-        If its rig of one motion has other symbols than the built-in rigs, it models effects already, or records have constants
-        of their own.
-    """
+    """Return the data of a campaign for the regression; records of a rig that drifts are cut into windows."""
     _check_can_be_discovered(campaign)
     drifts = not has_stiffness(campaign)
     floors = noise_floors(campaign.rig, campaign.records, drifts=drifts)
@@ -168,27 +112,13 @@ def regression_data(campaign: Campaign) -> RegressionData:
 
 
 def only(data: RegressionData, record: Record) -> RegressionData:
-    """Return the data with one estimation record alone, whole or in windows, and with all validation records.
-
-    Parameters
-    ----------
-    data
-        Of the whole campaign.
-    record
-        One of the campaign's estimation records.
-    """
+    """Return the data with one estimation record alone, whole or in windows, and with all validation records."""
     own = tuple(r for r in data.records if r.role == "validation" or r.origin == record.name)
     return replace(data, windows=own)
 
 
 def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
-    """Write all results of a discovery into a folder, all or none.
-
-    Raises
-    ------
-    InputError
-        If they cannot be written.
-    """
+    """Write all results of a discovery into a folder, all or none."""
     return write_together(
         out,
         {

@@ -18,21 +18,11 @@ from rigsight.workflow.run.results import check_target, write_together
 
 @dataclass(frozen=True)
 class WrittenFile:
-    """A written file.
+    """A written file."""
 
-    Attributes
-    ----------
-    path
-        The file.
-    written
-        Descriptions of the changed fields of a robot model.
-    without_field
-        Descriptions of what the file has no field for.
-    """
-
-    path: Path
-    written: tuple[str, ...] = ()
-    without_field: tuple[str, ...] = ()
+    path: Path  # the file
+    written: tuple[str, ...] = ()  # descriptions of the changed fields of a robot model
+    without_field: tuple[str, ...] = ()  # descriptions of what the file has no field for
 
 
 ROBOT_TARGETS = {"mjcf": ".xml", "isaac": ".yaml"}
@@ -51,35 +41,7 @@ def run_export(
     own_effects: Sequence[Effect] = (),
     own_rigs: Iterable[Rig] = (),
 ) -> WrittenFile:
-    """Write a model for another tool.
-
-    Parameters
-    ----------
-    model
-        A ``model.json`` or the folder that contains one.
-    target
-        A key of `rigsight.export.TARGETS` or `ROBOT_TARGETS`.
-    out
-        File to write; default is the rig's name with the target's suffix in this folder. Its name is that of the function, C
-        prefix or model.
-    hold
-        How the input behaves between its samples; default is the model's.
-    step
-        Longest internal step of a target with a fixed one [s]; for ``isaac`` the step of its physics.
-    source_only
-        True for an FMU without a binary.
-    robot
-        The MJCF or URDF file from which the rig was made, for a key of `ROBOT_TARGETS`.
-    own_effects
-        Effects that the model may name beside those of the catalogue.
-    own_rigs
-        Rigs that it may name beside the built-in ones, where it does not declare its own.
-
-    Raises
-    ------
-    InputError
-        If the model cannot be read or expressed in the target, or the file cannot be written.
-    """
+    """Write a model for another tool."""
     check_option("Target", target, (*TARGETS, *ROBOT_TARGETS))
     read = named_model(model, own_effects, own_rigs)
     if target in ROBOT_TARGETS:

@@ -70,37 +70,6 @@ def run_identify(
     """Identify the rig behind the estimation records of a campaign, with the effects that its simulation has.
 
     The rig with effects of memory is calibrated as well if some are named.
-
-    Parameters
-    ----------
-    campaign
-        The toml file or its folder.
-    out
-        Folder for ``identification.json``, ``model.json`` and the figures; None writes nothing.
-    method
-        Estimator of the frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
-    resolution
-        Width in frequency asked for [rad/s]; None takes what each record gives.
-    effects
-        Effects with which the rig is calibrated as well, one of them with memory.
-    own_effects
-        Effects beside those of the catalogue that the simulation in question may have already.
-    own_rigs
-        Rigs that the campaign may name beside the built-in ones.
-    seed
-        Seed of the calibration.
-    n_jobs
-        Records identified at the same time; None for one per processor.
-    listener
-        Told of every finished step.
-    command
-        The command line that the page quotes.
-
-    Raises
-    ------
-    InputError
-        If the campaign cannot be used, the effects cannot be calibrated on its rig, a record is too short for the resolution
-        asked for, no record shows the motion, or the results cannot be written; nothing is written then.
     """
     options = checked_options(method, resolution)
     jobs = checked_jobs(n_jobs)
@@ -130,18 +99,7 @@ def run_identify(
 
 
 def checked_options(method: str, resolution: float | None) -> EstimationOptions:
-    """Return how records are to be read.
-
-    Parameters
-    ----------
-    method, resolution
-        As in `run_identify`.
-
-    Raises
-    ------
-    InputError
-        If the method is unknown or has no resolution, or the resolution is no positive number.
-    """
+    """Return how records are to be read."""
     check_option("The method", method, METHODS)
     if resolution is not None and not (math.isfinite(resolution) and resolution > 0.0):
         raise InputError(f"The resolution must be a positive number of rad/s, got {resolution!r}.")
@@ -162,27 +120,7 @@ def identify_campaign(
     effects: Sequence[Effect] = (),
     seed: int = 0,
 ) -> Identification:
-    """Identify each estimation record, then all of them together, and score the validation records.
-
-    Parameters
-    ----------
-    campaign
-        A campaign that was read or made of records.
-    options
-        How its records are to be read.
-    n_jobs
-        Records identified at the same time.
-    listener
-        Told of every finished step.
-    effects, seed
-        As in `run_identify`.
-
-    Raises
-    ------
-    InputError
-        If a record is too short for the resolution asked for, no record shows the motion, the effects cannot be calibrated on
-        the rig, or a seed is given without effects.
-    """
+    """Identify each estimation record, then all of them together, and score the validation records."""
     if seed and not effects:
         raise InputError(
             f"Only the calibration of effects draws random numbers, so the seed {seed} would change nothing. Leave it out, or "
@@ -286,22 +224,7 @@ def _over_time_alone(campaign: Campaign, options: EstimationOptions, n_jobs: int
 def write_identification(
     identification: Identification, out: Path, command: str = "", seed: int | None = None
 ) -> tuple[Path, ...]:
-    """Write all results of an identification into a folder, all or none.
-
-    Parameters
-    ----------
-    identification
-        The result.
-    out
-        Made if it does not exist.
-    command
-        The command line that the page quotes, if there is a page.
-
-    Raises
-    ------
-    InputError
-        If they cannot be written.
-    """
+    """Write all results of an identification into a folder, all or none."""
     figures = identification_figures(identification)
     captions = {file: what for file, (what, _) in figures.items()}
     page = {}

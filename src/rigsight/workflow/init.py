@@ -25,52 +25,24 @@ CAMPAIGN_FILE = "campaign.toml"
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A written campaign.
+    """A written campaign."""
 
-    Attributes
-    ----------
-    path
-        The file.
-    model
-        The rig that matches the channels best.
-    records
-        Files taken as records.
-    left_out
-        Other measured files, and why they were not taken.
-    n_blanks
-        Values that are left to be filled in.
-    others
-        Rigs that it was chosen from, where it is a guess.
-    """
-
-    path: Path
-    model: str
-    records: tuple[str, ...]
-    left_out: tuple[tuple[str, str], ...]
-    n_blanks: int
-    others: tuple[str, ...] = ()
+    path: Path  # the file
+    model: str  # the rig that matches the channels best
+    records: tuple[str, ...]  # files taken as records
+    left_out: tuple[tuple[str, str], ...]  # other measured files, and why they were not taken
+    n_blanks: int  # values that are left to be filled in
+    others: tuple[str, ...] = ()  # rigs that it was chosen from, where it is a guess
 
 
 @dataclass(frozen=True, eq=False)
 class ModelDraft:
-    """A written rig file.
+    """A written rig file."""
 
-    Attributes
-    ----------
-    path
-        The rig file.
-    draft
-        Its contents, and what it leaves out.
-    run
-        Its free run compared with MuJoCo.
-    campaign
-        The campaign in the same folder; None if the folder contains no records yet.
-    """
-
-    path: Path
-    draft: RigDraft
-    run: FreeRun
-    campaign: Draft | None
+    path: Path  # the rig file
+    draft: RigDraft  # its contents, and what it leaves out
+    run: FreeRun  # its free run compared with MuJoCo
+    campaign: Draft | None  # the campaign in the same folder; None if the folder contains no records yet
 
 
 def run_init(
@@ -80,24 +52,7 @@ def run_init(
     rig_files: Iterable[Path] = (),
     values: Mapping[str, float] | None = None,
 ) -> Draft:
-    """Write a `campaign.toml` for the measured files of a folder, and a copy of a rig file from elsewhere beside it.
-
-    Parameters
-    ----------
-    folder
-        Folder with the files; those in folders below it are not looked at.
-    model
-        The rig; None for the one that matches the channels best.
-    rig_files
-        Rigs of the user's own, beside the built-in ones.
-    values
-        Known parameter values of the given simulation; constants then keep the values of the rig file.
-
-    Raises
-    ------
-    InputError
-        If there is a campaign already, no file can be used, another file is in the way, or nothing can be written there.
-    """
+    """Write a `campaign.toml` for the measured files of a folder, and a copy of a rig file from elsewhere beside it."""
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder} is not a folder; name the folder of the measured files.")
@@ -139,26 +94,7 @@ def run_init_from_mjcf(
     as_it_is: bool = False,
     listener: Listener = silent,
 ) -> ModelDraft:
-    """Write the rig file of a MuJoCo model or URDF, and a campaign if its folder holds measured files.
-
-    Parameters
-    ----------
-    folder
-        Where it is written; created if it does not exist.
-    model_file
-        MJCF or URDF.
-    gears
-        Name of a joint -> stiffness of its gear [N m/rad or N/m].
-    as_it_is
-        Simulate the bodies in MuJoCo, with contacts, joint ranges, equality constraints and tendons.
-    listener
-        Called at every step of the work: the equations of many joints take a while.
-
-    Raises
-    ------
-    InputError
-        If the model cannot be read or taken over, a file is in the way, or nothing can be written there.
-    """
+    """Write the rig file of a MuJoCo model or URDF, and a campaign if its folder holds measured files."""
     folder, source = Path(folder), Path(model_file)
     robot = read_robot(source, gears, as_it_is=as_it_is)
     draft = robot.draft

@@ -22,34 +22,19 @@ _NAMED = 2.0
 
 @dataclass(frozen=True)
 class Inspection:
-    """The contents of a file.
+    """The contents of a file."""
 
-    Attributes
-    ----------
-    file, format
-        Its name and the name of its format.
-    channels
-        In the order of the file.
-    times
-        Channel that looks like time -> median step in its unit and number of gaps; None if it does not increase.
-    refused
-        What else is in the file, and why it cannot be a signal.
-    model
-        The rig that matches the channels best.
-    proposal
-        ``[[records]]`` entry, with what must be checked as comments.
-    n_blanks
-        Values that are left to be filled in there.
-    """
-
+    # Its name and the name of its format.
     file: str
     format: str
-    channels: tuple[ChannelSummary, ...]
+    channels: tuple[ChannelSummary, ...]  # in the order of the file
+    # Channel that looks like time -> median step in its unit and number of gaps; None if it does not
+    # increase.
     times: dict[str, tuple[float | None, int | None]]
-    refused: tuple[Refused, ...]
-    model: str
-    proposal: str
-    n_blanks: int
+    refused: tuple[Refused, ...]  # what else is in the file, and why it cannot be a signal
+    model: str  # the rig that matches the channels best
+    proposal: str  # ``[[records]]`` entry, with what must be checked as comments
+    n_blanks: int  # values that are left to be filled in there
 
     def to_json(self) -> dict[str, Any]:
         """Return the contents for JSON."""
@@ -65,20 +50,7 @@ class Inspection:
 
 
 def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
-    """Return the channels of a measured file of any supported format.
-
-    Parameters
-    ----------
-    path
-        The file.
-    own_rigs
-        Rigs whose signals it may hold beside those of the built-in ones.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
+    """Return the channels of a measured file of any supported format."""
     path = Path(path)
     with open_measurement(path) as file:
         file, channels = _readable(path, file)
@@ -104,13 +76,7 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
 
 
 def _readable(path: Path, file: ChannelFile) -> tuple[ChannelFile, tuple[ChannelSummary, ...]]:
-    """Return a file without the channels that cannot be read, and the summaries of the others.
-
-    Raises
-    ------
-    InputError
-        If none can be read: then the file is damaged, not a channel.
-    """
+    """Return a file without the channels that cannot be read, and the summaries of the others."""
     read: list[tuple[Channel, ChannelSummary]] = []
     refused = list(file.refused)
     errors: list[InputError] = []

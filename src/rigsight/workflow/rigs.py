@@ -14,13 +14,7 @@ _DPI = 200
 
 
 def write_rig_picture(rig: Rig, file: Path) -> Path:
-    """Draw a rig into a PNG or SVG file.
-
-    Raises
-    ------
-    InputError
-        If the file has another suffix, or cannot be written.
-    """
+    """Draw a rig into a PNG or SVG file."""
     ending = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
     check_target(file)
     figure = rig_picture(rig)

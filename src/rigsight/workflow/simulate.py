@@ -43,35 +43,7 @@ def run_simulate(
     own_effects: Sequence[Effect] = (),
     own_rigs: Iterable[Rig] = (),
 ) -> Record:
-    """Simulate a model for the inputs of a record.
-
-    Parameters
-    ----------
-    model
-        A ``model.json`` or the folder that contains one.
-    record
-        Measured file with time and inputs; the outputs are read only where initial states are estimated.
-    out
-        CSV file for time, inputs and simulated outputs; None writes nothing.
-    columns
-        Columns of time ``t`` and the inputs; by default the columns with their names.
-    initial_state
-        States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
-        input sample; "estimated" fits all of them to the outputs measured in the record, and nothing else.
-    constants
-        Constants of the rig that have another value in this record.
-    own_effects
-        Effects that the model may name beside those of the catalogue.
-    own_rigs
-        Rigs that it may name beside the built-in ones, where it does not declare its own.
-
-    Raises
-    ------
-    InputError
-        If model or record cannot be used or the result cannot be written.
-    SimulationError
-        If the motion leaves the range of numbers or the model is too stiff.
-    """
+    """Simulate a model for the inputs of a record."""
     read = named_model(model, own_effects, own_rigs)
     rig = read.structure.rig
     columns = columns or {}

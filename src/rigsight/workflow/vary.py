@@ -42,29 +42,18 @@ line in a figure is as wide."""
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """The model with one value of one parameter.
+    """The model with one value of one parameter."""
 
-    Attributes
-    ----------
-    value
-        The parameter's value.
-    response
-        Frequency response, None where the model cannot be simulated with it.
-    error
-        Largest error of the response relative to its largest magnitude: 0 for a linear model, whose response is computed from its
-        equations, otherwise how much it changes with a sweep of half the duration. None without a response.
-    features
-        ``lowest_gain`` (the magnitude at the lowest frequency), ``peak_omega``, ``peak_magnitude``, ``break_frequency``,
-        ``fitted_break_frequency``; None where the band does not show one.
-    note
-        A remark; empty if there is none.
-    """
-
-    value: float
-    response: FrequencyResponse | None
+    value: float  # the parameter's value
+    response: FrequencyResponse | None  # frequency response, None where the model cannot be simulated with it
+    # Largest error of the response relative to its largest magnitude: 0 for a linear model, whose response is
+    # computed from its equations, otherwise how much it changes with a sweep of half the duration. None
+    # without a response.
     error: float | None
+    # ``lowest_gain`` (the magnitude at the lowest frequency), ``peak_omega``, ``peak_magnitude``,
+    # ``break_frequency``, ``fitted_break_frequency``; None where the band does not show one.
     features: dict[str, float | None]
-    note: str
+    note: str  # a remark; empty if there is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,35 +85,6 @@ def run_vary(
 
     Those of a linear model are exact, delays included. Others are read from simulated sweeps, each twice as long as the one
     before, until the response stays.
-
-    Parameters
-    ----------
-    model
-        A ``model.json``, the folder that contains one, or the name of a published set.
-    parameters
-        Names of parameters of the model.
-    out
-        Folder for ``vary.json`` and one picture per parameter; None writes nothing.
-    low, high
-        Ends of the values; default is half and twice the model's.
-    steps
-        Number of values, 2 to 50.
-    amplitude
-        Amplitude of the sweep, in the unit of the input.
-    band
-        Angular frequencies [rad/s]; default is about the natural frequency at this amplitude, on a rig of several motions about
-        all of its natural frequencies.
-    source, response
-        Names of the swept input (the others are at rest) and of the output; default is the first of each.
-    own_effects, own_rigs
-        Effects and rigs that the model may name beside those of the catalogue and the built-in ones.
-    listener
-        Told of every finished sweep.
-
-    Raises
-    ------
-    InputError
-        If the model or an option cannot be used, or the results cannot be written; nothing is written then.
     """
     if out is not None:
         check_writable(Path(out), VARY_FILE)
@@ -262,13 +222,7 @@ class _Sweeps:
     def response(
         self, structure: Structure, values: Mapping[str, float]
     ) -> tuple[FrequencyResponse, float, float]:
-        """Return the response, its relative error, and the part of its delay [s] that only shifts the record.
-
-        Raises
-        ------
-        SimulationError
-            If the motion grows without bound.
-        """
+        """Return the response, its relative error, and the part of its delay [s] that only shifts the record."""
         structure, own = without_vanished_effects(structure, values)
         late, prompt = self._shifts(structure, own)
         structure, own = without_vanished_effects(structure, prompt)

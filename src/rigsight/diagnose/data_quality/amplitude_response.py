@@ -26,15 +26,6 @@ def amplitude_dependences(
     """Compare the frequency responses at the lowest and the highest amplitude of one kind of record, path by path.
 
     On a rig with one motion the path from its input to its motion is compared, on any other those from each input to each sensor.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        All records of a campaign; steps do not take part.
-    faulty
-        Record and sensor of each faulty reading, which would distort like an effect.
     """
     if not rig.is_driven:
         return (

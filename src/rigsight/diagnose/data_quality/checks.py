@@ -18,15 +18,6 @@ from rigsight.records.record import Record
 def data_quality(context: FitContext, records: Sequence[Record], reidentified: Scored) -> DataQuality:
     """Check the records before an effect is tried.
 
-    Parameters
-    ----------
-    context
-        Records as they are fitted, scales and noise.
-    records
-        All records of the campaign, whole.
-    reidentified
-        The re-identified equations.
-
     Notes
     -----
     A wrong hold that a strong effect hides shows only with that effect in the model, see `with_best_model`.
@@ -46,17 +37,7 @@ def data_quality(context: FitContext, records: Sequence[Record], reidentified: S
 
 
 def with_offsets_told(quality: DataQuality, context: FitContext, model: Scored) -> DataQuality:
-    """Add the note if the mean residual of the best model differs between records, as with offsets that differ.
-
-    Parameters
-    ----------
-    quality
-        What was found before.
-    context
-        Records as they were fitted and scored.
-    model
-        The best model.
-    """
+    """Add the note if the mean residual of the best model differs between records, as with offsets that differ."""
     units = {signal.name: signal.unit for signal in context.rig.outputs}
     known = {finding.signal for finding in quality.findings if finding.kind == "offset"}
     found = [
@@ -71,15 +52,6 @@ def with_best_model(quality: DataQuality, context: FitContext, model: Scored) ->
     """Test the hold of the input again with the effects in the model that may have hidden its part of the gap.
 
     A delay that is shorter than a sample is left out for it: a wrong hold looks like half a sample of delay.
-
-    Parameters
-    ----------
-    quality
-        What was found before.
-    context
-        Records as they are fitted, scales and noise.
-    model
-        The best model; nothing is asked where it has no effect.
     """
     if not model.effects or any(finding.kind == "time_shift" for finding in quality.findings):
         return quality

@@ -11,31 +11,18 @@ Answer = Literal["yes", "no", "cannot tell"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is, or may be, wrong with the records.
+    """One thing that is, or may be, wrong with the records."""
 
-    Attributes
-    ----------
-    kind
-        What it is.
-    sentence
-        What was seen, with numbers.
-    mend
-        What to do about it.
-    serious
-        True for a fault of the data that may cause the gap; False if an effect may explain it equally well.
-    record, signal
-        Where it was seen; None for all records.
-    explained
-        Share of the gap of the equations without an effect, above the noise floor and as power, that it explains; None where that
-        was not measured.
-    """
-
-    kind: FindingKind
-    sentence: str
-    mend: str
+    kind: FindingKind  # what it is
+    sentence: str  # what was seen, with numbers
+    mend: str  # what to do about it
+    # True for a fault of the data that may cause the gap; False if an effect may explain it equally well.
     serious: bool = True
+    # Where it was seen; None for all records.
     record: str | None = None
     signal: str | None = None
+    # Share of the gap of the equations without an effect, above the noise floor and as power, that it
+    # explains; None where that was not measured.
     explained: float | None = None
 
     def to_json(self) -> dict[str, Any]:
@@ -53,40 +40,22 @@ class Finding:
 
 @dataclass(frozen=True)
 class AmplitudeDependence:
-    """Whether the frequency response changes with the amplitude.
+    """Whether the frequency response changes with the amplitude."""
 
-    Attributes
-    ----------
-    answer
-        ``"yes"``: a nonlinear effect is involved; ``"no"``: only linear causes are left; or ``"cannot tell"``.
-    sentence
-        The answer with numbers.
-    records
-        The two records that were compared.
-    path
-        Input and sensor, as in ``"u -> x"``; empty where there is none.
-    """
-
+    # ``"yes"``: a nonlinear effect is involved; ``"no"``: only linear causes are left; or ``"cannot tell"``.
     answer: Answer
-    sentence: str
-    records: tuple[str, ...] = ()
-    path: str = ""
+    sentence: str  # the answer with numbers
+    records: tuple[str, ...] = ()  # the two records that were compared
+    path: str = ""  # input and sensor, as in ``"u -> x"``; empty where there is none
 
 
 @dataclass(frozen=True)
 class DataQuality:
-    """Findings in the records themselves.
+    """Findings in the records themselves."""
 
-    Attributes
-    ----------
-    findings
-        In the order in which they are worth reading; empty where the records are healthy.
-    amplitudes
-        Whether each frequency response changes with the amplitude.
-    """
-
+    # In the order in which they are worth reading; empty where the records are healthy.
     findings: tuple[Finding, ...]
-    amplitudes: tuple[AmplitudeDependence, ...]
+    amplitudes: tuple[AmplitudeDependence, ...]  # whether each frequency response changes with the amplitude
 
     @property
     def notes(self) -> tuple[str, ...]:

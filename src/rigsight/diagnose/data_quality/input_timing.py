@@ -27,30 +27,14 @@ _DELAYS = ("input_delay", "sensor_delay")
 
 @dataclass(frozen=True)
 class InputTiming:
-    """Error of a model on the most excited stretches under each hypothesis.
+    """Error of a model on the most excited stretches under each hypothesis."""
 
-    Attributes
-    ----------
-    given
-        Hold as declared.
-    as_given
-        RMS of the residuals in units of the noise floor, with that hold.
-    with_hold
-        The same with every other hold.
-    with_shift
-        The same with the declared hold and a free shift; None where it was not tried.
-    shift
-        Fitted shift [s], positive where the outputs come late; None as above.
-    dt
-        Longest sample time of the records [s].
-    """
-
-    given: Hold
-    as_given: float
-    with_hold: Mapping[Hold, float]
-    with_shift: float | None
-    shift: float | None
-    dt: float
+    given: Hold  # hold as declared
+    as_given: float  # RMS of the residuals in units of the noise floor, with that hold
+    with_hold: Mapping[Hold, float]  # the same with every other hold
+    with_shift: float | None  # the same with the declared hold and a free shift; None where it was not tried
+    shift: float | None  # fitted shift [s], positive where the outputs come late; None as above
+    dt: float  # longest sample time of the records [s]
 
     def explained(self, error_over_noise: float) -> float:
         """Return the explained share of the gap above the floor, as power, if the error falls to `error_over_noise`."""
@@ -116,24 +100,7 @@ class InputTiming:
 def input_timing(
     context: FitContext, effects: tuple[Effect, ...], base: FitResult, with_shift: bool = True
 ) -> InputTiming | None:
-    """Fit a model to the most excited stretches with every hold, and with a time offset.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    effects
-        Effects of the model beside those that the simulation has.
-    base
-        Fit of the model to the records with the hold as declared.
-    with_shift
-        False to try the holds alone.
-
-    Returns
-    -------
-    None where the motion is prescribed, no input moves, the records' holds differ, or the model cannot be fitted to the
-    stretches.
-    """
+    """Fit a model to the most excited stretches with every hold, and with a time offset."""
     given = {record.hold for record in context.look}
     if not context.rig.is_driven or not context.driven or len(given) != 1:
         return None
@@ -157,15 +124,7 @@ def input_timing(
 
 
 def without_short_delays(context: FitContext, model: Scored) -> tuple[tuple[Effect, ...], FitResult]:
-    """Return the effects of a model but the delays that are shorter than a sample, and its fit without them.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    model
-        A model with effects.
-    """
+    """Return the effects of a model but the delays that are shorter than a sample, and its fit without them."""
     fit, dt = model.fit, max(record.dt for record in context.look)
 
     def is_short_delay(effect: Effect) -> bool:

@@ -32,15 +32,6 @@ def asked_offsets(
 
     The model must explain the records once offsets are free: an asymmetric effect, whose mean grows with the motion, also shifts
     records but leaves more than offsets do.
-
-    Parameters
-    ----------
-    context
-        Records as they were fitted, without free offsets.
-    reidentified, singles
-        The re-identified equations, and every effect by itself.
-    allowed
-        Error that a named cause may leave, in units of the noise floor.
     """
     models = [reidentified, *(m for m in singles if m.fit.residuals and np.isfinite(m.error_over_noise))]
     forgetful = [m for m in models if not _remembers(m.effects)]
@@ -73,13 +64,6 @@ def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding
 
     Springs return a rig to the same place if its inputs and constants are the same; nothing is reported otherwise, or for a rig
     that can rest anywhere.
-
-    Parameters
-    ----------
-    context
-        The rig and what is known of it.
-    records
-        All records of the campaign, whole.
     """
     rig = context.rig
     if not _comes_back(context, records) or any(
@@ -127,15 +111,7 @@ def _apart(records: Sequence[Record], name: str) -> tuple[float, str, str]:
 
 
 def means_of(context: FitContext, model: Scored) -> list[DifferingMeans]:
-    """Return the outputs whose mean residual differs between records.
-
-    Parameters
-    ----------
-    context
-        Records as they were fitted and scored.
-    model
-        The model.
-    """
+    """Return the outputs whose mean residual differs between records."""
     records, residuals = list(context.estimation), list(model.fit.residuals)
     if context.scoring != context.estimation:
         records, residuals = [*records, *context.scoring], [*residuals, *model.residuals]

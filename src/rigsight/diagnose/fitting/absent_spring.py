@@ -23,11 +23,6 @@ def with_weighed_spring(campaign: Campaign) -> Campaign:
     A stiffness of zero that is given states that there is no spring. It is fitted to windows of the records, beside the same fit
     with zero: if it differs from zero beyond its error and lowers the error, the records contradict the statement. The given
     simulation keeps it.
-
-    Parameters
-    ----------
-    campaign
-        Unchanged unless its rig is one driven mass that is given without a spring.
     """
     name = campaign.absent_spring
     if name is None:

@@ -16,24 +16,7 @@ from rigsight.rigs import Rig, joint_of
 def known_constant_forces(
     rig: Rig, effect: Effect, given: Mapping[str, float], has_stiffness: bool
 ) -> dict[str, float] | None:
-    """Return the values at which the constant forces are held while an effect is fitted.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    effect
-        At its place, or of no place.
-    given
-        Parameters of the rig in the given simulation.
-    has_stiffness
-        False for a rig of one motion without a spring: there a rest position exerts no force.
-
-    Returns
-    -------
-    Empty for an effect without a mean force; None where a constant force is not known. A force that is not given has its default;
-    a rest position has none, because it depends on where the sensor was set to zero.
-    """
+    """Return the values at which the constant forces are held while an effect is fitted."""
     if not effect.holds_constant_force:
         return {}
     joint = joint_of(rig, effect)

@@ -27,24 +27,14 @@ _FINE_TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Scored:
-    """A fitted model with its residuals on the records that score it.
+    """A fitted model with its residuals on the records that score it."""
 
-    Attributes
-    ----------
-    effects
-        The effects added.
-    fit
-        The fit to the estimation records.
-    held_out
-        The same numbers on the scoring records, only initial states fitted; without residuals where they cannot be simulated.
-    error_over_noise
-        RMS of the residuals in units of the noise floor.
-    """
-
-    effects: tuple[Effect, ...]
-    fit: FitResult
+    effects: tuple[Effect, ...]  # the effects added
+    fit: FitResult  # the fit to the estimation records
+    # The same numbers on the scoring records, only initial states fitted; without residuals where they cannot
+    # be simulated.
     held_out: FitResult
-    error_over_noise: float
+    error_over_noise: float  # RMS of the residuals in units of the noise floor
 
     @property
     def residuals(self) -> tuple[NDArray[np.float64], ...]:
@@ -73,46 +63,27 @@ class Scored:
 
 @dataclass(frozen=True)
 class FitContext:
-    """What every candidate is fitted and scored with.
-
-    Attributes
-    ----------
-    rig
-        The rig.
-    estimation, scoring
-        Records to fit and records to score, already cut into windows where that is needed.
-    look
-        The most excited stretch of each estimation record, for the first fit from each start.
-    scales
-        Size of each base quantity.
-    noise
-        Noise floor of each output.
-    held
-        Parameters of the rig that are held in all fits (such as those of an absent spring or of outputs that were not measured).
-    given
-        Parameters of the rig in the given simulation.
-    start
-        Values before any fit, from the given simulation or a regression: fits without the effect may distort them too much.
-    modelled
-        Effects already in the given simulation; every candidate is added to them.
-    memory
-        Where the outcomes of fits are kept.
-    threads
-        Threads that help with the records of a fit.
-    """
+    """What every candidate is fitted and scored with."""
 
     rig: Rig
+    # Records to fit and records to score, already cut into windows where that is needed.
     estimation: tuple[Record, ...]
     scoring: tuple[Record, ...]
+    # The most excited stretch of each estimation record, for the first fit from each start.
     look: tuple[Record, ...]
-    scales: Mapping[str, float]
-    noise: Mapping[str, float]
+    scales: Mapping[str, float]  # size of each base quantity
+    noise: Mapping[str, float]  # noise floor of each output
+    # Parameters of the rig that are held in all fits (such as those of an absent spring or of outputs that
+    # were not measured).
     held: frozenset[str]
+    # Values before any fit, from the given simulation or a regression: fits without the effect may distort
+    # them too much.
     start: Mapping[str, float] = field(default_factory=dict)
-    given: Mapping[str, float] = field(default_factory=dict)
+    given: Mapping[str, float] = field(default_factory=dict)  # parameters of the rig in the given simulation
+    # Effects already in the given simulation; every candidate is added to them.
     modelled: tuple[Effect, ...] = ()
-    memory: FitMemory | None = None
-    threads: IdleThreads = field(default_factory=IdleThreads)
+    memory: FitMemory | None = None  # where the outcomes of fits are kept
+    threads: IdleThreads = field(default_factory=IdleThreads)  # threads that help with the records of a fit
 
     @cached_property
     def records(self) -> tuple[Record, ...]:

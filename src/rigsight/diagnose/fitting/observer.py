@@ -23,18 +23,10 @@ from rigsight.simulate import Structure, compose, structure_of_fit
 
 @dataclass(frozen=True)
 class Observer:
-    """Sensors that a model tracks while it is compared with records, and the bandwidth.
+    """Sensors that a model tracks while it is compared with records, and the bandwidth."""
 
-    Attributes
-    ----------
-    sensors
-        Names of sensors that read only the motion.
-    bandwidth
-        Angular frequency up to which the motion is tracked [rad/s].
-    """
-
-    sensors: tuple[str, ...]
-    bandwidth: float
+    sensors: tuple[str, ...]  # names of sensors that read only the motion
+    bandwidth: float  # angular frequency up to which the motion is tracked [rad/s]
 
     def following(self, records: Sequence[Record]) -> tuple[Record, ...]:
         """Return records that models follow while they are fitted to them."""
@@ -50,13 +42,7 @@ def observed_sensors(records: Sequence[Record]) -> frozenset[str]:
 
 
 def followed_sensors(campaign: Campaign) -> tuple[str, ...]:
-    """Return the sensors that models of a campaign can track: those that read only the motion.
-
-    Parameters
-    ----------
-    campaign
-        Records and the given simulation.
-    """
+    """Return the sensors that models of a campaign can track: those that read only the motion."""
     shown = {name for record in campaign.records for name in record.signals}
     return tuple(name for name in sensors_of_motion(campaign.rig) if name in shown)
 

@@ -28,21 +28,7 @@ def fit_context_of(
     threads: IdleThreads,
     start: Mapping[str, float] | None = None,
 ) -> FitContext:
-    """Return the context in which candidates of a campaign are fitted and scored.
-
-    Parameters
-    ----------
-    campaign
-        Records and the given simulation.
-    noise
-        Noise floor of each output.
-    windowing
-        How to cut records.
-    memory, threads
-        As of `FitContext`.
-    start
-        Start values, where another context of this campaign has them already: for a rig of several bodies they take seconds.
-    """
+    """Return the context in which candidates of a campaign are fitted and scored."""
     start = start_values_of(campaign) if start is None else start
     fitted = windowing.cut(campaign.estimation)
     moving = until_rest(fitted, campaign.rig)

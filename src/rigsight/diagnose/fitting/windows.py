@@ -18,24 +18,14 @@ from rigsight.simulate.prescribed_motion import smooth_motion
 
 @dataclass(frozen=True)
 class Windowing:
-    """How records are cut; without a length and without cycles they stay whole.
+    """How records are cut; without a length and without cycles they stay whole."""
 
-    Attributes
-    ----------
-    length
-        Length of a window [s].
-    cycles
-        Cycles of motion in a window, so that the fast part of a sweep is cut finer than the slow one.
-    noise
-        Noise floor of each output whose cycles count, the first that a record holds.
-    observer
-        What models follow along whole records; None for a free run.
-    """
-
-    length: float | None = None
+    length: float | None = None  # length of a window [s]
+    # Cycles of motion in a window, so that the fast part of a sweep is cut finer than the slow one.
     cycles: int | None = None
+    # Noise floor of each output whose cycles count, the first that a record holds.
     noise: Mapping[str, float] = field(default_factory=dict)
-    observer: Observer | None = None
+    observer: Observer | None = None  # what models follow along whole records; None for a free run
 
     @classmethod
     def by_cycles(cls, noise: Mapping[str, float]) -> Windowing:

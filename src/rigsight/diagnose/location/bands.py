@@ -35,19 +35,7 @@ def spectrum(samples: NDArray[np.float64], dt: float) -> tuple[NDArray[np.float6
 def band_edges(
     records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], noise: float
 ) -> NDArray[np.float64]:
-    """Return edges [rad/s] of bands over the excited range and of one above it, shape (n_bands + 2,).
-
-    Parameters
-    ----------
-    records
-        Input, output, both of shape (n_samples,), and sample time [s].
-    noise
-        Standard deviation of the output's noise.
-
-    Returns
-    -------
-    The first edge is 0: what is slower than the excitation belongs to the first band.
-    """
+    """Return edges [rad/s] of bands over the excited range and of one above it, shape (n_bands + 2,)."""
     lows, highs = [], []
     for source, response, dt in records:
         omega, drive = spectrum(source - np.mean(source), dt)
@@ -82,17 +70,7 @@ def band_powers(samples: NDArray[np.float64], dt: float, edges: NDArray[np.float
 
 
 def dominant_frequency(samples: NDArray[np.float64], dt: float, size: float) -> float:
-    """Return the center frequency of the power of a stretch [rad/s]; NaN where it is constant.
-
-    Parameters
-    ----------
-    samples
-        Shape (n_samples,).
-    dt
-        Sample time [s].
-    size
-        Size of the whole signal: what varies by less than a small share of it rests.
-    """
+    """Return the center frequency of the power of a stretch [rad/s]; NaN where it is constant."""
     centered = samples - np.mean(samples)
     if samples.size < 2 or float(np.ptp(samples)) <= MAPS.rests * size:
         return float("nan")

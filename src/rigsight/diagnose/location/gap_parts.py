@@ -11,29 +11,18 @@ from typing import Any
 
 @dataclass(frozen=True, kw_only=True)
 class GapPart:
-    """Errors of the simulations in one output and one part of the records.
-
-    Attributes
-    ----------
-    output
-        Name of the output.
-    before, reidentified, after, noise_floor
-        NRMSE; the reference is given for each kind of part. `after` is NaN where it cannot be formed.
-    share
-        Share of this part in the squared residual of the re-identified equations in this output.
-    noise_share
-        Share of the whole squared residual that is noise in this part; the rest of `share` is gap.
-    units
-        Unit of each key by which the gap is split, where it has one.
-    """
+    """Errors of the simulations in one output and one part of the records."""
 
     output: str
+    # NRMSE; the reference is given for each kind of part. `after` is NaN where it cannot be formed.
     before: float
     reidentified: float
     after: float
     noise_floor: float
-    share: float
+    share: float  # share of this part in the squared residual of the re-identified equations in this output
+    # Share of the whole squared residual that is noise in this part; the rest of `share` is gap.
     noise_share: float
+    # Unit of each key by which the gap is split, where it has one.
     units: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
@@ -83,29 +72,21 @@ class BandPart(GapPart):
 
 @dataclass(frozen=True, kw_only=True)
 class StatePart(GapPart):
-    """One cell of the plane of displacement and velocity, relative to the measured RMS of all scored records.
+    """One cell of the plane of displacement and velocity, relative to the measured RMS of all scored records."""
 
-    Attributes
-    ----------
-    x_low, x_high, v_low, v_high
-        Limits of the cell.
-    n_samples
-        Samples in it.
-    force_mean, force_rms, force_noise
-        Force (torque) missing in the re-identified equations there: mean, RMS, and its standard deviation due to sensor noise.
-        NaN where it does not exceed the noise anywhere, and for an output on which no force acts directly.
-    joint
-        The joint with this motion, at which the whole force would act; empty on a rig with one motion.
-    """
-
+    # Limits of the cell.
     x_low: float
     x_high: float
     v_low: float
     v_high: float
-    n_samples: int
+    n_samples: int  # samples in it
+    # Force (torque) missing in the re-identified equations there: mean, RMS, and its standard deviation due
+    # to sensor noise. NaN where it does not exceed the noise anywhere, and for an output on which no force
+    # acts directly.
     force_mean: float
     force_rms: float
     force_noise: float
+    # The joint with this motion, at which the whole force would act; empty on a rig with one motion.
     joint: str = ""
 
 
@@ -126,24 +107,14 @@ class TimePart(GapPart):
 
 @dataclass(frozen=True, kw_only=True)
 class PathPart(GapPart):
-    """One section of the signal path driven by its measured input, relative to the measured RMS of its output.
+    """One section of the signal path driven by its measured input, relative to the measured RMS of its output."""
 
-    Attributes
-    ----------
-    path
-        As in ``"psi -> y"``.
-    source
-        The signal that drives it, as measured.
-    shift, shift_std
-        Time by which the source must be earlier for the best fit [s]; NaN where that was not tested.
-    shifted
-        Error of the re-identified section with its source shifted by that; NaN where that was not tested.
-    """
-
-    path: str
-    source: str
+    path: str  # as in ``"psi -> y"``
+    source: str  # the signal that drives it, as measured
+    # Time by which the source must be earlier for the best fit [s]; NaN where that was not tested.
     shift: float = math.nan
     shift_std: float = math.nan
+    # Error of the re-identified section with its source shifted by that; NaN where that was not tested.
     shifted: float = math.nan
 
 

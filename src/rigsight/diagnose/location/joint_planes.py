@@ -33,15 +33,6 @@ def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
 
     None beside effects that are modelled already, as the motion is followed with the rig's own equations, of a rig that nothing
     but prescribed motions move, and where a sensor's level is not known.
-
-    Parameters
-    ----------
-    context
-        Rig, noise and the records behind `scored`.
-    reidentified
-        The re-identified equations.
-    scored
-        Records, of which the stretches with the largest gap are looked at.
     """
     if not scored or context.modelled or not context.rig.mechanism.free:
         return ()

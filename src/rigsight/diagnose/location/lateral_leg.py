@@ -24,24 +24,18 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class LateralLeg:
-    """The section from the measured motion to y.
+    """The section from the measured motion to y."""
 
-    Attributes
-    ----------
-    given, fitted, shifted
-        Residual of y per scored record, shape (n_samples,): as given, with the best numbers, and with the motion shifted too.
-    shift, shift_std
-        How much earlier the motion must have come for the best fit [s], and its standard error from a white residual.
-    noise_gain
-        Gain from the noise of the motion to y, [unit of y per unit of x].
-    """
-
+    # Residual of y per scored record, shape (n_samples,): as given, with the best numbers, and with the
+    # motion shifted too.
     given: tuple[NDArray[np.float64], ...]
     fitted: tuple[NDArray[np.float64], ...]
     shifted: tuple[NDArray[np.float64], ...]
+    # How much earlier the motion must have come for the best fit [s], and its standard error from a white
+    # residual.
     shift: float
     shift_std: float
-    noise_gain: float
+    noise_gain: float  # gain from the noise of the motion to y, [unit of y per unit of x]
 
 
 @dataclass(frozen=True)
@@ -53,15 +47,7 @@ class _Numbers:
 
 
 def fit_lateral_leg(context: FitContext, given: Mapping[str, float]) -> LateralLeg | None:
-    """Fit the lateral equation with the measured motion as input; None where no record holds both.
-
-    Parameters
-    ----------
-    context
-        Records; the estimation records are fitted, the scoring records give the residuals.
-    given
-        Parameters of the given simulation.
-    """
+    """Fit the lateral equation with the measured motion as input; None where no record holds both."""
     rig = context.rig
     if rig.follower is None:
         return None

@@ -38,23 +38,7 @@ def localize(
     rng: np.random.Generator,
     floors: Sequence[NoiseFloor] = (),
 ) -> Localization:
-    """Return the gap split in every way.
-
-    Parameters
-    ----------
-    context
-        Records and noise.
-    traces
-        Errors of the simulations on every record.
-    scored_on
-        Role of the records that the gap budget counts.
-    before, linear, after
-        The given simulation, the re-identified equations, the model of the verdict.
-    rng
-        Source of the resampling behind the intervals.
-    floors
-        Noise floors with their stretches; the noise of an output without any is taken to be white.
-    """
+    """Return the gap split in every way."""
     stretches = {floor.output: _long_enough(floor.stretches) for floor in floors}
     scored = [trace for trace in traces if trace.role == scored_on]
     one_motion = context.rig.has_one_motion

@@ -25,15 +25,7 @@ from rigsight.rigs import Rig
 def path_parts(
     context: FitContext, before: Scored, reidentified: Scored, after: Scored
 ) -> tuple[PathPart, ...]:
-    """Return the error of every section of the signal path when it is driven by its measured input.
-
-    Parameters
-    ----------
-    context
-        Records and noise.
-    before, linear, after
-        The given simulation, the re-identified equations, the model of the verdict.
-    """
+    """Return the error of every section of the signal path when it is driven by its measured input."""
     rig = context.rig
     source, motion = rig.inputs[0].name, rig.outputs[0].name
     own = _motion_alone(context, reidentified)

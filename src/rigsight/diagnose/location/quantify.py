@@ -38,21 +38,6 @@ def gap_intervals(
     """Return 95 % intervals of the NRMSE of each stage, and of the share of the gap that is closed.
 
     All stages are resampled together, so that a stretch with large motion affects all of them equally.
-
-    Parameters
-    ----------
-    residuals
-        Stage -> residuals per record, shape (n_samples,) each; ``"before"`` and ``"after"`` give ``"closed"``.
-    measured
-        Measured output per record, shape (n_samples,) each.
-    noise_floor
-        NRMSE that a perfect model would leave.
-    rng
-        Source of the resampling.
-
-    Returns
-    -------
-    Stage -> lower and upper limit; NaN where a residual is not finite.
     """
     stages = list(residuals)
     center = float(np.mean(np.concatenate(measured)))
@@ -83,17 +68,6 @@ def effect_shares(
 
     The share of an effect is its reduction of the error, averaged over the orders in which the effects can be added: the shares
     add up to one, and two interchangeable effects share what both explain.
-
-    Parameters
-    ----------
-    effects
-        Effects of the verdict.
-    left
-        NRMSE by output of the fitted models, by the set of their effects; the empty set is the re-identified equations.
-
-    Returns
-    -------
-    Empty where there are fewer than two effects, or a model with some of them was not fitted. NaN where they close nothing.
 
     References
     ----------

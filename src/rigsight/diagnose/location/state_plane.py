@@ -40,43 +40,20 @@ class _Motion:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """A motion and the missing force there, of all records one after the other.
+    """A motion and the missing force there, of all records one after the other."""
 
-    Attributes
-    ----------
-    x, v, force
-        Displacement, velocity and force, shape (n_samples,).
-    force_noise
-        Standard deviation that the sensors' noise gives the force.
-    forced
-        Outputs that the force acts on.
-    units
-        Of each key of a part.
-    joint
-        Whose motion; empty on a rig with one.
-    """
-
+    # Displacement, velocity and force, shape (n_samples,).
     x: NDArray[np.float64]
     v: NDArray[np.float64]
     force: NDArray[np.float64]
-    force_noise: float
-    forced: tuple[str, ...]
-    units: Mapping[str, str]
-    joint: str = ""
+    force_noise: float  # standard deviation that the sensors' noise gives the force
+    forced: tuple[str, ...]  # outputs that the force acts on
+    units: Mapping[str, str]  # of each key of a part
+    joint: str = ""  # whose motion; empty on a rig with one
 
 
 def state_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
-    """Return the gap of each output over a coarse grid of the measured motion's displacement and velocity.
-
-    Parameters
-    ----------
-    context
-        Rig and noise.
-    reidentified
-        The re-identified equations.
-    scored
-        Records.
-    """
+    """Return the gap of each output over a coarse grid of the measured motion's displacement and velocity."""
     if not scored:
         return ()
     motions = [_motion(context, reidentified.fit.values, trace) for trace in scored]
@@ -94,17 +71,7 @@ def state_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
 
 
 def plane_parts(context: FitContext, plane: Plane, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
-    """Return the gap of each output over a coarse grid of a plane.
-
-    Parameters
-    ----------
-    context
-        Rig and noise.
-    plane
-        Motion and force.
-    scored
-        The records that they are of.
-    """
+    """Return the gap of each output over a coarse grid of a plane."""
     columns, x_edges = _cells(plane.x)
     rows, v_edges = _cells(plane.v)
     cell = columns * MAPS.cells + rows
@@ -209,13 +176,7 @@ def _finite_mean(values: NDArray[np.float64]) -> float:
 
 
 def plane_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the unit of each key of a part from those of the base quantities where the motion is.
-
-    Parameters
-    ----------
-    units
-        Of ``"x"``, ``"time"`` and ``"force"``.
-    """
+    """Return the unit of each key of a part from those of the base quantities where the motion is."""
     x, time, force = units["x"], units["time"], units["force"]
     return {
         **dict.fromkeys(("x_low", "x_high"), x),

@@ -20,23 +20,15 @@ STAGES: tuple[Stage, ...] = ("before", "reidentified", "after")
 
 @dataclass(frozen=True)
 class Trace:
-    """Measured and simulated outputs of one record.
+    """Measured and simulated outputs of one record."""
 
-    Attributes
-    ----------
-    record, role, kind, amplitude
-        As in the campaign.
-    t
-        Shape (n_samples,) [s].
-    inputs, measured, before, reidentified, after
-        Signal name -> shape (n_samples,).
-    """
-
+    # As in the campaign.
     record: str
     role: str
     kind: str
     amplitude: float | None
-    t: NDArray[np.float64]
+    t: NDArray[np.float64]  # shape (n_samples,) [s]
+    # Signal name -> shape (n_samples,).
     inputs: Mapping[str, NDArray[np.float64]]
     measured: Mapping[str, NDArray[np.float64]]
     before: Mapping[str, NDArray[np.float64]]
@@ -55,15 +47,7 @@ class Trace:
 
 
 def traces_of(context: FitContext, before: Scored, reidentified: Scored, after: Scored) -> tuple[Trace, ...]:
-    """Return measured and simulated outputs of all records, those that score first, windows joined again.
-
-    Parameters
-    ----------
-    context
-        Records as they were fitted and scored.
-    before, reidentified, after
-        The model of each stage.
-    """
+    """Return measured and simulated outputs of all records, those that score first, windows joined again."""
     scored = _joined(context.rig, context.scoring, before.residuals, reidentified.residuals, after.residuals)
     if context.scoring == context.estimation:
         return scored

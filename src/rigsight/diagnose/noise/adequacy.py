@@ -51,46 +51,24 @@ _TOO_FAST = "motion that is too fast for the sample time"
 
 @dataclass(frozen=True)
 class Agreement:
-    """Correlation of the residual of a model with one signal or cause.
+    """Correlation of the residual of a model with one signal or cause."""
 
-    Attributes
-    ----------
-    what
-        In words, such as ``"velocity of load_bearing"``.
-    place
-        Joint, drive or sensor; empty for what has no place.
-    p_value
-        Probability of such a correlation by chance, tested alone.
-    share
-        Share of the squared residual that it explains beyond chance.
-    """
-
-    what: str
-    place: str
-    p_value: float
-    share: float
+    what: str  # in words, such as ``"velocity of load_bearing"``
+    place: str  # joint, drive or sensor; empty for what has no place
+    p_value: float  # probability of such a correlation by chance, tested alone
+    share: float  # share of the squared residual that it explains beyond chance
 
 
 @dataclass(frozen=True)
 class Adequacy:
-    """Is the residual of a model noise and disturbance?
+    """Is the residual of a model noise and disturbance?"""
 
-    Attributes
-    ----------
-    p_value
-        Probability that noise and disturbance alone correlate this well with anything that was tested.
-    agreements
-        Signals with which it correlates, significant ones first and by decreasing share.
-    is_spread
-        False if it is concentrated in a few stretches of the records, unlike noise.
-    significance
-        p-value below which it is not adequate.
-    """
-
+    # Probability that noise and disturbance alone correlate this well with anything that was tested.
     p_value: float
+    # Signals with which it correlates, significant ones first and by decreasing share.
     agreements: tuple[Agreement, ...]
-    is_spread: bool = True
-    significance: float = VERDICT.significance
+    is_spread: bool = True  # false if it is concentrated in a few stretches of the records, unlike noise
+    significance: float = VERDICT.significance  # p-value below which it is not adequate
 
     @property
     def adequate(self) -> bool:
@@ -123,19 +101,6 @@ def adequacy(
 
     Fitted records are included, because their other amplitudes show a law with a slightly wrong form. Parameters that the fit
     distorted to compensate are free in the test, so that they do not hide it.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    model
-        Fitted and scored.
-    rng
-        Source of the turned signs.
-    significance
-        p-value below which it is not adequate.
-    of_steady_size
-        Whether noise and disturbance must also be equally large where nothing moves.
     """
     records = context.records
     answers = Answers(context, records, context.on_all_records(model), model.effects, model.fit.free)

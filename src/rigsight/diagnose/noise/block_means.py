@@ -20,17 +20,10 @@ _MIN_BLOCKS = 8
 
 @dataclass(frozen=True)
 class Blocks:
-    """Means over the blocks of series.
+    """Means over the blocks of series."""
 
-    Attributes
-    ----------
-    means
-        Shape (n_blocks, n_series).
-    sizes
-        Number of values in each block, shape (n_blocks,); blocks of short records are smaller.
-    """
-
-    means: NDArray[np.float64]
+    means: NDArray[np.float64]  # shape (n_blocks, n_series)
+    # Number of values in each block, shape (n_blocks,); blocks of short records are smaller.
     sizes: NDArray[np.float64]
 
     @property
@@ -60,15 +53,7 @@ class Blocks:
 def blocks_of(
     series: Sequence[NDArray[np.float64]], n_values: Sequence[NDArray[np.int64]] | None = None
 ) -> Blocks:
-    """Return the means over blocks of series.
-
-    Parameters
-    ----------
-    series
-        Per record, shape (n_samples, n_series); the records share the block length.
-    n_values
-        Per record, how many values each sample is the mean of, shape (n_samples,); one by default. Samples of none are left out.
-    """
+    """Return the means over blocks of series."""
     counted = n_values or [np.ones(len(s), dtype=np.int64) for s in series]
     total = sum(len(s) for s in series)
     length = max(1, total // max(_MIN_BLOCKS, min(100, total // 200)))
@@ -89,13 +74,6 @@ def squared_errors(models: Sequence[Sequence[NDArray[np.float64]]], noise: NDArr
     """Return the squared residuals of models in units of the noise floor, a series per model.
 
     The square root of a model's mean is its `error_over_noise`.
-
-    Parameters
-    ----------
-    models
-        Residuals of each model per record, shape (n_samples, n_outputs), NaN where an output was not measured.
-    noise
-        Noise floor of each output, shape (n_outputs,).
     """
     records = list(zip(*models, strict=True))
     counts = [np.sum(np.isfinite(of_models[0]), axis=1) for of_models in records]

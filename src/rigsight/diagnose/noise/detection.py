@@ -35,19 +35,7 @@ _WHITE_ONLY = "top of the spectrum (white noise only)"
 def noise_floors(
     rig: Rig, records: Sequence[Record], drifts: bool = False, at_rest: bool = True
 ) -> tuple[NoiseFloor, ...]:
-    """Return the noise floor of every output that the records hold.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        All records of a campaign: they share their sensors.
-    drifts
-        True for an axis without a spring: drift from one period to the next is not noise.
-    at_rest
-        False for a rig that is known to move while the input is constant.
-    """
+    """Return the noise floor of every output that the records hold."""
     floors = []
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]

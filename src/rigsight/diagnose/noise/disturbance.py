@@ -25,21 +25,11 @@ _SMOOTHED = 9
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A disturbance force in addition to the drive.
+    """A disturbance force in addition to the drive."""
 
-    Attributes
-    ----------
-    std
-        Its standard deviation.
-    unit
-        Of the force.
-    below
-        Angular frequency up to which it stands above the sensor's noise [rad/s].
-    """
-
-    std: float
-    unit: str
-    below: float
+    std: float  # its standard deviation
+    unit: str  # of the force
+    below: float  # angular frequency up to which it stands above the sensor's noise [rad/s]
 
 
 def disturbance(
@@ -50,23 +40,7 @@ def disturbance(
     noise: float,
     bandwidth: float | None,
 ) -> Disturbance | None:
-    """Return the force that would cause the residual of a model; None except for one driven mass, and where noise hides it.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    values
-        Its constants and parameters.
-    records
-        What was scored.
-    left
-        Residuals of the model in the first output of each record, shape (n_samples,).
-    noise
-        Standard deviation of the sensor's noise.
-    bandwidth
-        Of the observer [rad/s]; None for free runs.
-    """
+    """Return the force that would cause the residual of a model; None except for one driven mass, and where noise hides it."""
     if not (rig.has_one_motion and rig.is_driven):
         return None
     motion, follows = rig.motion, bandwidth or 0.0

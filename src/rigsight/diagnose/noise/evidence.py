@@ -99,15 +99,6 @@ class Evidence:
 
         An effect missing in the simpler model raises that spectrum. A model with this effect stays below it everywhere; a model
         that replaces a slow error by a fast one loses.
-
-        Parameters
-        ----------
-        model, simpler
-            Fitted to the same records.
-
-        Returns
-        -------
-        In nats, without a penalty for parameters.
         """
         gained = 0.0
         for (left, dt), (least, _) in zip(self._remainders(simpler), self._remainders(model), strict=True):

@@ -29,13 +29,7 @@ _WHITE = 1e-4
 
 
 def whitening_filter(parts: Sequence[Floats]) -> Floats:
-    """Return the coefficients of the filter that leaves what is new at each sample, shape (1 + order,), the first is 1.
-
-    Parameters
-    ----------
-    parts
-        Remainder of one output in each record, shape (n_samples,) each.
-    """
+    """Return the coefficients of the filter that leaves what is new at each sample, shape (1 + order,), the first is 1."""
     n_samples = sum(part.size for part in parts)
     most = min(_ORDERS[-1], min(part.size for part in parts) - 1)
     covariance = np.zeros(most + 1)

@@ -13,25 +13,14 @@ Kind = Literal["convention", "assumption", "measured", "budget"]
 
 @dataclass(frozen=True)
 class Stated:
-    """A number of a policy as a page states it.
+    """A number of a policy as a page states it."""
 
-    Attributes
-    ----------
-    name, value
-        The field and its value.
-    kind
-        See `Kind`.
-    reason
-        What it decides, and why it is what it is.
-    set_by
-        The data that set it; empty where none did.
-    """
-
+    # The field and its value.
     name: str
     value: float | tuple[float, ...]
-    kind: Kind
-    reason: str
-    set_by: str
+    kind: Kind  # see `Kind`
+    reason: str  # what it decides, and why it is what it is
+    set_by: str  # the data that set it; empty where none did
 
 
 def number(value: Any, kind: Kind, reason: str, set_by: str = "") -> Any:

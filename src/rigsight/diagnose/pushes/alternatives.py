@@ -35,15 +35,7 @@ _TIMES = 4
 
 
 def law_columns(answers: Answers, effect: Effect) -> Floats:
-    """Return the responses to any other law of the signals that an effect reads, at its place; shape (n, n_columns).
-
-    Parameters
-    ----------
-    answers
-        Of the equations with the effect.
-    effect
-        Any.
-    """
+    """Return the responses to any other law of the signals that an effect reads, at its place; shape (n, n_columns)."""
     place = answers.context.rig.acts_at(effect)
     if effect.place in (Place.SENSOR, Place.ACTUATOR):
         # A static nonlinearity is not another form of a delay or lag, nor vice versa.
@@ -62,13 +54,7 @@ def law_columns(answers: Answers, effect: Effect) -> Floats:
 
 
 def alternatives(answers: Answers) -> Iterator[tuple[str, str, Floats]]:
-    """Yield each possible cause of a residual in words, with the place and the responses of all readings, shape (n, n_columns).
-
-    Parameters
-    ----------
-    answers
-        Of the equations with the residual. The place is empty for a cause without a place.
-    """
+    """Yield each possible cause of a residual in words, with its place and the responses of all readings, (n, n_columns)."""
     rig = answers.context.rig
     for joint in motion_columns(rig):
         yield f"velocity of {joint}", joint, _velocities_of(answers, joint)
@@ -103,19 +89,7 @@ def _signal(answers: Answers, drive: str) -> float:
 
 
 def slopes(answers: Answers, place: str) -> list[Floats]:
-    """Return the rate of the simulated motion, signal or reading at a place along each record.
-
-    Parameters
-    ----------
-    answers
-        Of the equations.
-    place
-        Joint, drive or sensor.
-
-    Returns
-    -------
-    Shape (n_samples,) each, per second.
-    """
+    """Return the rate of the simulated motion, signal or reading at a place along each record."""
     return [np.gradient(s, r.dt) for s, r in zip(answers.simulated(place), answers.records, strict=True)]
 
 

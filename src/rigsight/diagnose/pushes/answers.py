@@ -38,35 +38,16 @@ _DEPENDENT = 1e-7
 
 @dataclass(frozen=True)
 class Followed:
-    """Subspace that parameters and initial states could compensate.
+    """Subspace that parameters and initial states could compensate."""
 
-    Attributes
-    ----------
-    spans
-        Where each record stands in a column of all readings.
-    of_states
-        Basis of the subspace of the initial states of each record, shape (n_own, n_columns) each.
-    of_parameters
-        Basis of the additional subspace of the parameters, shape (n, n_columns).
-    """
-
-    spans: tuple[slice, ...]
+    spans: tuple[slice, ...]  # where each record stands in a column of all readings
+    # Basis of the subspace of the initial states of each record, shape (n_own, n_columns) each.
     of_states: tuple[Floats, ...]
-    of_parameters: Floats
+    of_parameters: Floats  # basis of the additional subspace of the parameters, shape (n, n_columns)
 
     @classmethod
     def of(cls, spans: Sequence[slice], by_state: Sequence[Floats], by_parameter: Floats) -> Followed:
-        """Return the bases of given answers.
-
-        Parameters
-        ----------
-        spans
-            Where each record stands in a column.
-        by_state
-            Answers to its initial states, shape (n_own, n_states) each.
-        by_parameter
-            Answers to the parameters, shape (n, n_free).
-        """
+        """Return the bases of given answers."""
         states = cls(tuple(spans), tuple(map(orthonormal, by_state)), np.zeros((by_parameter.shape[0], 0)))
         return replace(states, of_parameters=orthonormal(states.without(by_parameter)))
 
@@ -78,19 +59,7 @@ class Followed:
         return np.asarray(left - self.of_parameters @ (self.of_parameters.T @ left))
 
     def along(self, basis: Floats, stretches: Sequence[slice]) -> Floats:
-        """Return what a basis and these share in stretches, none of which reaches from one record into the next.
-
-        Parameters
-        ----------
-        basis
-            Shape (n, n_columns).
-        stretches
-            Of the n readings.
-
-        Returns
-        -------
-        Products of the columns of both, shape (n_stretches, n_columns, n_followed).
-        """
+        """Return what a basis and these share in stretches, none of which reaches from one record into the next."""
         widths = [own.shape[1] for own in self.of_states]
         columns = [slice(int(b) - w, int(b)) for w, b in zip(widths, np.cumsum(widths), strict=True)]
         products = np.zeros((len(stretches), basis.shape[1], sum(widths) + self.of_parameters.shape[1]))
@@ -206,17 +175,7 @@ class Answers:
         return [out[:, columns[place]] for out in self.calm_outputs]
 
     def to_push(self, place: str, signals: Sequence[Floats], size: float) -> Floats:
-        """Return the change of all readings, weighted and stacked, per size of a push; not finite where it cannot be followed.
-
-        Parameters
-        ----------
-        place
-            Joint, drive or sensor.
-        signals
-            The push along each record, shape (n_samples,) each.
-        size
-            Factor on it so small that the answer is proportional.
-        """
+        """Return the change of all readings, weighted and stacked, per size of a push; not finite where it cannot be followed."""
         column = self.structure.rig.mechanism.inputs.index(push(place))
         is_drive = place in signal_columns(self.context.rig)
         changes = []
@@ -226,15 +185,7 @@ class Answers:
         return self.stacked(changes)
 
     def to_effect(self, effect: Effect, own: Mapping[str, float]) -> Floats:
-        """Return the change of all readings, weighted and stacked, with one more effect in the equations.
-
-        Parameters
-        ----------
-        effect
-            The effect; its states begin at zero.
-        own
-            Values of all its parameters, by their own names.
-        """
+        """Return the change of all readings, weighted and stacked, with one more effect in the equations."""
         structure = compose(
             with_probes(self.context.rig),
             (*self.structure.effects, effect),

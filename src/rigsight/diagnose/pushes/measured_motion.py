@@ -38,17 +38,7 @@ class Corrections:
     def of_joint(
         self, name: str, differences: NDArray[np.float64], measured: set[str]
     ) -> NDArray[np.float64] | None:
-        """Return the correction of a joint's motion, shape (n_samples,); None where the sensors do not tell.
-
-        Parameters
-        ----------
-        name
-            The joint.
-        differences
-            Readings less simulated ones, shape (n_samples, n_sensors).
-        measured
-            Names of the sensors that the record holds.
-        """
+        """Return the correction of a joint's motion, shape (n_samples,); None where the sensors do not tell."""
         slopes = self._joints[name]
         asked = [i for i, n in enumerate(self._names) if n in measured and self._sensors[n] is not None]
         if slopes is None or not asked:

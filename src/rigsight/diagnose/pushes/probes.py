@@ -69,13 +69,7 @@ def _signal_alone(with_speed: bool) -> Rig:
 
 
 def alone(effect: Effect) -> tuple[Structure, int]:
-    """Return the equations of an effect by itself, and the number of the output that shows what it makes of motion or signal.
-
-    Parameters
-    ----------
-    effect
-        At any place; without a delay.
-    """
+    """Return the equations of an effect by itself, and the number of the output that shows what it makes of motion or signal."""
     name = kind_of(effect.name)
     law = (effect.torque, effect.spring, effect.deflection, effect.drive, effect.measured, effect.states)
     if name not in _known or _known[name][0] != law:

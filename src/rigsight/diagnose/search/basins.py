@@ -32,13 +32,6 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
     Each also starts from the parameters that it has in common with the best one, and the best one from those of the next, because
     neither the mass of the rig nor an effect that both have depends on the others. If a model explains the records, nothing else
     is tried.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    models
-        Fitted and scored.
     """
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     ranked = sorted(usable, key=lambda model: model.error_over_noise)

@@ -32,23 +32,14 @@ LOOK_ACCURACY = 1e-3
 
 @dataclass(frozen=True)
 class FirstLook:
-    """First fits of a candidate to part of the records or roughly to all, best first, those that ended at the same place once.
+    """First fits of a candidate to part of the records or roughly to all, best first, those that ended at the same place once."""
 
-    Attributes
-    ----------
-    effects, structure, free
-        What was fitted.
-    fits
-        What was reached.
-    nearest
-        Mean squared error reached in the most excited stretches.
-    """
-
+    # What was fitted.
     effects: tuple[Effect, ...]
     structure: Structure
     free: tuple[str, ...]
-    fits: tuple[FitResult, ...]
-    nearest: float
+    fits: tuple[FitResult, ...]  # what was reached
+    nearest: float  # mean squared error reached in the most excited stretches
 
     @property
     def newest(self) -> str:
@@ -70,25 +61,7 @@ def look_at(
     hold: frozenset[str] = frozenset(),
     substeps: Sequence[int] | None = None,
 ) -> FirstLook:
-    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    effects
-        All effects of the model; the last is new.
-    base
-        Fit without the last.
-    parents
-        Fits with a simpler effect in place of the last, by name of that effect.
-    further
-        Further start values of the last effect in addition to its declared starts.
-    hold
-        Rig parameters to keep at their base value.
-    substeps
-        Integration steps per sample of each record; None chooses them, which needs the accurate integrator.
-    """
+    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect."""
     structure = context.simplest(effects, base.structure)
     known = context.constant_forces_beside(structure.effects)
     moved = {*context.free_parameters(structure), *base.free} - {*hold, *known}
@@ -113,17 +86,7 @@ def looked_from(
     structure: Structure,
     starts: Sequence[Mapping[str, float]],
 ) -> FirstLook:
-    """Fit a set of effects to the most excited stretches of the records from given starts.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    effects, structure
-        The model.
-    starts
-        Values of all parameters.
-    """
+    """Fit a set of effects to the most excited stretches of the records from given starts."""
     free = tuple(context.free_parameters(structure))
     fits = _looked(context, structure, free, starts)
     return FirstLook(effects, structure, free, fits, mean_square(fits[0]))
@@ -173,19 +136,7 @@ def widened(
     substeps: Sequence[int] | None = None,
     lowest: float = float("inf"),
 ) -> list[FirstLook]:
-    """Fit the first looks that came near the best one in the most excited stretches roughly to whole records; drop the others.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    looks
-        First looks.
-    substeps
-        Integration steps per sample of each record; None chooses them.
-    lowest
-        Lowest mean squared error in the most excited stretches, including other looks.
-    """
+    """Fit the first looks that came near the best one in the most excited stretches roughly to whole records; drop the others."""
     lowest = min([lowest, *(look.nearest for look in looks)])
 
     def one(look: FirstLook) -> FirstLook:
@@ -198,17 +149,7 @@ def widened(
 def looked_again(
     context: FitContext, settled: FitResult, starts: Sequence[Mapping[str, float]]
 ) -> tuple[FitResult, ...]:
-    """Fit from other starts than those of a candidate: to the most excited stretches, then roughly to all records.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    settled
-        Gives the equations and the free parameters.
-    starts
-        Values of all parameters.
-    """
+    """Fit from other starts than those of a candidate: to the most excited stretches, then roughly to all records."""
     near = context.problem(settled.structure, context.look, LOOK_ACCURACY)
     looks = [
         near.fit(start, settled.free, None, SEARCH.look_evaluations, _LOOK_TOLERANCE, False)

@@ -29,53 +29,28 @@ from rigsight.simulate import Structure
 
 @dataclass(frozen=True)
 class SingleModels:
-    """Models with at most one effect, fitted and scored on the same records.
+    """Models with at most one effect, fitted and scored on the same records."""
 
-    Attributes
-    ----------
-    windowing
-        How records were cut.
-    context
-        Records, scales and noise.
-    before, reidentified
-        The given simulation, and its equations with refitted parameters.
-    singles
-        Every effect by itself.
-    search
-        Where and for which effects was searched.
-    """
-
-    windowing: Windowing
-    context: FitContext
+    windowing: Windowing  # how records were cut
+    context: FitContext  # records, scales and noise
+    # The given simulation, and its equations with refitted parameters.
     before: Scored
     reidentified: Scored
-    singles: list[Scored]
-    search: Search
+    singles: list[Scored]  # every effect by itself
+    search: Search  # where and for which effects was searched
 
 
 @dataclass(frozen=True)
 class AllModels:
-    """Models with any number of effects, fitted and scored on the same records.
+    """Models with any number of effects, fitted and scored on the same records."""
 
-    Attributes
-    ----------
-    alone
-        Those with at most one effect.
-    several
-        Those with two and three effects.
-    are_in_windows
-        Whether they are fitted and scored in windows of a few cycles, because the motion is sensitive to small disturbances.
-    checks
-        Say whether the residual of a model is noise and disturbance.
-    forms
-        Say how much another form of an effect would explain; of whole records.
-    """
-
-    alone: SingleModels
-    several: list[Scored]
+    alone: SingleModels  # those with at most one effect
+    several: list[Scored]  # those with two and three effects
+    # Whether they are fitted and scored in windows of a few cycles, because the motion is sensitive to small
+    # disturbances.
     are_in_windows: bool
-    checks: Checks
-    forms: OtherForms
+    checks: Checks  # say whether the residual of a model is noise and disturbance
+    forms: OtherForms  # say how much another form of an effect would explain; of whole records
 
 
 def single_models(
@@ -88,28 +63,7 @@ def single_models(
     prepare: Prepare | None,
     memory: FitMemory | None,
 ) -> SingleModels:
-    """Fit and score the given simulation, its equations and every candidate.
-
-    Parameters
-    ----------
-    campaign
-        Records and the given simulation.
-    noise
-        Noise floor of each output.
-    effects
-        Candidates.
-    windowing
-        How to cut records.
-    n_jobs, say, prepare, memory
-        As of `diagnose`.
-
-    Raises
-    ------
-    InputError
-        If the given simulation cannot be run.
-    SimulationError
-        If the rig's own equations cannot be simulated near the records.
-    """
+    """Fit and score the given simulation, its equations and every candidate."""
     context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs))
     reidentified = reidentify(context, context.start)
     if not reidentified.residuals:
@@ -179,25 +133,7 @@ def with_several_effects(
     say: Callable[[str], None],
     prepare: Prepare | None,
 ) -> AllModels:
-    """Fit and score several effects together where one does not explain the records; all in windows where only these can decide.
-
-    Parameters
-    ----------
-    campaign, noise
-        As of `single_models`.
-    models
-        Those with at most one effect.
-    effects
-        Candidates.
-    lower_bound
-        True if the noise floor is only a lower bound.
-    allowed
-        Error that a named cause may leave, in units of the noise floor.
-    rng
-        Source of the small disturbances, and of the turned signs of the checks.
-    say, prepare
-        As of `diagnose`.
-    """
+    """Fit and score several effects together where one does not explain the records; in windows where only these can decide."""
     context, whole = models.context, models.windowing.whole
     at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
     most_left = np.inf if lower_bound else VERDICT.most_left

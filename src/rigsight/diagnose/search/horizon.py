@@ -61,23 +61,6 @@ def windowing_of(
     The bandwidth of the observer is as high as possible while the gap remains clear, so that errors do not accumulate longer than
     necessary, but not so high that the tracked noise shows in the error of a true model. If no sensor reads the motion alone,
     records are cut into windows.
-
-    Parameters
-    ----------
-    campaign
-        Records and the given simulation.
-    noise
-        Noise floor of each output.
-    n_jobs
-        Threads that help with the records of a fit.
-
-    Returns
-    -------
-    windowing
-        How they are compared. The slowest observer still holds an unstable rig; several bodies that are unstable are compared in
-        windows.
-    amplified
-        Error of a true model due to the noise, by output, in units of the noise; at least 1.
     """
     sensors, poles = followed_sensors(campaign), _poles(campaign)
     limit = longest_free_run(poles, campaign.estimation)
@@ -112,13 +95,6 @@ def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
     """Return the error of a true model that tracks noisy sensors, by sensor, in units of the noise.
 
     The true parameters are unknown: the larger of two values, with the given and with the fitted parameters.
-
-    Parameters
-    ----------
-    context
-        Records with what models follow, noise of each sensor.
-    fit
-        The equations without an effect, fitted to the records.
     """
     record, rng = context.estimation[0], np.random.default_rng(0)
     sensors = [signal.name for signal in context.rig.outputs]

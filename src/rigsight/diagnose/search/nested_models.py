@@ -28,17 +28,7 @@ _TOLERANCE = 1e-4
 
 
 def ordered_by_inclusion(context: FitContext, without: Scored, singles: Sequence[Scored]) -> list[Scored]:
-    """Return models of one effect with a chi square that does not rise with generality.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    without
-        The equations without an effect.
-    singles
-        Every effect alone, fitted and scored.
-    """
+    """Return models of one effect with a chi square that does not rise with generality."""
     found = {model.names[0]: model for model in singles}
     parents = {
         name: [parent for parent in model.effects[0].parents if parent in found]
@@ -55,17 +45,7 @@ def ordered_by_inclusion(context: FitContext, without: Scored, singles: Sequence
 
 
 def lowered_by_extensions(context: FitContext, model: Scored, extensions: Sequence[Scored]) -> Scored:
-    """Return a model in the lowest minimum that is reached from better models which contain it.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    model
-        Fitted and scored.
-    extensions
-        Models with one effect more or with a more general one, fitted and scored.
-    """
+    """Return a model in the lowest minimum that is reached from better models which contain it."""
     better = [larger for larger in extensions if is_lower(larger.fit, model.fit)]
     if not better:
         return model
@@ -76,15 +56,6 @@ def at_least_as_good(context: FitContext, model: Scored, without: Scored) -> Sco
     """Return a model of one effect with a chi square that is not above that of the equations without it.
 
     If no fit from the equations without the effect is better, the result equals them: the effect has its null value.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    model
-        Fitted and scored.
-    without
-        The equations without the effect.
     """
     kept = set(without.fit.free) & set(model.fit.structure.names)
     if not _is_worse(model.fit, without.fit) or not kept <= set(model.fit.free):

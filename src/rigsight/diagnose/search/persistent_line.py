@@ -17,17 +17,6 @@ def persistent_line(residuals: Sequence[NDArray[np.float64]], dt: Sequence[float
 
     The residual of a wrong model follows the input, sweeps through the band or is spread over it; a periodic disturbance has the
     same frequency in all records. The mean of the logarithms of the spectra is large only where all of them are.
-
-    Parameters
-    ----------
-    residuals
-        First output, measured minus simulated, of each record, shape (n_samples,) each.
-    dt
-        Sample time of each record [s].
-
-    Returns
-    -------
-    None if no record is long enough.
     """
     duration = min((r.size * step for r, step in zip(residuals, dt, strict=True)), default=0.0)
     least = 2.0 * np.pi * SEARCH.line_cycles / duration if duration > 0.0 else np.inf

@@ -22,27 +22,17 @@ class SuspectedPlace:
 
 @dataclass(frozen=True)
 class Search:
-    """Where to look, and for which effects.
+    """Where to look, and for which effects."""
 
-    Attributes
-    ----------
-    places
-        All of them, the most suspected first; empty on a rig with one motion, where each kind of effect has one place.
-    effects
-        Candidates that are looked at.
-    shares
-        Share of the squared residual that the best push of an effect explains, by its name.
-    starts
-        Own values of an effect with which its push explains most, by its name.
-    others
-        The rest, for a gap that none of these explains.
-    """
-
+    # All of them, the most suspected first; empty on a rig with one motion, where each kind of effect has one
+    # place.
     places: tuple[SuspectedPlace, ...]
-    effects: tuple[Effect, ...]
+    effects: tuple[Effect, ...]  # candidates that are looked at
+    # Share of the squared residual that the best push of an effect explains, by its name.
     shares: Mapping[str, float]
+    # Own values of an effect with which its push explains most, by its name.
     starts: Mapping[str, Mapping[str, float]]
-    others: tuple[Effect, ...] = ()
+    others: tuple[Effect, ...] = ()  # the rest, for a gap that none of these explains
 
     @property
     def most(self) -> float:
@@ -51,17 +41,7 @@ class Search:
 
 
 def search_places(context: FitContext, model: Scored, effects: Sequence[Effect]) -> Search:
-    """Return the places at which the residual of a model may arise, on a rig with one motion the effects that may cause it.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    model
-        The fitted equations whose residual is to be explained.
-    effects
-        Candidates at their places.
-    """
+    """Return the places at which the residual of a model may arise, on a rig with one motion the effects that may cause it."""
     # A periodic disturbance is independent of the motion, so that no push represents it; a position-periodic effect has another
     # form at every wave number.
     pushing = [effect for effect in effects if not _stands_for_itself(effect)]

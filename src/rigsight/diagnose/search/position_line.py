@@ -42,19 +42,7 @@ class Line:
 
 
 def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2) -> list[Line]:
-    """Return the lines that explain most, best first.
-
-    Parameters
-    ----------
-    law
-        The position-periodic law.
-    runs
-        Records; of long ones only the stretch with the largest residual is used.
-    answer
-        Response of the output to it.
-    count
-        Number of lines.
-    """
+    """Return the lines that explain most, best first."""
     share = max(SEARCH.most_wave_samples // max(len(runs), 1), 64)
     runs = [_liveliest(run, share) for run in runs]
     spans = [float(np.ptp(run.way)) for run in runs]

@@ -26,23 +26,6 @@ def growth_of_disturbances(
 
     With play and stops a small change can lead to a different motion; then even the true model has a large error on a whole
     record, whatever its initial state.
-
-    Parameters
-    ----------
-    context
-        Records and noise.
-    reidentified
-        The equations without an effect.
-    model
-        The model in question.
-    rng
-        Source of the disturbances, white up to the natural frequency.
-
-    Returns
-    -------
-    The largest RMS change over a scored record, in units of the noise floor; 1 for the linear equations, 0 where a model cannot
-    be simulated. On a rig with one motion that of the leading output counts; on any other each input is disturbed in turn, and
-    the output that changes most counts.
     """
     rig = context.rig
     if not rig.is_driven or not rig.inputs:

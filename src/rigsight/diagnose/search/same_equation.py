@@ -13,15 +13,7 @@ from rigsight.identify import FitResult
 
 
 def without_repeated_equations(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Return the models without those that are equivalent to a simpler one among them.
-
-    Parameters
-    ----------
-    context
-        Says which constant forces are known.
-    models
-        Of one or several effects, fitted and scored.
-    """
+    """Return the models without those that are equivalent to a simpler one among them."""
     return _without_late_shifts(_without_needless_means(context, models))
 
 

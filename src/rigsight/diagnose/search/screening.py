@@ -52,39 +52,22 @@ _TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Suspect:
-    """An effect at a place, and the share of the squared residual that a push of its form explains.
-
-    Attributes
-    ----------
-    effect
-        The effect.
-    share
-        Share explained by the best of its pushes.
-    values
-        Values of its own parameters for a push of that form and size; empty where there are none.
-    """
+    """An effect at a place, and the share of the squared residual that a push of its form explains."""
 
     effect: Effect
-    share: float
+    share: float  # share explained by the best of its pushes
+    # Values of its own parameters for a push of that form and size; empty where there are none.
     values: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Response:
-    """Change of all readings with an effect, to first order.
-
-    Attributes
-    ----------
-    effect
-        The effect.
-    values
-        Values of its own parameters.
-    column
-        Change of the readings, weighted and stacked, after projecting out parameters and initial states, shape (n,).
-    """
+    """Change of all readings with an effect, to first order."""
 
     effect: Effect
-    values: Mapping[str, float]
+    values: Mapping[str, float]  # values of its own parameters
+    # Change of the readings, weighted and stacked, after projecting out parameters and initial states, shape
+    # (n,).
     column: Floats
 
 
@@ -287,15 +270,6 @@ def scaled(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str,
 
     Where an effect is absent at a value of a parameter, its force grows with the distance from there. A push the other way is the
     same effect only where its parameters may have that sign: a spring may soften, a friction cannot drive.
-
-    Parameters
-    ----------
-    effect
-        The effect.
-    own
-        Values of its parameters by their own names, for a factor of one.
-    factor
-        Factor on its force.
     """
     if factor == 0.0:
         return {}

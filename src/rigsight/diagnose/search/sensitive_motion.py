@@ -24,19 +24,7 @@ def is_predictable(
     at_floor: float,
     rng: np.random.Generator,
 ) -> bool:
-    """Return False if no model explains the records and the motion of a good one is sensitive to small disturbances.
-
-    Parameters
-    ----------
-    context, reidentified
-        Whole records, and the re-identified equations on them.
-    models
-        Candidates, fitted and scored.
-    at_floor
-        Held-out error in units of the noise floor at which the records count as explained.
-    rng
-        Source of the disturbances.
-    """
+    """Return False if no model explains the records and the motion of a good one is sensitive to small disturbances."""
     usable = _nearest(models)
     if not usable or usable[0].error_over_noise <= at_floor:
         return True
@@ -52,17 +40,7 @@ def is_predictable(
 
 
 def fitted_in_windows(context: FitContext, reidentified: Scored, singles: Sequence[Scored]) -> list[Scored]:
-    """Fit the best models in windows; the others are only scored there, with the parameters that they have.
-
-    Parameters
-    ----------
-    context
-        Records cut into windows, scales and noise.
-    reidentified
-        The re-identified equations.
-    singles
-        Every effect alone, fitted to whole records.
-    """
+    """Fit the best models in windows; the others are only scored there, with the parameters that they have."""
     nearest = {model.names for model in _nearest(singles)[: SEARCH.most_asked]}
 
     def one(model: Scored) -> Scored:
@@ -115,17 +93,7 @@ def _scored(context: FitContext, model: Scored) -> Scored:
 
 
 def scored_in_windows(context: FitContext, model: Scored, values: Mapping[str, float]) -> Scored:
-    """Return a model scored on the windows that judge, with these numbers and the initial states that suit them.
-
-    Parameters
-    ----------
-    context
-        Records cut into windows, scales and noise.
-    model
-        Gives the equations.
-    values
-        All parameters.
-    """
+    """Return a model scored on the windows that judge, with these numbers and the initial states that suit them."""
     result = context.problem(model.fit.structure, context.scoring).fit_windows(values, ())
     error_over_noise = result.weighted_rms if result.residuals else float("inf")
     return replace(model, held_out=result, error_over_noise=error_over_noise)

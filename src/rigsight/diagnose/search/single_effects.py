@@ -58,21 +58,7 @@ def fit_candidates(
     progress: Callable[[str], None] | None = None,
     known: Sequence[Scored] = (),
 ) -> list[Scored]:
-    """Return every effect alone, fitted and scored, with those that were before.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    reidentified
-        The re-identified equations.
-    effects
-        Candidates; those that the rig does not offer are left out.
-    progress
-        Called with the name of each candidate that is done.
-    known
-        Effects that were fitted before: these start from them, and compete with them.
-    """
+    """Return every effect alone, fitted and scored, with those that were before."""
     regression = None
     if context.rig.has_one_motion and context.rig.is_driven and context.driven:
         regression = EffectRegression(context.rig, context.driven, reidentified.fit.values, context.scales)
@@ -131,19 +117,7 @@ def fit_candidate(
     base: FitResult,
     hold: frozenset[str] = frozenset(),
 ) -> Scored:
-    """Fit and score one set of effects to full precision.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    effects
-        All effects of the model; the last is new.
-    base
-        Fit without the last.
-    hold
-        Rig parameters to keep at their base value.
-    """
+    """Fit and score one set of effects to full precision."""
     (found,) = widened(context, [look_at(context, effects, base, {}, hold=hold)])
     return refine(context, [followed(context, found, promising=True)])[0]
 

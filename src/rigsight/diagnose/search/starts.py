@@ -29,21 +29,7 @@ def start_values(
     base: FitResult,
     parents: Mapping[str, FitResult],
 ) -> Iterator[dict[str, float]]:
-    """Yield start values of all parameters for a fit with `effect`.
-
-    Parameters
-    ----------
-    context
-        Gives the characteristic sizes.
-    structure
-        The equations with `effect`.
-    effect
-        The effect to add.
-    base
-        Fit without it.
-    parents
-        Fits with a simpler effect in its place, by name of that effect.
-    """
+    """Yield start values of all parameters for a fit with `effect`."""
     starts = list(_plain_starts(context, structure, effect, base, parents))
     if effect.wave_number is not None:
         waves = [with_own_values(structure, effect, base, own) for own in wave_starts(context, effect, base)]
@@ -96,17 +82,7 @@ def _plain_starts(
 
 
 def restart_values(structure: Structure, effect: Effect, fit: FitResult) -> Iterator[dict[str, float]]:
-    """Yield further start values for a fit with `effect` that may have stopped in a local minimum.
-
-    Parameters
-    ----------
-    structure
-        Equations of the fit.
-    effect
-        One of its effects.
-    fit
-        Where it stopped.
-    """
+    """Yield further start values for a fit with `effect` that may have stopped in a local minimum."""
     own = structure.values_of(effect, fit.values)
     for start in effect.starts:
         if start.parent == effect.name:
@@ -126,17 +102,7 @@ def with_own_values(
 
 
 def sized(value: float, null: float, factor: float) -> float:
-    """Return the value of a parameter that scales its effect by a factor relative to another value.
-
-    Parameters
-    ----------
-    value
-        The other one.
-    null
-        Where the effect is absent.
-    factor
-        Not zero; a negative one reverses the effect.
-    """
+    """Return the value of a parameter that scales its effect by a factor relative to another value."""
     return null + factor * (value - null) if abs(null) < ENDLESS else value / factor
 
 

@@ -23,17 +23,7 @@ _DAMPING_RATIO = 0.5
 
 
 def wave_starts(context: FitContext, effect: Effect, base: FitResult) -> Iterator[dict[str, float]]:
-    """Yield an effect's own values at the position-periodic lines in the residual of a fit without it.
-
-    Parameters
-    ----------
-    context
-        Records and sizes.
-    effect
-        One with a wave number.
-    base
-        Fit without it to the estimation records.
-    """
+    """Yield an effect's own values at the position-periodic lines in the residual of a fit without it."""
     if len(base.residuals) != len(context.estimation):
         return
     names, law = _law(effect)

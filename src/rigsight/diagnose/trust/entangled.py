@@ -12,13 +12,7 @@ from rigsight.identify import FitResult
 
 
 def entangled(fit: FitResult) -> tuple[Entangled, ...]:
-    """Return the pairs of parameters with correlated errors, the highest correlation first.
-
-    Parameters
-    ----------
-    fit
-        With the covariance of its free parameters.
-    """
+    """Return the pairs of parameters with correlated errors, the highest correlation first."""
     found = []
     for i, j in itertools.combinations(range(len(fit.free)), 2):
         block = fit.covariance[np.ix_([i, j], [i, j])]

@@ -25,37 +25,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Estimates:
-    """Parameters estimated from some pieces alone.
+    """Parameters estimated from some pieces alone."""
 
-    Attributes
-    ----------
-    shifts
-        Difference from the common fit, in units of the parameters, shape (n_free,).
-    variances
-        Infinite where these pieces do not determine a number, shape (n_free,).
-    freedom
-        Degrees of freedom of these variances, shape (n_free,).
-    """
-
-    shifts: Floats
-    variances: Floats
-    freedom: Floats
+    shifts: Floats  # difference from the common fit, in units of the parameters, shape (n_free,)
+    variances: Floats  # infinite where these pieces do not determine a number, shape (n_free,)
+    freedom: Floats  # degrees of freedom of these variances, shape (n_free,)
 
 
 def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
-    """Return the parameters estimated from some pieces.
-
-    Parameters
-    ----------
-    of
-        Coordinates and their chain to the parameters.
-    some
-        Pieces, each with an initial state of its own.
-    spectra
-        Of the noise of each record.
-    kept
-        Which parameters are estimated; the others are held at the common fit, shape (n_free,).
-    """
+    """Return the parameters estimated from some pieces."""
     inverse, infinite = _inverse(of, some, kept)
     away = -inverse @ sum((piece.rows.T @ piece.residuals for piece in some), start=np.zeros(len(of.free)))
     # A step that is longer than coordinates can count says no more than that.
@@ -72,17 +50,6 @@ def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: ND
 
 def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
     """Return the difference between pooled windows and the whole records that they cover (Hausman).
-
-    Parameters
-    ----------
-    of
-        As of `estimates`, with all whole records.
-    windows
-        All windows of one length, in order.
-    spectra
-        Of the noise of each record.
-    kept
-        Which parameters are estimated; the others are held at the common fit, shape (n_free,).
 
     References
     ----------
@@ -107,13 +74,7 @@ def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: ND
 
 
 def mean(several: Sequence[Estimates]) -> Estimates:
-    """Return the mean of independent estimates, each with the weight of its own variance.
-
-    Parameters
-    ----------
-    several
-        One or more.
-    """
+    """Return the mean of independent estimates, each with the weight of its own variance."""
     weights = np.array([1.0 / one.variances for one in several])
     total = np.sum(weights, axis=0)
     # A number that none of them determines has no weight anywhere.
@@ -129,13 +90,6 @@ def told_by_most(of: Pieces, groups: Sequence[Sequence[Piece]]) -> NDArray[np.bo
 
     A parameter that is equivalent to another in most groups, such as the two terms of a friction under a single load, is left
     out; the other then represents both.
-
-    Parameters
-    ----------
-    of
-        As of `estimates`.
-    groups
-        Pieces of each group.
     """
     kept = np.ones(len(of.free), dtype=bool)
     while np.any(kept):

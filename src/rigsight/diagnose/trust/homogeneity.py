@@ -27,29 +27,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spread:
-    """Difference of a parameter between groups.
+    """Difference of a parameter between groups."""
 
-    Attributes
-    ----------
-    p_value
-        Probability of such differences if the parameter is the same in all.
-    largest
-        The largest difference from the mean of all groups, in standard errors of that difference; with few degrees of freedom,
-        the equivalent number of standard errors with the same probability.
-    """
-
-    p_value: float
+    p_value: float  # probability of such differences if the parameter is the same in all
+    # The largest difference from the mean of all groups, in standard errors of that difference; with few
+    # degrees of freedom, the equivalent number of standard errors with the same probability.
     largest: float
 
 
 def spread(values: Floats, variances: Floats, freedom: Floats) -> Spread:
-    """Return the differences of one parameter between groups.
-
-    Parameters
-    ----------
-    values, variances, freedom
-        By group, shape (n_groups,), with the degrees of freedom of the variances; all finite, of two groups or more.
-    """
+    """Return the differences of one parameter between groups."""
     weights, n = 1.0 / variances, values.size
     total = float(np.sum(weights))
     away = values - float(weights @ values) / total
@@ -77,30 +64,14 @@ def adjusted(p_values: Sequence[float]) -> list[float]:
 
 @dataclass(frozen=True)
 class Course:
-    """Trend of a parameter with a quantity.
+    """Trend of a parameter with a quantity."""
 
-    Attributes
-    ----------
-    direction
-        1 if it rises, -1 if it falls, 0 otherwise.
-    left
-        Weighted sum of squares about the best monotonic trend.
-    """
-
-    direction: int
-    left: float
+    direction: int  # 1 if it rises, -1 if it falls, 0 otherwise
+    left: float  # weighted sum of squares about the best monotonic trend
 
 
 def course(values: Floats, variances: Floats, along: Floats) -> Course:
-    """Return whether values of one parameter rise or fall with a quantity.
-
-    Parameters
-    ----------
-    values, variances
-        By group, shape (n_groups,).
-    along
-        The quantity by group; groups that share a value of it count as one level.
-    """
+    """Return whether values of one parameter rise or fall with a quantity."""
     levels, place = np.unique(along, return_inverse=True)
     weights = 1.0 / variances
     total = np.bincount(place, weights)

@@ -16,38 +16,16 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class Order:
-    """A quantity by which records differ.
+    """A quantity by which records differ."""
 
-    Attributes
-    ----------
-    pattern
-        Pattern of a parameter that changes with it.
-    name
-        In words, such as ``"amplitude"`` or the name of a constant.
-    unit
-        Of the quantity; empty for a plain number.
-    levels
-        Its value by the name of the record.
-    """
-
-    pattern: Pattern
-    name: str
-    unit: str
-    levels: Mapping[str, float]
+    pattern: Pattern  # pattern of a parameter that changes with it
+    name: str  # in words, such as ``"amplitude"`` or the name of a constant
+    unit: str  # of the quantity; empty for a plain number
+    levels: Mapping[str, float]  # its value by the name of the record
 
 
 def orders(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) -> tuple[Order, ...]:
-    """Return the quantities by which records differ; set values first, the order of the records last.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        Whole ones, in the order of the campaign.
-    constants
-        Of the campaign, where a record has none of its own.
-    """
+    """Return the quantities by which records differ; set values first, the order of the records last."""
     found = []
     units = {p.name: _told(p.unit) for p in rig.constants}
     for name in dict.fromkeys(name for record in records for name in record.constants):

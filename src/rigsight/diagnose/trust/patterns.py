@@ -47,18 +47,10 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class Meaning:
-    """Likely meaning of a pattern.
+    """Likely meaning of a pattern."""
 
-    Attributes
-    ----------
-    cause
-        Likely cause, a main clause without a full stop.
-    experiment
-        The experiment that would decide, a sentence.
-    """
-
-    cause: str
-    experiment: str
+    cause: str  # likely cause, a main clause without a full stop
+    experiment: str  # the experiment that would decide, a sentence
 
 
 _LADDER = "Record the same input at three amplitudes or more, each twice."
@@ -138,17 +130,7 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
 
 
 def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
-    """Return the likely meaning of a pattern, from the most specific entry; None where nothing differs.
-
-    Parameters
-    ----------
-    pattern
-        How the number differs.
-    role
-        What it is in the equations.
-    direction
-        1 if it rises, -1 if it falls, 0 otherwise.
-    """
+    """Return the likely meaning of a pattern, from the most specific entry; None where nothing differs."""
     for known_role, known_direction in ((role, direction), (role, None), (None, None)):
         found = _MEANINGS.get((pattern, known_role, known_direction))
         if found is not None:
@@ -157,15 +139,7 @@ def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
 
 
 def roles(rig: Rig, effects: Iterable[str]) -> dict[str, Role]:
-    """Return the role of each parameter in the equations.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    effects
-        Names of the parameters of effects in the equations.
-    """
+    """Return the role of each parameter in the equations."""
     found: dict[str, Role] = {}
     mechanism = rig.mechanism
     for drive in mechanism.drives:

@@ -33,80 +33,39 @@ _TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Piece:
-    """A record or a window of one.
+    """A record or a window of one."""
 
-    Attributes
-    ----------
-    record
-        Name of the whole record.
-    place
-        Which window of it, counted from 0, and of how many.
-    rows
-        Derivatives after projecting out its initial state, shape (n_measured * n_samples, n_free).
-    residuals
-        Residuals after the same projection, shape (n_measured * n_samples,): of a whole record at the common parameters, of a
-        window at those of its record alone, so that differences between records do not affect windows.
-    noise
-        Residuals after projecting out parameters and state of this piece, same shape.
-    n_measured
-        Number of stacked outputs.
-    n_own
-        Number of projected parameters: free parameters and initial states.
-    """
-
-    record: str
-    place: tuple[int, int]
-    rows: Floats
+    record: str  # name of the whole record
+    place: tuple[int, int]  # which window of it, counted from 0, and of how many
+    rows: Floats  # derivatives after projecting out its initial state, shape (n_measured * n_samples, n_free)
+    # Residuals after the same projection, shape (n_measured * n_samples,): of a whole record at the common
+    # parameters, of a window at those of its record alone, so that differences between records do not affect
+    # windows.
     residuals: Floats
-    noise: Floats
-    n_measured: int
-    n_own: int
+    noise: Floats  # residuals after projecting out parameters and state of this piece, same shape
+    n_measured: int  # number of stacked outputs
+    n_own: int  # number of projected parameters: free parameters and initial states
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """Whole records, their halves and quarters.
-
-    Attributes
-    ----------
-    free
-        Names of the numbers.
-    values
-        Of the common fit, shape (n_free,).
-    place
-        The same in the coordinates of the rows, shape (n_free,).
-    coordinates
-        Conversion from coordinates to values.
-    derivative_error
-        Relative error of the rows.
-    whole
-        One of each record, or its windows where the diagnosis itself is done in windows.
-    cut
-        Number of windows in a record -> the windows of all records; without those too short.
-    portions
-        Number of windows in each record that can be evaluated individually, 1 where they are too short.
-    """
+    """Whole records, their halves and quarters."""
 
     free: tuple[str, ...]
-    values: Floats
-    place: Floats
-    coordinates: Coordinates
-    derivative_error: float
+    values: Floats  # of the common fit, shape (n_free,)
+    place: Floats  # the same in the coordinates of the rows, shape (n_free,)
+    coordinates: Coordinates  # conversion from coordinates to values
+    derivative_error: float  # relative error of the rows
+    # One of each record, or its windows where the diagnosis itself is done in windows.
     whole: tuple[Piece, ...]
+    # Number of windows in a record -> the windows of all records; without those too short.
     cut: dict[int, tuple[Piece, ...]]
+    # Number of windows in each record that can be evaluated individually, 1 where they are too short.
     portions: int = 1
 
 
 def pieces(context: FitContext, model: Scored) -> Pieces | None:
-    """Return the information of records and their windows; None where the model cannot be simulated in one of them.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    model
-        Fitted and scored.
-    """
+    """Return the information of records and their windows; None where the model cannot be simulated in one of them."""
     free, records, fit = model.fit.free, context.records, context.on_all_records(model)
     found = derivatives(context.problem(fit.structure, records), fit, free)
     whole: list[Piece] = []
@@ -149,13 +108,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
 
 
 def pseudo_inverse(rows: Floats) -> Floats:
-    """Return the pseudoinverse that maps residuals to parameters, shape (n_free, n); zero in undetermined directions.
-
-    Parameters
-    ----------
-    rows
-        Derivatives, shape (n, n_free).
-    """
+    """Return the pseudoinverse that maps residuals to parameters, shape (n_free, n); zero in undetermined directions."""
     size = np.linalg.norm(rows, axis=0)
     size[size == 0.0] = 1.0
     base, triangle = np.linalg.qr(rows / size)

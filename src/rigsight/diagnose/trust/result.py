@@ -12,63 +12,37 @@ from rigsight.diagnose.trust.patterns import Meaning, Pattern
 
 @dataclass(frozen=True)
 class GroupValue:
-    """A parameter estimated from one group alone.
+    """A parameter estimated from one group alone."""
 
-    Attributes
-    ----------
-    group
-        Name of the record, the level of an amplitude or constant, or the window.
-    value, std
-        In the unit of the number.
-    """
-
-    group: str
+    group: str  # name of the record, the level of an amplitude or constant, or the window
+    # In the unit of the number.
     value: float
     std: float
 
 
 @dataclass(frozen=True)
 class ParameterTrust:
-    """Trust in one parameter.
+    """Trust in one parameter."""
 
-    Attributes
-    ----------
-    name, unit
-        Of the number.
-    value, std
-        Of the common fit.
-    of_effect
-        True for a number of an effect, False for one of the rig.
-    groups
-        Values by kind of group: ``"record"``, ``"amplitude"``, a constant by name, ``"portion"``, ``"window"``. Groups that do
-        not determine it alone are left out.
-    p_value
-        Probability of such differences if it is the same everywhere, adjusted for all tests of all parameters.
-    largest
-        Largest difference between groups, in standard errors of that difference.
-    pattern
-        How it differs.
-    direction
-        1 if it rises with `goes_with`, -1 if it falls, else 0.
-    goes_with
-        What it changes with: ``"amplitude"``, the name of a constant, ``"time"``; if several cannot be distinguished, all of
-        them.
-    points_to
-        Likely cause and next experiment; None where it is stable.
-    """
-
+    # Of the number.
     name: str
     unit: str
+    # Of the common fit.
     value: float
     std: float
-    of_effect: bool
+    of_effect: bool  # true for a number of an effect, False for one of the rig
+    # Values by kind of group: ``"record"``, ``"amplitude"``, a constant by name, ``"portion"``, ``"window"``.
+    # Groups that do not determine it alone are left out.
     groups: Mapping[str, tuple[GroupValue, ...]]
+    # Probability of such differences if it is the same everywhere, adjusted for all tests of all parameters.
     p_value: float
-    largest: float
-    pattern: Pattern
-    direction: int = 0
+    largest: float  # largest difference between groups, in standard errors of that difference
+    pattern: Pattern  # how it differs
+    direction: int = 0  # 1 if it rises with `goes_with`, -1 if it falls, else 0
+    # What it changes with: ``"amplitude"``, the name of a constant, ``"time"``; if several cannot be
+    # distinguished, all of them.
     goes_with: tuple[str, ...] = ()
-    points_to: Meaning | None = None
+    points_to: Meaning | None = None  # likely cause and next experiment; None where it is stable
 
     @property
     def stable(self) -> bool:
@@ -83,40 +57,20 @@ class ParameterTrust:
 
 @dataclass(frozen=True)
 class Entangled:
-    """Two strongly correlated parameters.
+    """Two strongly correlated parameters."""
 
-    Attributes
-    ----------
-    names
-        Of both.
-    correlation
-        Of their errors.
-    text
-        Description, a sentence.
-    """
-
-    names: tuple[str, str]
-    correlation: float
-    text: str
+    names: tuple[str, str]  # of both
+    correlation: float  # of their errors
+    text: str  # description, a sentence
 
 
 @dataclass(frozen=True)
 class Trust:
-    """Whether the parameters of the diagnosed model are the same wherever they are estimated.
+    """Whether the parameters of the diagnosed model are the same wherever they are estimated."""
 
-    Attributes
-    ----------
-    statement
-        In a few sentences.
-    parameters
-        One each, those that differ first.
-    entangled
-        Pairs that can hardly be separated.
-    """
-
-    statement: str
-    parameters: tuple[ParameterTrust, ...] = ()
-    entangled: tuple[Entangled, ...] = field(default=())
+    statement: str  # in a few sentences
+    parameters: tuple[ParameterTrust, ...] = ()  # one each, those that differ first
+    entangled: tuple[Entangled, ...] = field(default=())  # pairs that can hardly be separated
 
     @property
     def stable(self) -> bool:

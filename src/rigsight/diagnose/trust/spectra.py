@@ -26,32 +26,18 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NoiseSpectra:
-    """Residual spectra of whole records, by the name of the record.
+    """Residual spectra of whole records, by the name of the record."""
 
-    Attributes
-    ----------
-    filters
-        Whitening filters by output, first of each number of outputs that a record holds.
-    powers
-        Power of the innovations, by record and output.
-    taken
-        By record: ratio of the noise power before the fit to the residual power, in the band that determines each parameter,
-        shape (n_free,).
-    """
-
+    # Whitening filters by output, first of each number of outputs that a record holds.
     filters: dict[int, list[Floats]]
-    powers: dict[str, list[float]]
+    powers: dict[str, list[float]]  # power of the innovations, by record and output
+    # By record: ratio of the noise power before the fit to the residual power, in the band that determines
+    # each parameter, shape (n_free,).
     taken: dict[str, Floats]
 
     @classmethod
     def of(cls, whole: Sequence[Piece]) -> NoiseSpectra:
-        """Return the residual spectra of records with their own parameters refitted.
-
-        Parameters
-        ----------
-        whole
-            Of each record, or of the windows of each.
-        """
+        """Return the residual spectra of records with their own parameters refitted."""
         filters: dict[int, list[Floats]] = {}
         powers: dict[str, list[float]] = {}
         taken: dict[str, Floats] = {}
@@ -79,19 +65,7 @@ class NoiseSpectra:
         return found
 
     def variances(self, piece: Piece, columns: Floats) -> Floats:
-        """Return the variance that the noise of a record gives to linear estimates.
-
-        Parameters
-        ----------
-        piece
-            A record or a window of it.
-        columns
-            Weights of its residuals, shape (n_measured * n_samples, n).
-
-        Returns
-        -------
-        Shape (n,).
-        """
+        """Return the variance that the noise of a record gives to linear estimates."""
         return np.asarray(np.sum(self._shares(piece, columns), axis=0) * self.taken[piece.record])
 
     def _shares(self, piece: Piece, columns: Floats) -> Floats:

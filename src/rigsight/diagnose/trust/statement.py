@@ -22,21 +22,7 @@ def statement(
     asked: Sequence[str],
     left_open: Sequence[str] = (),
 ) -> str:
-    """Return the statement on the parameters, in a few sentences.
-
-    Parameters
-    ----------
-    numbers
-        Those that differ first.
-    pairs
-        Correlated parameters.
-    n_records
-        Number of records.
-    asked
-        Kinds of groups that were compared.
-    left_open
-        Parameters that all records together do not determine.
-    """
+    """Return the statement on the parameters, in a few sentences."""
     differing = [number for number in numbers if not number.stable]
     sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.told]]
     if len(_alike(differing)) > TRUST.told:

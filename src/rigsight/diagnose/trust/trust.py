@@ -54,22 +54,7 @@ def trust(
     constants: Mapping[str, float],
     std: Mapping[str, float] | None = None,
 ) -> Trust:
-    """Return the trust in the parameters of a model.
-
-    Parameters
-    ----------
-    context
-        Records as they were fitted and scored, scales and noise.
-    model
-        Fitted and scored.
-    records
-        Whole ones, in the order of the campaign.
-    constants
-        Of the campaign.
-    std
-        Standard errors of the parameters by the bootstrap, where available. If they exceed those of the formula, errors by group
-        are increased by the same factor, because disturbance forces shift the events that determine the parameters.
-    """
+    """Return the trust in the parameters of a model."""
     if not model.fit.free:
         return Trust(_NOTHING_FITTED)
     found = pieces(context, model)

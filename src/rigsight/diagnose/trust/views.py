@@ -24,30 +24,16 @@ _NAMES = ("half", "quarter")
 
 @dataclass(frozen=True)
 class View:
-    """Parameters estimated in several groups.
+    """Parameters estimated in several groups."""
 
-    Attributes
-    ----------
-    kind
-        By what.
-    labels
-        Of the groups.
-    found
-        Of each group.
-    sizes
-        Of the numbers of the common fit, without sign, shape (n_free,).
-    apart
-        For groups that share samples, such as windows of each length: difference of the last from the first. Else None.
-    is_tested
-        False where the groups are those of another view.
-    """
-
-    kind: str
-    labels: tuple[str, ...]
-    found: tuple[Estimates, ...]
-    sizes: Floats
+    kind: str  # by what
+    labels: tuple[str, ...]  # of the groups
+    found: tuple[Estimates, ...]  # of each group
+    sizes: Floats  # of the numbers of the common fit, without sign, shape (n_free,)
+    # For groups that share samples, such as windows of each length: difference of the last from the first.
+    # Else None.
     apart: Estimates | None = None
-    is_tested: bool = True
+    is_tested: bool = True  # false where the groups are those of another view
 
     def known(self, index: int) -> NDArray[np.intp]:
         """Return which groups determine a parameter alone."""
@@ -78,17 +64,7 @@ class View:
 
 
 def views(of: Pieces, records: Sequence[str], orders: Sequence[Order]) -> dict[str, View]:
-    """Return every view that the records allow, by its kind.
-
-    Parameters
-    ----------
-    of
-        What records and windows say.
-    records
-        Names of the records in the order of the campaign.
-    orders
-        By what records differ.
-    """
+    """Return every view that the records allow, by its kind."""
     made: dict[str, View] = {}
     spectra = NoiseSpectra.of(of.whole)
     if len(records) > 1:

@@ -51,42 +51,21 @@ _SHOWS = 0.05
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard errors of a fitted model.
+    """Standard errors of a fitted model."""
 
-    Attributes
-    ----------
-    std
-        By name of the fitted parameters, infinite where the records do not determine one.
-    covariance
-        Shape (n_free, n_free), in the order of the fit's `free`.
-    method
-        ``"bootstrap"``, or ``"formula"`` where the model cannot be simulated under such forces, or not in reasonable time.
-    sources
-        The disturbance forces and the noise of the draws, noise in SI units; None for the formula.
-    """
-
-    std: dict[str, float]
-    covariance: Floats
+    std: dict[str, float]  # by name of the fitted parameters, infinite where the records do not determine one
+    covariance: Floats  # shape (n_free, n_free), in the order of the fit's `free`
+    # ``"bootstrap"``, or ``"formula"`` where the model cannot be simulated under such forces, or not in
+    # reasonable time.
     method: StdMethod
+    # The disturbance forces and the noise of the draws, noise in SI units; None for the formula.
     sources: Sources | None = None
 
 
 def uncertainty_of(
     context: FitContext, fit: FitResult, rng: np.random.Generator, n_replicates: int | None = None
 ) -> Uncertainty:
-    """Return the standard errors of a model that was fitted to the context's estimation records.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    fit
-        The model.
-    rng
-        Source of randomness.
-    n_replicates
-        Draws; default follows from how many steps of integration one takes.
-    """
+    """Return the standard errors of a model that was fitted to the context's estimation records."""
     by_formula = Uncertainty(dict(fit.standard_errors), fit.covariance, "formula")
     if not (fit.free and fit.residuals and max(r.shape[0] for r in fit.residuals) >= FEWEST):
         return by_formula

@@ -15,19 +15,7 @@ _STREAM = 1
 
 
 def with_own_errors(diagnosis: Diagnosis, context: FitContext, model: Scored, seed: int) -> Diagnosis:
-    """Return a diagnosis whose named candidate has standard errors of the bootstrap.
-
-    Parameters
-    ----------
-    diagnosis
-        As its fits tell it, with the errors of their formula.
-    context
-        What its models were fitted with.
-    model
-        That of the verdict; of a gap without an effect the re-identified equations.
-    seed
-        Of the draws.
-    """
+    """Return a diagnosis whose named candidate has standard errors of the bootstrap."""
     found = uncertainty_of(context, model.fit, np.random.default_rng([seed, _STREAM]))
 
     def own(candidate: Candidate) -> Candidate:

@@ -43,18 +43,10 @@ _ACCURACY = 1e-5
 
 @dataclass(frozen=True)
 class Replicates:
-    """A fitted model along the records of its fit.
+    """A fitted model along the records of its fit."""
 
-    Attributes
-    ----------
-    context
-        Records and threads.
-    fit
-        Of the model, to the context's estimation records.
-    """
-
-    context: FitContext
-    fit: FitResult
+    context: FitContext  # records and threads
+    fit: FitResult  # of the model, to the context's estimation records
 
     @cached_property
     def _structure(self) -> Structure:
@@ -81,59 +73,15 @@ class Replicates:
         return sum(steps for _, steps in self._undisturbed)
 
     def responses(self, forces: Sequence[Floats]) -> list[Floats]:
-        """Return the change of the residuals of each record by forces at the joints.
-
-        Parameters
-        ----------
-        forces
-            Samples of each record, shape (n_samples, n_joints, n_replicates).
-
-        Returns
-        -------
-        Shape (n_samples, n_outputs, n_replicates) each.
-
-        Raises
-        ------
-        SimulationError
-            If the model cannot be simulated under them.
-        """
+        """Return the change of the residuals of each record by forces at the joints."""
         return self._of_each_record(lambda i: self._response(i, forces[i], None))
 
     def with_noise(self, noise: Sequence[Floats]) -> list[Floats]:
-        """Return the change of the residuals of each record by sensor noise: the noise itself less the response of the observer.
-
-        Parameters
-        ----------
-        noise
-            Samples of each record, shape (n_samples, n_outputs, n_replicates).
-
-        Returns
-        -------
-        As of `responses`, which tells the errors too.
-        """
+        """Return how sensor noise changes the residuals of each record: the noise itself less the response of the observer."""
         return self._of_each_record(lambda i: self._changed(i, None, noise[i]))
 
     def drawn(self, sources: Sources, n_replicates: int, rng: np.random.Generator) -> list[Floats]:
-        """Return random changes of the residuals of each record for forces and sensor noise of these sizes.
-
-        Parameters
-        ----------
-        sources
-            Sizes of forces and sensor noise.
-        n_replicates
-            How many.
-        rng
-            Source of randomness.
-
-        Returns
-        -------
-        Shape (n_samples, n_outputs, n_replicates) each.
-
-        Raises
-        ------
-        SimulationError
-            If the model cannot be simulated under them.
-        """
+        """Return random changes of the residuals of each record for forces and sensor noise of these sizes."""
         forces = [sources.forces(r.n_samples, r.dt, n_replicates, rng) for r in self.context.estimation]
         noise = [sources.noise(r.n_samples, n_replicates, rng) for r in self.context.estimation]
         return self._of_each_record(lambda i: self._changed(i, forces[i], noise[i]))

@@ -41,20 +41,13 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True)
 class Sources:
-    """Sizes of disturbance forces and sensor noise.
+    """Sizes of disturbance forces and sensor noise."""
 
-    Attributes
-    ----------
-    noise_std
-        Of each sensor's white noise, shape (n_outputs,).
-    force_std
-        Of the force at each joint by corner frequency, shape (n_joints, n_corners), in the unit of the joint's force.
-    corners
-        Corner frequencies of the low-pass noise [rad/s], infinite for white forces, shape (n_corners,).
-    """
-
-    noise_std: Floats
+    noise_std: Floats  # of each sensor's white noise, shape (n_outputs,)
+    # Of the force at each joint by corner frequency, shape (n_joints, n_corners), in the unit of the joint's
+    # force.
     force_std: Floats
+    # Corner frequencies of the low-pass noise [rad/s], infinite for white forces, shape (n_corners,).
     corners: Floats
 
     def noise(self, n_samples: int, n_replicates: int, rng: np.random.Generator) -> Floats:
@@ -90,33 +83,7 @@ def likeliest_sources(
     dts: Sequence[float],
     corners: Floats,
 ) -> Sources:
-    """Return the maximum likelihood sizes of sources from the spectra of a residual.
-
-    Parameters
-    ----------
-    left
-        Residuals of a model on each record, in units of the noise of each sensor, shape (n_samples, n_outputs); 0 throughout
-        where it was not measured.
-    of_noise
-        White noise of each sensor, shape (n_samples, n_replicates), and what it leaves of each record, shape (n_samples,
-        n_outputs, n_replicates), both in units of the noise; outer sequence over sensors.
-    of_forces
-        White forces at each joint, shape (n_samples, n_replicates), and what they leave of each record in the same units, shape
-        (n_samples, n_outputs, n_replicates); outer sequence over joints.
-    dts
-        Sample time of each record [s].
-    corners
-        As of `Sources`.
-
-    Returns
-    -------
-    With the noise in the same units. Forces that no sensor shows are zero.
-
-    Raises
-    ------
-    ValueError
-        If all records are shorter than `FEWEST` samples.
-    """
+    """Return the maximum likelihood sizes of sources from the spectra of a residual."""
     long = [i for i, own in enumerate(left) if own.shape[0] >= FEWEST]
     if not long:
         raise ValueError("No record is long enough for a spectrum.")

@@ -35,24 +35,7 @@ def judge(
     cause: Callable[[], MainCause],
     lower_bound: bool = False,
 ) -> Judgement:
-    """Return the verdict on the held-out errors, all in units of the noise floor.
-
-    Parameters
-    ----------
-    error_before
-        RMS that the given simulation leaves.
-    reidentified
-        The re-identified equations.
-    best
-        The best model with an effect.
-    is_adequate
-        Says whether the residual of a model is correlated with nothing, see `adequacy`.
-    cause
-        Says how much of the gap the best model explains, and what contradicts it.
-    lower_bound
-        True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances may
-        stand well above it, so that a modest error that no model reduces is taken for noise.
-    """
+    """Return the verdict on the held-out errors, all in units of the noise floor."""
     at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
     helps = best.error_over_noise * VERDICT.worthwhile < reidentified.error_over_noise
     retuned = reidentified.error_over_noise * VERDICT.worthwhile < error_before

@@ -20,23 +20,13 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class MainCause:
-    """The share of the re-identified gap that a model explains.
+    """The share of the re-identified gap that a model explains."""
 
-    Attributes
-    ----------
-    share
-        Of the squared gap above the noise floor.
-    at_least
-        Lower limit of the share in 95 % of the resamplings of the records' stretches.
-    contradicted_by
-        Equally good models that act at other places and explain another part of the gap.
-    equalled_by
-        Equally good models that act at other places but explain the same part.
-    """
-
-    share: float
-    at_least: float
+    share: float  # of the squared gap above the noise floor
+    at_least: float  # lower limit of the share in 95 % of the resamplings of the records' stretches
+    # Equally good models that act at other places and explain another part of the gap.
     contradicted_by: tuple[Scored, ...] = ()
+    # Equally good models that act at other places but explain the same part.
     equalled_by: tuple[Scored, ...] = ()
 
     @property
@@ -53,23 +43,7 @@ def main_cause(
     noise: NDArray[np.float64],
     rng: np.random.Generator,
 ) -> MainCause:
-    """Determine the share of the residual of the equations that a model explains.
-
-    Parameters
-    ----------
-    rig
-        Gives the place of each effect.
-    reidentified
-        The re-identified equations.
-    best
-        The model with an effect.
-    tied
-        Models whose held-out error does not differ significantly from that of the best.
-    noise
-        Noise floor of each output, shape (n_outputs,).
-    rng
-        Source of the resampling.
-    """
+    """Determine the share of the residual of the equations that a model explains."""
     squares = squared_errors([model.residuals for model in (reidentified, best)], noise)
     gap, left = squares.resampled(squares.draws(rng)).T
     share = _share(*squares.mean)

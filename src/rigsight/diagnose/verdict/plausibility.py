@@ -29,15 +29,7 @@ class Doubt:
 
 
 def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
-    """Return the implausible parameters of a model.
-
-    Parameters
-    ----------
-    model
-        Fitted and scored.
-    reidentified
-        The re-identified equations, with the parameters of the rig without an effect.
-    """
+    """Return the implausible parameters of a model."""
     fit = model.fit
     parameters = {p.name: p for p in fit.structure.parameters}
     own = {fit.structure.parameter_name(e, p.name) for e in model.effects for p in e.parameters}
@@ -77,13 +69,6 @@ def has_size_of_zero(model: Scored, others: Sequence[Scored]) -> bool:
 
     It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
     of that, tested together by Wald's chi square. Where these are determined only with others, the former decides alone.
-
-    Parameters
-    ----------
-    model
-        Fitted and scored.
-    others
-        Models among which are those without one of its effects.
     """
     fits = {frozenset(other.names): other.fit for other in others}
 
@@ -111,17 +96,7 @@ def _is_within_errors(model: Scored, effect: Effect) -> bool:
 
 
 def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str, str]) -> Ranking:
-    """Return the ranking with a plausible model before an implausible one that is hardly better and at the same place.
-
-    Parameters
-    ----------
-    ranking
-        By held-out error.
-    reidentified
-        The re-identified equations.
-    places
-        Place of each effect by name.
-    """
+    """Return the ranking with a plausible model before an implausible one that is hardly better and at the same place."""
     best = ranking.order[0]
     if not any(doubt.grave for doubt in doubts(best, reidentified)):
         return ranking

@@ -18,47 +18,27 @@ from rigsight.effects.effect import Place
 
 @dataclass(frozen=True)
 class Grounds:
-    """Basis of the probability of one model.
+    """Basis of the probability of one model."""
 
-    Attributes
-    ----------
-    share
-        Of the ranking: held-out errors and evidence together.
-    held_out
-        Share of the resamplings of the held-out errors in which it is the simplest of the best.
-    evidence
-        Logarithm of its evidence relative to the most probable model [nats]; None where its fit was not finished.
-    """
-
-    share: float
-    held_out: float
+    share: float  # of the ranking: held-out errors and evidence together
+    held_out: float  # share of the resamplings of the held-out errors in which it is the simplest of the best
+    # Logarithm of its evidence relative to the most probable model [nats]; None where its fit was not
+    # finished.
     evidence: float | None
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """Scored models in order with their probabilities.
+    """Scored models in order with their probabilities."""
 
-    Attributes
-    ----------
-    order
-        Models, the chosen one first, then by held-out error.
-    probabilities
-        Probability of each to be the cause among those tried.
-    tied
-        Models whose held-out error does not differ significantly from that of the chosen one.
-    grounds
-        Basis of each probability, in the same order.
-    error_of_choice
-        Error, on the stretches not drawn in a resampling, of the model with the best held-out errors in it, in units of the noise
-        floor; RMS over all resamplings. Evidence, which uses all records, does not affect this selection. NaN if a model was
-        selected by other means, or nothing was left out.
-    """
-
-    order: tuple[Scored, ...]
-    probabilities: tuple[float, ...]
+    order: tuple[Scored, ...]  # models, the chosen one first, then by held-out error
+    probabilities: tuple[float, ...]  # probability of each to be the cause among those tried
+    # Models whose held-out error does not differ significantly from that of the chosen one.
     tied: tuple[Scored, ...]
-    grounds: tuple[Grounds, ...]
+    grounds: tuple[Grounds, ...]  # basis of each probability, in the same order
+    # Error, on the stretches not drawn in a resampling, of the model with the best held-out errors in it, in
+    # units of the noise floor; RMS over all resamplings. Evidence, which uses all records, does not affect
+    # this selection. NaN if a model was selected by other means, or nothing was left out.
     error_of_choice: float = math.nan
 
 
@@ -74,21 +54,6 @@ def rank(
 
     Held-out errors are what an engineer sees, but they say little if noise or a disturbance force dominates the error of every
     model. Then the spectrum of the residual says more.
-
-    Parameters
-    ----------
-    models
-        Scored models.
-    noise
-        Noise floor of each output, shape (n_outputs,).
-    rng
-        Source of the resampling.
-    gap
-        Error of the re-identified equations of the rig, in units of the noise floor.
-    criterion
-        Minus twice the log of a model's evidence, see `evidence`; None ranks by held-out errors alone.
-    evidence_counts
-        False if the residual of the most likely model is not noise: then the evidence is reported but not used for the ranking.
 
     References
     ----------

@@ -13,27 +13,19 @@ from rigsight.diagnose.pushes.alternatives import BY_RECORD
 
 @dataclass(frozen=True)
 class Remainder:
-    """Error of the diagnosed model above noise and disturbance.
+    """Error of the diagnosed model above noise and disturbance."""
 
-    Attributes
-    ----------
-    share
-        Of the squared gap of the re-identified equations; 0 where it correlates with nothing and so counts as noise and
-        disturbance.
-    where
-        Joint, drive or sensor at which it arises; empty where it correlates with nothing, or with no place.
-    goes_with
-        Signal, time or record with which it correlates, or that it is concentrated in a few stretches; empty where there is none.
-    p_value
-        Probability that noise and disturbance alone correlate this well with anything that was tested.
-    beside_a_cause
-        True if the verdict names a cause: then the remaining error is in addition to it.
-    """
-
+    # Of the squared gap of the re-identified equations; 0 where it correlates with nothing and so counts as
+    # noise and disturbance.
     share: float
+    # Joint, drive or sensor at which it arises; empty where it correlates with nothing, or with no place.
     where: tuple[str, ...]
+    # Signal, time or record with which it correlates, or that it is concentrated in a few stretches; empty
+    # where there is none.
     goes_with: str
+    # Probability that noise and disturbance alone correlate this well with anything that was tested.
     p_value: float
+    # True if the verdict names a cause: then the remaining error is in addition to it.
     beside_a_cause: bool = True
 
     @property
@@ -82,21 +74,7 @@ def _in_words(goes_with: str) -> str:
 def remainder_of(
     reidentified: Scored, model: Scored, found: Adequacy, lower_bound: bool, beside_a_cause: bool
 ) -> Remainder:
-    """Return the remaining error of a model.
-
-    Parameters
-    ----------
-    reidentified
-        The re-identified equations.
-    model
-        The model of the verdict.
-    found
-        Whether its residual is correlated with anything.
-    lower_bound
-        True if the noise floor is only a lower bound: then only a significant correlation counts as remaining error.
-    beside_a_cause
-        True where the verdict names one.
-    """
+    """Return the remaining error of a model."""
     if found.adequate:
         return Remainder(0.0, (), "", found.p_value, beside_a_cause)
     # What is concentrated in a few stretches remains whole, whatever small part correlates with something by chance.

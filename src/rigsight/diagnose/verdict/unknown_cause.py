@@ -21,15 +21,6 @@ def force_of_one_motion(
 
     There is none beside effects that are modelled already either: the rig's own terms do not stand alone there. Nor is there
     one from records that are too short for a regression, or whose own constants change inertia, spring or damper.
-
-    Parameters
-    ----------
-    context, reidentified
-        Records, and the re-identified equations on them.
-    has_stiffness
-        False for an axis without a spring.
-    rng
-        Source of the ensemble.
     """
     if context.modelled or not context.rig.has_one_motion:
         return None
@@ -46,11 +37,6 @@ def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointFo
     """Return the force that would have to be missing at each joint, the most likely first; none for a rig with one motion.
 
     There are none beside effects that are modelled already either.
-
-    Parameters
-    ----------
-    context, reidentified
-        Records, of which the most excited stretches are used, and the re-identified equations on them.
     """
     if context.modelled or context.rig.has_one_motion:
         return ()
@@ -71,13 +57,6 @@ def traced_to(rig: Rig, forces: Sequence[JointForce]) -> tuple[str, ...]:
     """Return the places of the only missing force that agrees with all sensors; empty if none or several agree.
 
     These are a joint, and the drives that act along the same motion.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    forces
-        At each of its joints.
     """
     agreeing = not_contradicted(forces)
     if len(forces) < 2 or len(agreeing) != 1 or agreeing[0].error_over_noise > VERDICT.comparable:

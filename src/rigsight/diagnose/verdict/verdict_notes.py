@@ -48,23 +48,13 @@ class _Found(Protocol):
 
 @dataclass(frozen=True)
 class Basis:
-    """What the notes are based on.
+    """What the notes are based on."""
 
-    Attributes
-    ----------
-    campaign
-        Records and the given simulation.
-    found
-        What the examination found.
-    rng
-        For rules that simulate disturbances.
-    below_rest
-        The error of a model, in units of the noise floor measured at rest, that refuted this floor; None where none did.
-    """
-
-    campaign: Campaign
-    found: _Found
-    rng: np.random.Generator
+    campaign: Campaign  # records and the given simulation
+    found: _Found  # what the examination found
+    rng: np.random.Generator  # for rules that simulate disturbances
+    # The error of a model, in units of the noise floor measured at rest, that refuted this floor; None where
+    # none did.
     below_rest: float | None = None
 
 

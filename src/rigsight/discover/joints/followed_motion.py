@@ -38,44 +38,19 @@ _FACTOR_IN_ALL = 4.0
 
 @dataclass(eq=False)
 class FollowedMotion:
-    """A rig with an unknown force at some joints, and the current estimate of its motion.
+    """A rig with an unknown force at some joints, and the current estimate of its motion."""
 
-    Attributes
-    ----------
-    equations
-        Of the rig with the forces.
-    forces
-        Index of each force and of its rate among the states.
-    fitted
-        Parameters with respect to which the equations have derivatives.
-    values
-        Constants and parameters.
-    motions
-        States per record, shape (n_samples, n_states) each.
-    sizes
-        Typical size of each state, shape (n_states,).
-    omega
-        Angular frequency of the motion [rad/s].
-    decade
-        Common logarithm of the forces' intensity.
-    errors
-        Standard errors of the states, as `motions`.
-    known
-        Prior values of constants and parameters.
-    jumps
-        Samples of each record after which the forces may jump, shape (n_samples,); None for none.
-    """
-
-    equations: MotionEquations
-    forces: tuple[tuple[int, int], ...]
-    fitted: tuple[Parameter, ...]
-    values: dict[str, float]
-    motions: list[Floats]
-    sizes: Floats
-    omega: float
-    decade: float = 0.0
-    errors: list[Floats] = field(default_factory=list)
-    known: dict[str, float] = field(init=False)
+    equations: MotionEquations  # of the rig with the forces
+    forces: tuple[tuple[int, int], ...]  # index of each force and of its rate among the states
+    fitted: tuple[Parameter, ...]  # parameters with respect to which the equations have derivatives
+    values: dict[str, float]  # constants and parameters
+    motions: list[Floats]  # states per record, shape (n_samples, n_states) each
+    sizes: Floats  # typical size of each state, shape (n_states,)
+    omega: float  # angular frequency of the motion [rad/s]
+    decade: float = 0.0  # common logarithm of the forces' intensity
+    errors: list[Floats] = field(default_factory=list)  # standard errors of the states, as `motions`
+    known: dict[str, float] = field(init=False)  # prior values of constants and parameters
+    # Samples of each record after which the forces may jump, shape (n_samples,); None for none.
     jumps: list[NDArray[np.bool_] | None] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -113,23 +88,7 @@ def with_unknown_forces(
 def improved(
     followed: Sequence[FollowedMotion], records: Sequence[Record], noise: Floats, decades: Sequence[float]
 ) -> float:
-    """Estimate motion and forces once more, for several rigs with the same number of states at once.
-
-    Parameters
-    ----------
-    followed
-        The current estimates; changed in place.
-    records
-        Inputs and sensor readings.
-    noise
-        Noise floor of each output, shape (n_outputs,).
-    decades
-        Intensities to try.
-
-    Returns
-    -------
-    The largest change of a state other than the forces, relative to its size.
-    """
+    """Estimate motion and forces once more, for several rigs with the same number of states at once."""
     n_records = len(records)
     linear = [motion for one in followed for motion in one.linearized(records)]
     cases = cases_of(
@@ -180,17 +139,7 @@ def _squares(cases: Cases, gains: Gains) -> Floats:
 
 
 def prior_spread(one: FollowedMotion, target: float, own: Floats) -> Floats:
-    """Return the prior standard deviations of the parameters, shape (n_fitted,).
-
-    Parameters
-    ----------
-    one
-        The rig.
-    target
-        Sum of squares of the whitened readings: a parameter with prior value zero may explain all of it.
-    own
-        Sums of squares of the whitened responses to the parameters.
-    """
+    """Return the prior standard deviations of the parameters, shape (n_fitted,)."""
     known = np.array([one.known[p.name] for p in one.fitted])
     reach = np.sqrt(target / np.where(own > 0.0, own, 1.0))
     return np.where(known != 0.0, _KNOWN * np.abs(known), reach)

@@ -36,39 +36,24 @@ class Cases:
     """Linearized motions of one structure or of structures with equal shapes, scaled so that noise and states are about one.
 
     Axis 0 is time, axis 1 the case. Cases shorter than the longest one are padded with samples without measurement.
-
-    Attributes
-    ----------
-    transition
-        Shape (n_samples - 1, n_cases, n_states, n_states).
-    seen
-        Derivative of the readings by the state, shape (n_samples, n_cases, n_outputs, n_states); zero where nothing was
-        measured.
-    drive
-        Known changes of the next state by column, shape (n_samples - 1, n_cases, n_states, n_columns).
-    data
-        Direct part of each column in the readings, shape (n_samples, n_cases, n_outputs, n_columns).
-    measured
-        True where a sensor was read, shape (n_samples, n_cases, n_outputs).
-    start
-        Covariance of the first state, shape (n_cases, n_states, n_states).
-    walk
-        Covariance that an intensity of one adds from sample to sample, shape (n_cases, n_states, n_states).
-    jump
-        Directions in which the state may jump after some samples, shape (n_samples - 1, n_cases, n_states, n_directions).
-    jumps
-        True for the samples after which it may, shape (n_samples, n_cases).
     """
 
-    transition: Floats
+    transition: Floats  # shape (n_samples - 1, n_cases, n_states, n_states)
+    # Derivative of the readings by the state, shape (n_samples, n_cases, n_outputs, n_states); zero where
+    # nothing was measured.
     seen: Floats
+    # Known changes of the next state by column, shape (n_samples - 1, n_cases, n_states, n_columns).
     drive: Floats
+    # Direct part of each column in the readings, shape (n_samples, n_cases, n_outputs, n_columns).
     data: Floats
-    measured: NDArray[np.bool_]
-    start: Floats
+    measured: NDArray[np.bool_]  # true where a sensor was read, shape (n_samples, n_cases, n_outputs)
+    start: Floats  # covariance of the first state, shape (n_cases, n_states, n_states)
+    # Covariance that an intensity of one adds from sample to sample, shape (n_cases, n_states, n_states).
     walk: Floats
+    # Directions in which the state may jump after some samples, shape (n_samples - 1, n_cases, n_states,
+    # n_directions).
     jump: Floats
-    jumps: NDArray[np.bool_]
+    jumps: NDArray[np.bool_]  # true for the samples after which it may, shape (n_samples, n_cases)
 
     @property
     def n_measured(self) -> NDArray[np.int_]:
@@ -85,25 +70,7 @@ def cases_of(
     jumps: Sequence[NDArray[np.bool_] | None],
     lasting: bool,
 ) -> Cases:
-    """Bring linearized motions into one form; the first column is the measured residual, the others are the parameters.
-
-    Parameters
-    ----------
-    motions
-        One for each case.
-    noise
-        Standard deviation of each output, shape (n_outputs,).
-    sizes
-        Size of each state in each case, shape (n_states,) each.
-    forces
-        Index of each unknown force among the states, and of its rate.
-    breadth
-        Standard deviation of the first state in units of the sizes.
-    jumps
-        Samples after which the unknown forces may jump by about their size, shape (n_samples,) each; None for none.
-    lasting
-        True if the force keeps its value after a jump, False if it changes for that sample interval alone.
-    """
+    """Bring linearized motions into one form; the first column is the measured residual, the others are the parameters."""
     longest = max(motion.residual.shape[0] for motion in motions)
     n_cases, (n_outputs, n) = len(motions), motions[0].seen.shape[1:]
     n_columns = 1 + motions[0].by_parameter.shape[2]
@@ -145,20 +112,11 @@ def cases_of(
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """Gains and variances of a filter, shape (n_samples, n_cases, n_intensities, ...) each.
+    """Gains and variances of a filter, shape (n_samples, n_cases, n_intensities, ...) each."""
 
-    Attributes
-    ----------
-    gain
-        Change of the state by each reading, (..., n_outputs, n_states).
-    variance
-        Of the prediction error of each reading, (..., n_outputs).
-    predicted
-        Covariance before the readings of a sample are used, (..., n_states, n_states); empty unless requested.
-    """
-
-    gain: Floats
-    variance: Floats
+    gain: Floats  # change of the state by each reading, (..., n_outputs, n_states)
+    variance: Floats  # of the prediction error of each reading, (..., n_outputs)
+    # Covariance before the readings of a sample are used, (..., n_states, n_states); empty unless requested.
     predicted: Floats
 
     @property
@@ -170,17 +128,7 @@ class Gains:
 
 
 def gains_of(cases: Cases, intensities: Floats, keep: bool = False) -> Gains:
-    """Compute covariances and gains along the records.
-
-    Parameters
-    ----------
-    cases
-        The cases.
-    intensities
-        Of the random walk in each case, shape (n_cases, n_intensities), in units of the sizes.
-    keep
-        Keep the covariances for a smoother.
-    """
+    """Compute covariances and gains along the records."""
     n_samples, n_cases, n_outputs, n = cases.seen.shape
     n_q = intensities.shape[1]
     gain = np.zeros((n_samples, n_cases, n_q, n_outputs, n))
@@ -209,17 +157,7 @@ def gains_of(cases: Cases, intensities: Floats, keep: bool = False) -> Gains:
 
 
 def whitened(cases: Cases, gains: Gains, drive: AtSample, data: AtSample, tell: Rows) -> None:
-    """Pass columns through the filter.
-
-    Parameters
-    ----------
-    cases, gains
-        The filter.
-    drive, data
-        Columns as in `Cases`, of one sample.
-    tell
-        Called with every whitened row, samples in order.
-    """
+    """Pass columns through the filter."""
     n_samples, n_cases, n_outputs, n = cases.seen.shape
     with np.errstate(invalid="ignore"):
         root = np.sqrt(gains.variance)
@@ -247,15 +185,7 @@ class Smoothed:
 
 
 def smoothed(cases: Cases, gains: Gains, drive: Floats, data: Floats) -> Smoothed:
-    """Smooth one column of each case, for gains of a single intensity.
-
-    Parameters
-    ----------
-    cases, gains
-        The filter, with `Gains.predicted`.
-    drive, data
-        Shape (n_samples - 1, n_cases, n_states) and (n_samples, n_cases, n_outputs).
-    """
+    """Smooth one column of each case, for gains of a single intensity."""
     n_samples, n_cases, n_outputs, n = cases.seen.shape
     before = np.zeros((n_samples, n_cases, n))
     errors = np.zeros((n_samples, n_cases, n_outputs))

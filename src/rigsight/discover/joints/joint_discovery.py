@@ -61,26 +61,7 @@ class _Polished:
 def discover_at_joints(
     data: RegressionData, seed: int = 0, progress: Callable[[str], None] | None = None, n_jobs: int = 1
 ) -> Discovery:
-    """Discover which force is missing at which joint, and complete the rig's equations with its law.
-
-    Parameters
-    ----------
-    data
-        Records and rig.
-    seed
-        Seed of the ensembles.
-    progress
-        Called with a short text when a stage is done.
-    n_jobs
-        Records that are simulated at the same time.
-
-    Raises
-    ------
-    InputError
-        If there is no estimation record, one is too short, or none moves the rig.
-    SimulationError
-        If the rig's own equations cannot be simulated near the records, or its linearized responses cannot be regressed.
-    """
+    """Discover which force is missing at which joint, and complete the rig's equations with its law."""
     say = progress or (lambda _: None)
     polisher = _Polisher(data, IdleThreads(n_jobs))
     alone = polisher.polished((), polisher.start)

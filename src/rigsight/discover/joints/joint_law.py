@@ -93,24 +93,12 @@ class LawTerm:
 
 @dataclass(frozen=True, eq=False)
 class RegressedLaw:
-    """A law, with the rig's parameters estimated with it.
+    """A law, with the rig's parameters estimated with it."""
 
-    Attributes
-    ----------
-    terms
-        The most significant first; may be empty.
-    parameters
-        The rig's own, estimated with the law.
-    criterion
-        Bayesian information criterion; comparable between joints.
-    decade
-        Common logarithm of the intensity of the remaining unknown force.
-    """
-
-    terms: tuple[LawTerm, ...]
-    parameters: Mapping[str, float]
-    criterion: float
-    decade: float
+    terms: tuple[LawTerm, ...]  # the most significant first; may be empty
+    parameters: Mapping[str, float]  # the rig's own, estimated with the law
+    criterion: float  # bayesian information criterion; comparable between joints
+    decade: float  # common logarithm of the intensity of the remaining unknown force
 
 
 def joint_effects(rig: Rig, joint: Joint) -> list[Effect]:
@@ -128,19 +116,7 @@ def joint_effects(rig: Rig, joint: Joint) -> list[Effect]:
 
 
 def force_along(term: LawTerm, found: JointMotion, index: int, parameters: Mapping[str, float]) -> Floats:
-    """Return the resisting force of a term along the motion of its joint in a record, shape (n_samples,).
-
-    Parameters
-    ----------
-    term
-        The term.
-    found
-        Its joint.
-    index
-        Index of the record.
-    parameters
-        Constants and parameters of the rig.
-    """
+    """Return the resisting force of a term along the motion of its joint in a record, shape (n_samples,)."""
     motion = _motion(found, index)
     if term.effect.torque is not None:
         return torque_along(term.effect, term.values, motion)
@@ -157,17 +133,7 @@ def _motion(found: JointMotion, index: int) -> Motion:
 def regressed_laws(
     found: Sequence[JointMotion], noise: Floats, scales: Sequence[Mapping[str, float]]
 ) -> list[RegressedLaw]:
-    """Return, for each joint, the law with the fewest terms that the sensors do not distinguish from the most likely one.
-
-    Parameters
-    ----------
-    found
-        The joints, and the force that each would have to carry.
-    noise
-        Noise floor of each output, shape (n_outputs,).
-    scales
-        Size of each base quantity at each joint.
-    """
+    """Return, for each joint, the law with the fewest terms that the sensors do not distinguish from the most likely one."""
     records = found[0].records
     offered = [_offered(one, sizes) for one, sizes in zip(found, scales, strict=True)]
     signals = [
@@ -188,17 +154,7 @@ def inclusion(
     law: RegressedLaw,
     rng: np.random.Generator,
 ) -> dict[str, float]:
-    """Return inclusion probabilities: the shares of resampled data sets in which terms are selected, by name of the effect.
-
-    Parameters
-    ----------
-    found, noise, scales
-        As for `regressed_laws`, of one joint.
-    law
-        Its law; its terms compete with those that explain most of the force by themselves.
-    rng
-        Source of the ensemble.
-    """
+    """Return inclusion probabilities: the shares of resampled data sets in which terms are selected, by name of the effect."""
     offered = _offered(found, scales)
     signals = [
         np.column_stack([part for s in offered for part in s.parts[i]]) for i in range(len(found.records))

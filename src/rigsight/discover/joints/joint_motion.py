@@ -110,15 +110,7 @@ def followed_again(
     records: Sequence[Record],
     noise: Mapping[str, float],
 ) -> tuple[JointMotion, ...]:
-    """Return each joint with its force, estimated again about the current motion; the force may jump where the joint rests.
-
-    Parameters
-    ----------
-    joints, alone
-        Each joint, and the rig with the unknown force there.
-    records, noise
-        As for `joint_motions`.
-    """
+    """Return each joint with its force, estimated again about the current motion; the force may jump where the joint rests."""
     for joint, one in zip(joints, alone, strict=True):
         one.jumps = list(_resting(joint, one, records))
     floors = noise_of(alone[0].equations.structure.rig, noise)

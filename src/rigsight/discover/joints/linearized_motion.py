@@ -38,36 +38,22 @@ _FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
 
 @dataclass(frozen=True, eq=False)
 class LinearizedMotion:
-    """One record about a reference motion: ``x[k+1] = reference[k+1] + defect[k] + transition[k] @ (x[k] - reference[k]) + ...``.
+    """A record about a reference motion: ``x[k+1] = reference[k+1] + defect[k] + transition[k] @ (x[k] - reference[k])...``."""
 
-    Attributes
-    ----------
-    reference
-        States, shape (n_samples, n_states).
-    transition
-        Derivative of the next state by this one, shape (n_samples - 1, n_states, n_states).
-    by_parameter
-        Derivative of the next state by parameters, shape (n_samples - 1, n_states, n_parameters).
-    defect
-        State simulated one sample ahead from a reference state, minus the next reference state, shape (n_samples - 1, n_states).
-    seen
-        Derivative of the readings by the state, shape (n_samples, n_outputs, n_states).
-    seen_by_parameter
-        Derivative of the readings by parameters, shape (n_samples, n_outputs, n_parameters).
-    residual
-        Measured minus the readings of the reference, shape (n_samples, n_outputs); NaN where nothing was measured.
-    dt
-        Sample time [s].
-    """
-
-    reference: Floats
-    transition: Floats
+    reference: Floats  # states, shape (n_samples, n_states)
+    transition: Floats  # derivative of the next state by this one, shape (n_samples - 1, n_states, n_states)
+    # Derivative of the next state by parameters, shape (n_samples - 1, n_states, n_parameters).
     by_parameter: Floats
+    # State simulated one sample ahead from a reference state, minus the next reference state, shape
+    # (n_samples - 1, n_states).
     defect: Floats
-    seen: Floats
+    seen: Floats  # derivative of the readings by the state, shape (n_samples, n_outputs, n_states)
+    # Derivative of the readings by parameters, shape (n_samples, n_outputs, n_parameters).
     seen_by_parameter: Floats
+    # Measured minus the readings of the reference, shape (n_samples, n_outputs); NaN where nothing was
+    # measured.
     residual: Floats
-    dt: float
+    dt: float  # sample time [s]
 
 
 class MotionEquations:
@@ -113,17 +99,7 @@ class MotionEquations:
         self._slopes = _compiled([*arguments, *accelerations], slopes)
 
     def about(self, record: Record, values: Mapping[str, float], reference: Floats) -> LinearizedMotion:
-        """Linearize about a reference motion.
-
-        Parameters
-        ----------
-        record
-            Inputs and sensor readings; a sensor may be missing.
-        values
-            Value of every parameter of the structure.
-        reference
-            States, shape (n_samples, n_states).
-        """
+        """Linearize about a reference motion."""
         p = parameter_vector(self.structure, record_values(self.structure, values, record))
         held = record_input(self.structure, record)
         x, u, times = self._at_samples(record, held, reference)

@@ -25,27 +25,13 @@ _DECADES = (4.0, 1.0, -2.0, -5.0, -10.0)
 
 @dataclass(frozen=True, eq=False)
 class SensorRegression:
-    """Regression of the sensor readings on parameters and terms, for one intensity of the remaining unknown force.
+    """Regression of the sensor readings on parameters and terms, for one intensity of the remaining unknown force."""
 
-    Attributes
-    ----------
-    projected
-        Target, and the rig's parameters as columns that are always included.
-    columns
-        One for each term, shape (n_rows, n_terms).
-    fitted
-        Names of the parameters of the columns of `projected`.
-    logarithms
-        Sum of the logarithms of the variances that the rows were divided by.
-    decade
-        Common logarithm of that intensity.
-    """
-
-    projected: Projected
-    columns: Floats
-    fitted: tuple[str, ...]
-    logarithms: float
-    decade: float
+    projected: Projected  # target, and the rig's parameters as columns that are always included
+    columns: Floats  # one for each term, shape (n_rows, n_terms)
+    fitted: tuple[str, ...]  # names of the parameters of the columns of `projected`
+    logarithms: float  # sum of the logarithms of the variances that the rows were divided by
+    decade: float  # common logarithm of that intensity
 
     def criterion(self, left: float, n_terms: int) -> float:
         """Return the Bayesian information criterion of an equation with a residual sum of squares and a number of terms."""
@@ -58,19 +44,7 @@ def sensor_regressions(
     noise: Floats,
     signals: Sequence[Sequence[Floats]],
 ) -> list[tuple[SensorRegression, ...]]:
-    """Return the regressions of each joint, the largest intensity first.
-
-    Parameters
-    ----------
-    followed
-        The rig with the force at each joint.
-    records
-        Inputs and sensor readings.
-    noise
-        Noise floor of each output, shape (n_outputs,).
-    signals
-        Forces that resist each joint, shape (n_samples, n_terms) per record, linear between samples.
-    """
+    """Return the regressions of each joint, the largest intensity first."""
     n_records, forces = len(records), followed[0].forces
     ((force, rate),) = forces
     linear = [

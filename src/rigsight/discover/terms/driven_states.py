@@ -28,13 +28,7 @@ Filter = tuple[sp.Matrix, sp.Matrix]
 
 @lru_cache(maxsize=256)
 def linear_filter(effect_states: tuple[tuple[sp.Symbol, sp.Expr], ...]) -> Filter | None:
-    """Return the linear filter that these rates describe; None if they are not linear.
-
-    Parameters
-    ----------
-    effect_states
-        Symbol and rate of each state.
-    """
+    """Return the linear filter that these rates describe; None if they are not linear."""
     own = [symbol for symbol, _ in effect_states]
     rates = sp.Matrix([rate for _, rate in effect_states])
     of_states, of_signals = rates.jacobian(own), rates.jacobian(_SIGNALS)
@@ -61,15 +55,6 @@ def states_along(
     """Return the states of a filter along a motion by name, shape (n_samples,) each.
 
     They start in equilibrium with the first sample of each signal.
-
-    Parameters
-    ----------
-    effect
-        An effect for which `is_filter` is true.
-    values
-        Its parameters.
-    motion
-        The motion.
     """
     found = linear_filter(_rates(effect))
     assert found is not None

@@ -18,13 +18,7 @@ _DIGITS = 4
 
 
 def held_numbers(fit: FitResult) -> dict[str, float]:
-    """Return the held parameters whose values are written into the equations: only 0 and 1, which make them shorter.
-
-    Parameters
-    ----------
-    fit
-        The equations with all values; constants of the rig are always written as symbols.
-    """
+    """Return the held parameters whose values are written into the equations: only 0 and 1, which make them shorter."""
     constants = {p.name for p in fit.structure.rig.constants}
     return {
         name: value
@@ -34,15 +28,7 @@ def held_numbers(fit: FitResult) -> dict[str, float]:
 
 
 def equations(structure: Structure, numbers: Mapping[str, float]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the equations of a structure as text and as LaTeX: of motion, of states, of outputs other than single states.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    numbers
-        Parameters written as numbers: those that were not fitted, such as a scale of one or a force of zero.
-    """
+    """Return the equations of a structure as text and as LaTeX: of motion, of states, of outputs other than single states."""
     symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))
     written = {
         symbols[name]: sp.Integer(value) if float(value).is_integer() else sp.Float(value)

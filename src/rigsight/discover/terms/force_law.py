@@ -35,21 +35,11 @@ _RIVALS = (-_FORCE, _DISPLACEMENT)
 
 @dataclass(frozen=True)
 class ForceLaw:
-    """The equation that the force of a loop with one free state obeys.
+    """The equation that the force of a loop with one free state obeys."""
 
-    Attributes
-    ----------
-    effect
-        The loop.
-    terms
-        Right-hand side per unit of each coefficient, by its printed name.
-    parameters
-        The parameter of each of the effect's own terms, by the same names.
-    """
-
-    effect: Effect
-    terms: Mapping[str, sp.Expr]
-    parameters: Mapping[str, str]
+    effect: Effect  # the loop
+    terms: Mapping[str, sp.Expr]  # right-hand side per unit of each coefficient, by its printed name
+    parameters: Mapping[str, str]  # the parameter of each of the effect's own terms, by the same names
 
     @classmethod
     def of(cls, effect: Effect) -> ForceLaw | None:
@@ -76,22 +66,13 @@ class ForceLaw:
 
 @dataclass(frozen=True)
 class ForceEquation:
-    """The regressed equation of the hysteretic force.
+    """The regressed equation of the hysteretic force."""
 
-    Attributes
-    ----------
-    law
-        The terms offered to the regression.
-    coefficients, inclusion
-        By term of the law [SI].
-    share
-        Share of the force's rate that the equation explains.
-    """
-
-    law: ForceLaw
+    law: ForceLaw  # the terms offered to the regression
+    # By term of the law [SI].
     coefficients: Mapping[str, float]
     inclusion: Mapping[str, float]
-    share: float
+    share: float  # share of the force's rate that the equation explains
 
 
 def force_equation(
@@ -102,23 +83,7 @@ def force_equation(
     values: Mapping[str, float],
     rng: np.random.Generator,
 ) -> ForceEquation:
-    """Regress the equation of the hysteretic force.
-
-    Parameters
-    ----------
-    law
-        The equation.
-    motions
-        Of all records.
-    rows
-        The form of the rows.
-    forces
-        The hysteretic force of each record, shape (n_samples,).
-    values
-        Parameters of the effect, of which nonlinear ones are needed inside the terms.
-    rng
-        Source of the ensemble.
-    """
+    """Regress the equation of the hysteretic force."""
     numbers = {sp.Symbol(name, real=True): value for name, value in values.items()}
     signals = [sp.lambdify((_DISPLACEMENT, _RATE, _FORCE), term.subs(numbers)) for term in law.terms.values()]
     target = [rows.rate_of(force, motion.dt) for motion, force in zip(motions, forces, strict=True)]

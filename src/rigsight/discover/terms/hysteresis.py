@@ -68,23 +68,13 @@ class LoopShape:
 
     Sum and difference of a pair, and parameters that are searched logarithmically, are sizes: the coordinate is their logarithm.
     Of the other parameters, those with a special value keep the values of the grid.
-
-    Attributes
-    ----------
-    pairs
-        Parameters that are varied as sum and difference.
-    single
-        Parameters that are varied alone.
-    kept
-        Parameters that keep the values of the grid, with their special values.
-    dimensions
-        Dimension text of each parameter.
     """
 
-    pairs: tuple[SumAndDifference, ...]
-    single: tuple[Parameter, ...]
+    pairs: tuple[SumAndDifference, ...]  # parameters that are varied as sum and difference
+    single: tuple[Parameter, ...]  # parameters that are varied alone
+    # Parameters that keep the values of the grid, with their special values.
     kept: tuple[tuple[str, float], ...]
-    dimensions: Mapping[str, str]
+    dimensions: Mapping[str, str]  # dimension text of each parameter
 
     @classmethod
     def of(cls, effect: Effect) -> LoopShape:
@@ -149,21 +139,11 @@ def _logarithms(limits: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Loop:
-    """The shape of a loop and its column.
+    """The shape of a loop and its column."""
 
-    Attributes
-    ----------
-    values
-        Nonlinear parameters of the effect.
-    column
-        Rows of the loop's own deflection in all records, shape (n_rows,).
-    share
-        Share of the residual of the rig's own terms that the loop explains.
-    """
-
-    values: Mapping[str, float]
-    column: NDArray[np.float64]
-    share: float
+    values: Mapping[str, float]  # nonlinear parameters of the effect
+    column: NDArray[np.float64]  # rows of the loop's own deflection in all records, shape (n_rows,)
+    share: float  # share of the residual of the rig's own terms that the loop explains
 
 
 def loop_structure(effect: Effect) -> Structure:
@@ -180,25 +160,7 @@ def best_loop(
     driven: bool,
     threads: IdleThreads,
 ) -> Loop | None:
-    """Return the loop that explains most of the residual of the rig's own terms; None if none explains any of it.
-
-    Parameters
-    ----------
-    effect
-        An effect for which `is_loop` is true.
-    motions
-        Of all records.
-    rows
-        The form of the rows.
-    projected
-        The rig's own terms, including its spring, which represents the part without memory.
-    scales
-        Size of each base quantity.
-    driven
-        True if the acceleration is regressed, false if the force is.
-    threads
-        Threads that simulate the records in parallel.
-    """
+    """Return the loop that explains most of the residual of the rig's own terms; None if none explains any of it."""
     shape = LoopShape.of(effect)
     structure = loop_structure(effect)
     grid, bounds = shape.grid, shape.bounds

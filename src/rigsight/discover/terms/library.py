@@ -119,25 +119,7 @@ def candidates(
     driven: bool,
     threads: IdleThreads | None = None,
 ) -> list[Candidate]:
-    """Return one candidate per effect, at the nonlinear parameters that explain most of the residual of the rig's own terms.
-
-    Parameters
-    ----------
-    effects
-        From `offered_effects`.
-    motions
-        Of all records.
-    rows
-        The form of the rows.
-    projected
-        The rig's own terms, projected out of every column.
-    scales
-        Size of each base quantity.
-    driven
-        True if the acceleration is regressed, false if the force is: a resisting force has the other sign there.
-    threads
-        Threads that search the nonlinear parameters; None for the calling thread alone.
-    """
+    """Return one candidate per effect, at the nonlinear parameters that explain most of the residual of the rig's own terms."""
     sign = -1.0 if driven else 1.0
     helpers = threads or IdleThreads()
     plain = [effect for effect in effects if _is_plain(effect)]
@@ -191,17 +173,7 @@ def _best_inner(
 
 
 def mixed(signals: TermSignals, parts: NDArray[np.float64], projected: Projected) -> tuple[Candidate, float]:
-    """Return the parts of a term as one column, mixed as in the regression, and the share that it explains.
-
-    Parameters
-    ----------
-    signals
-        The term.
-    parts
-        Rows of its parts, shape (n_rows, n_parts).
-    projected
-        The regression.
-    """
+    """Return the parts of a term as one column, mixed as in the regression, and the share that it explains."""
     weights, share = projected.explained(parts)
     if not np.any(weights):
         return Candidate(signals.effect, signals.inner, {}, parts[:, 0]), 0.0
@@ -259,40 +231,21 @@ def _slope(effect: Effect, parameter: Parameter) -> sp.Expr:
 
 @dataclass(frozen=True, eq=False)
 class TermSignals:
-    """An effect along measured motions, for given nonlinear parameters.
-
-    Attributes
-    ----------
-    effect
-        The effect.
-    inner
-        Values of the nonlinear parameters inside the term.
-    names
-        Linear parameters, one for each part; empty if the term has a single part without a coefficient of its own.
-    parts
-        For each record, the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
-    """
+    """An effect along measured motions, for given nonlinear parameters."""
 
     effect: Effect
-    inner: Mapping[str, float]
+    inner: Mapping[str, float]  # values of the nonlinear parameters inside the term
+    # Linear parameters, one for each part; empty if the term has a single part without a coefficient of its
+    # own.
     names: tuple[str, ...]
+    # For each record, the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
     parts: tuple[tuple[NDArray[np.float64], ...], ...]
 
 
 def term_signals(
     effect: Effect, motions: Sequence[Motion], scales: Mapping[str, float]
 ) -> Iterator[TermSignals]:
-    """Yield an effect along measured motions, for each point of the grid of its nonlinear parameters.
-
-    Parameters
-    ----------
-    effect
-        An effect without states.
-    motions
-        Of all records.
-    scales
-        Size of each base quantity.
-    """
+    """Yield an effect along measured motions, for each point of the grid of its nonlinear parameters."""
     fitted = [p for p in effect.parameters if p.fitted]
     linear = [p for p in fitted if effect.torque is not None and _is_linear(effect, p)]
     inside = [p for p in fitted if p not in linear]

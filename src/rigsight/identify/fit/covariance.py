@@ -42,25 +42,6 @@ def colored_covariance(
     outputs: a disturbance that acts before two sensors moves both. Coordinates that the records do not determine get an infinite
     variance.
 
-    Parameters
-    ----------
-    sensitivities
-        For each record the weighted residuals, shape (n,), and their derivatives, shape (n, n_common + n_own): the first columns
-        belong to common coordinates, the others to this record's own (its initial states).
-    n_common
-        Number of common coordinates.
-    n_outputs
-        For each record the number of outputs of equal length that follow each other in its residuals; by default one.
-    derivative_error
-        Relative error of the derivatives, by which linearly dependent columns may differ.
-    for_intervals
-        Widen each variance so that an interval of the normal distribution covers as often as that of Student's t with the degrees
-        of freedom of the noise that the coordinate reads: few for an offset, which reads the lines next to zero.
-
-    Returns
-    -------
-    Shape (n_common, n_common).
-
     References
     ----------
     L. Ljung, *System Identification* (Prentice Hall 1999), chapter 9; W. K. Newey and K. D. West, Econometrica 55
@@ -160,19 +141,7 @@ def sandwich_covariance(
 
 
 def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ``chain covariance chain^T``, for variances that may be infinite.
-
-    Parameters
-    ----------
-    covariance
-        Of coordinates, shape (n, n), see `colored_covariance`.
-    chain
-        d parameters / d coordinates, shape (m, n).
-
-    Returns
-    -------
-    Shape (m, m); a parameter that depends on an undetermined coordinate has an infinite variance, the others are unaffected.
-    """
+    """Return ``chain covariance chain^T``, for variances that may be infinite."""
     infinite = np.isinf(np.diag(covariance))
     finite = np.where(infinite[:, None] | infinite[None, :], 0.0, covariance)
     result = chain @ finite @ chain.T

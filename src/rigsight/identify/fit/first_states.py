@@ -30,21 +30,7 @@ _HUGE = 1e6
 
 
 def first_state(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
-    """Return an estimate of the initial state from the first samples: readings and their slopes, empty memory, settled lags.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    record
-        May lack sensors.
-    values
-        Constants and parameters by name.
-
-    Returns
-    -------
-    Shape (n_states,), in the units of the states.
-    """
+    """Return an estimate of the initial state from the first samples: readings and their slopes, empty memory, settled lags."""
     rig = structure.rig
     if rig.has_one_motion:
         return _of_one_motion(structure, record, values)
@@ -53,19 +39,7 @@ def first_state(structure: Structure, record: Record, values: Mapping[str, float
 
 
 def state_at_rest(structure: Structure, record: Record, guess: Floats, values: Mapping[str, float]) -> Floats:
-    """Return the estimate for a rig at rest, shape (n_states,), from the mean readings before the inputs change.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    record
-        May lack sensors.
-    guess
-        From `first_state`.
-    values
-        Constants and parameters by name.
-    """
+    """Return the estimate for a rig at rest, shape (n_states,), from the mean readings before the inputs change."""
     rig = structure.rig
     state = guess.copy()
     if not rig.is_driven:
@@ -97,21 +71,6 @@ def rig_state(
     """Return the state of a rig without effects that agrees best with the first samples of its sensors.
 
     States that they do not determine are those of the static equilibrium under the first input.
-
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    record
-        May lack sensors.
-    values
-        Constants and parameters by name.
-    resting
-        Number of samples during which the rig is at rest; None if it may move from the first sample on.
-
-    Returns
-    -------
-    Shape (n_states,).
     """
     if not equations.shows_all_states(set(record.signals)):
         return _rig_state(equations, record, values, resting, equations.sensor_names)

@@ -22,24 +22,14 @@ _LEAST_RANGE = 1e-9
 
 @dataclass(frozen=True)
 class RecordData:
-    """One record in the form that a fit needs.
+    """One record in the form that a fit needs."""
 
-    Attributes
-    ----------
-    record, held
-        The record, and its input between samples.
-    measured
-        Shape (n_samples, n_outputs), NaN for an output that was not measured.
-    weights
-        Reciprocal noise of each output, 0 if it was not measured.
-    own
-        Indices in the parameter vector of the record's own constants, and their values.
-    """
-
+    # The record, and its input between samples.
     record: Record
     held: HeldInput
-    measured: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    measured: NDArray[np.float64]  # shape (n_samples, n_outputs), NaN for an output that was not measured
+    weights: NDArray[np.float64]  # reciprocal noise of each output, 0 if it was not measured
+    # Indices in the parameter vector of the record's own constants, and their values.
     own: tuple[tuple[int, float], ...] = ()
 
     def first(self, n_samples: int) -> RecordData:
@@ -58,29 +48,14 @@ class RecordData:
 
 @dataclass(frozen=True)
 class FitData:
-    """Structure and records of a fit.
+    """Structure and records of a fit."""
 
-    Attributes
-    ----------
-    structure
-        Rig and effects; the free offsets of sensors come after all other states.
-    records
-        The records.
-    limited
-        True for states that cannot leave a range, shape (n_states,).
-    unlimited_sizes
-        Characteristic size of each state, shape (n_states, 1).
-    accuracy
-        Relative accuracy of the simulations.
-    threads
-        Threads among which the records are distributed.
-    """
-
-    structure: Structure
+    structure: Structure  # rig and effects; the free offsets of sensors come after all other states
     records: tuple[RecordData, ...]
-    limited: NDArray[np.bool_]
-    unlimited_sizes: NDArray[np.float64]
-    accuracy: float
+    limited: NDArray[np.bool_]  # true for states that cannot leave a range, shape (n_states,)
+    unlimited_sizes: NDArray[np.float64]  # characteristic size of each state, shape (n_states, 1)
+    accuracy: float  # relative accuracy of the simulations
+    # Threads among which the records are distributed.
     threads: IdleThreads = field(default_factory=IdleThreads)
 
     def of_each_record(self, one: Callable[[int], Result]) -> list[Result]:
@@ -103,19 +78,7 @@ class FitData:
 def record_data(
     structure: Structure, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
 ) -> RecordData:
-    """Return a record in the form that a fit needs.
-
-    Parameters
-    ----------
-    structure
-        The structure that is simulated in the fit.
-    record
-        May lack outputs.
-    names
-        Outputs of the rig, in order.
-    output_noise
-        Standard deviation by which the residuals of each output are divided.
-    """
+    """Return a record in the form that a fit needs."""
     missing = np.full(record.n_samples, np.nan)
     measured = np.column_stack([record.signals.get(n, missing) for n in names])
     weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
@@ -125,15 +88,7 @@ def record_data(
 
 
 def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return weighted residuals (n,) of the first set and its outputs minus those of each other one (n, n_sets - 1).
-
-    Parameters
-    ----------
-    record
-        The measured record.
-    out
-        Simulated outputs, shape (n_samples, n_outputs, n_sets).
-    """
+    """Return weighted residuals (n,) of the first set and its outputs minus those of each other one (n, n_sets - 1)."""
     used = np.flatnonzero(record.weights > 0.0)
     n_samples, _, n_sets = out.shape
     residuals = np.empty(used.size * n_samples)

@@ -187,19 +187,7 @@ class Problem:
     def _put_together(
         self, products: NDArray[np.float64], projections: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the normal equations of all coordinates from those of each record for the parameters and its own initial states.
-
-        Parameters
-        ----------
-        products
-            Shape (n_records, n, n) with n = n_free + n_states.
-        projections
-            Shape (n_records, n).
-
-        Returns
-        -------
-        Shapes (n_coordinates, n_coordinates) and (n_coordinates,).
-        """
+        """Return the normal equations of all coordinates from those of each record for parameters and its own initial states."""
         n_records, free = products.shape[0], slice(None, self.n_free)
         own = self.n_free + np.arange(n_records * self.n_states).reshape(n_records, self.n_states)
         size = self.n_free + own.size

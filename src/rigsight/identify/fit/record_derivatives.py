@@ -97,18 +97,12 @@ def derivatives(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> Der
 
 @dataclass(frozen=True)
 class OwnDerivatives:
-    """Estimate from one record alone, near the common values.
+    """Estimate from one record alone, near the common values."""
 
-    Attributes
-    ----------
-    derivatives
-        Derivatives at the record's own values, with residuals extrapolated linearly from there to the common values.
-    fit
-        The record's own values and initial state.
-    """
-
+    # Derivatives at the record's own values, with residuals extrapolated linearly from there to the common
+    # values.
     derivatives: RecordDerivatives
-    fit: FitResult
+    fit: FitResult  # the record's own values and initial state
 
 
 def own_derivatives(

@@ -68,21 +68,7 @@ def off_kinks(
     bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
     n_samples: int,
 ) -> NDArray[np.float64] | None:
-    """Return the point near the end of a search where Gauss-Newton steps from long differences vanish.
-
-    Parameters
-    ----------
-    problem
-        The fit.
-    theta, bounds
-        End of the search, and its bounds, shape (n,) each.
-    n_samples
-        Number of measured samples, from which the size of the noise follows.
-
-    Returns
-    -------
-    Shape (n,); None if the steps lead to a higher cost or do not converge.
-    """
+    """Return the point near the end of a search where Gauss-Newton steps from long differences vanish."""
     before = problem.at(theta)
     variance = before.cost / max(n_samples, 1)
     if not (np.isfinite(before.cost) and variance > 0.0):

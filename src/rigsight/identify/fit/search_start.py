@@ -19,23 +19,14 @@ _STATE_RANGE = 20.0
 
 @dataclass(frozen=True)
 class SearchStart:
-    """Start of a search, dimensionless.
+    """Start of a search, dimensionless."""
 
-    Attributes
-    ----------
-    coordinates
-        Of the free parameters.
-    theta
-        Free parameters, then the initial states of each record, shape (n_free + n_records * n_states,).
-    places
-        Initial states of each record in units of their sizes, each of shape (n_states,).
-    lower, upper
-        Bounds of the initial states of each record, as `places`.
-    """
-
-    coordinates: Coordinates
+    coordinates: Coordinates  # of the free parameters
+    # Free parameters, then the initial states of each record, shape (n_free + n_records * n_states,).
     theta: NDArray[np.float64]
+    # Initial states of each record in units of their sizes, each of shape (n_states,).
     places: list[NDArray[np.float64]]
+    # Bounds of the initial states of each record, as `places`.
     lower: list[NDArray[np.float64]]
     upper: list[NDArray[np.float64]]
 
@@ -53,21 +44,7 @@ class SearchStart:
         free: Sequence[str],
         initial_states: Sequence[NDArray[np.float64]] | None = None,
     ) -> SearchStart:
-        """Return the start of a search.
-
-        Parameters
-        ----------
-        data
-            Structure and records.
-        scales
-            Size of each base quantity.
-        values
-            Value of every parameter of the structure, SI units.
-        free
-            Names of those to fit.
-        initial_states
-            Of each record, shape (n_states,), SI units; by default estimated from the first samples.
-        """
+        """Return the start of a search."""
         coordinates = Coordinates.of(data.structure, free, values, scales)
         states = list(initial_states) if initial_states is not None else guessed_states(data, values)
         if has_dry_friction(data.structure):

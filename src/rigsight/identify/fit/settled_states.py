@@ -50,17 +50,6 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
 
     With limited states it is the best of several, moving and at rest. For a rig with more than one motion, and for a free
     motion, it is fitted to the beginning of the record.
-
-    Parameters
-    ----------
-    data
-        Structure and records of the fit.
-    values
-        Value of every parameter of the structure.
-
-    Returns
-    -------
-    Shape (n_states,) each.
     """
     guesses = [first_state(data.structure, d.record, values) for d in data.records]
     p = parameter_vector(data.structure, values)
@@ -85,13 +74,6 @@ def moving_or_at_rest(data: FitData, values: Mapping[str, float], states: Sequen
     """Return each record's initial state, fitted to the whole record from the given one and from rest, whichever fits better.
 
     While a joint sticks, its initial velocity has no effect: a descent neither leaves the state of rest nor finds it.
-
-    Parameters
-    ----------
-    data, values
-        As of `guessed_states`.
-    states
-        Initial states, shape (n_states,) each.
     """
     p = parameter_vector(data.structure, values)
 
@@ -125,23 +107,7 @@ def _likeliest(data: FitData, record: RecordData, p: Floats, states: Floats) -> 
 
 
 def settled_state(data: FitData, record: RecordData, p: Floats, guess: Floats) -> Floats:
-    """Return the initial state that fits a record from its beginning, as far as the parameters allow.
-
-    Parameters
-    ----------
-    data
-        Structure and records of the fit.
-    record
-        The record.
-    p
-        Parameters, shape (n_parameters,); the record's own constants replace those in it.
-    guess
-        First estimate, shape (n_states,).
-
-    Returns
-    -------
-    Shape (n_states,).
-    """
+    """Return the initial state that fits a record from its beginning, as far as the parameters allow."""
     state, n_samples, before = guess, min(_FIRST_SAMPLES, record.record.n_samples), np.inf
     while True:
         (found,) = _fitted(data, record, record.parameters(p), [state], n_samples)
@@ -229,16 +195,7 @@ def _descent(n: int) -> Generator[Floats, Floats, tuple[Floats, Floats]]:
 
 
 def _dies_away(slopes: Floats, n_samples: int) -> bool:
-    """Return True if the effect of any change of the state is smaller in the second half of a stretch than in the first.
-
-    Parameters
-    ----------
-    slopes
-        Change of all errors with each state, shape (n_errors, n_states): the samples of one output after the other, then the
-        rows of the first estimate's weight.
-    n_samples
-        Number of samples of the stretch.
-    """
+    """Return True if the effect of any change of the state is smaller in the second half of a stretch than in the first."""
     n_states = slopes.shape[1]
     if n_states == 0:
         return True

@@ -12,11 +12,6 @@ def symmetric_eigen(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], N
 
     Divide and conquer is faster but has failed on a well-conditioned matrix of 90 rows; relatively robust representations are
     used then.
-
-    Parameters
-    ----------
-    matrix
-        Symmetric, finite, shape (n, n).
     """
     try:
         values, vectors = np.linalg.eigh(matrix)

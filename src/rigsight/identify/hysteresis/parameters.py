@@ -15,15 +15,7 @@ from rigsight.units import characteristic_value
 
 
 def free_parameters(structure: Structure, outputs: Collection[str]) -> tuple[str, ...]:
-    """Return the parameters that records of these outputs determine, without constants and those of unmeasured outputs.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    outputs
-        Names of measured outputs.
-    """
+    """Return the parameters that records of these outputs determine, without constants and those of unmeasured outputs."""
     rig = structure.rig
     motion = rig.motion
     moved = {
@@ -51,13 +43,7 @@ def free_parameters(structure: Structure, outputs: Collection[str]) -> tuple[str
 
 
 def checked_free(structure: Structure, free: Sequence[str]) -> tuple[str, ...]:
-    """Return the names in the order of the structure.
-
-    Raises
-    ------
-    InputError
-        If one is unknown or the list is empty.
-    """
+    """Return the names in the order of the structure."""
     for name in free:
         check_option("A parameter to calibrate", name, structure.names)
     if not free:
@@ -66,15 +52,7 @@ def checked_free(structure: Structure, free: Sequence[str]) -> tuple[str, ...]:
 
 
 def special_structure(structure: Structure, free: Sequence[str]) -> tuple[Structure, tuple[str, ...]]:
-    """Write the special values of the effects (an exponent of 1) into the equations, which makes simulations ten times faster.
-
-    Returns
-    -------
-    structure
-        The same object if there are none.
-    free
-        The remaining free parameters.
-    """
+    """Write the special values of the effects (an exponent of 1) into the equations, which makes simulations ten times faster."""
     special = {
         structure.parameter_name(effect, name): value
         for effect in structure.effects
@@ -91,11 +69,6 @@ def start_values(structure: Structure, start: Mapping[str, float]) -> dict[str, 
     """Return a value for every parameter: the given one, else the first start value of its effect, else the default.
 
     Values of effects are placeholders if a search over the whole range follows.
-
-    Raises
-    ------
-    InputError
-        If a parameter has none of these; the message lists all such parameters.
     """
     of_rig = {p.name for p in (*structure.rig.constants, *structure.rig.parameters)}
     values = {p.name: p.default for p in structure.parameters if p.default is not None}
@@ -110,17 +83,7 @@ def start_values(structure: Structure, start: Mapping[str, float]) -> dict[str, 
 def declared_starts(
     structure: Structure, begin: Mapping[str, float], scales: Mapping[str, float]
 ) -> list[dict[str, float]]:
-    """Return the start values that the effects declare, one effect at a time, for starts that depend on the rig alone.
-
-    Parameters
-    ----------
-    structure
-        Rig of one motion, and effects.
-    begin
-        Value of every parameter; the stiffness is that of the linear rig.
-    scales
-        Size of each base quantity.
-    """
+    """Return the start values that the effects declare, one effect at a time, for starts that depend on the rig alone."""
     own_sizes = {
         structure.parameter_name(effect, p.name): p.starts[0] * characteristic_value(p.dimension, scales)
         for effect in structure.effects
@@ -143,15 +106,7 @@ def declared_starts(
 
 
 def neighbors(structure: Structure, values: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return the start values that the effects declare for another fit, because a fit may have ended in a nearby local minimum.
-
-    Parameters
-    ----------
-    structure
-        Rig of one motion, and effects.
-    values
-        Value of every parameter, as fitted.
-    """
+    """Return the start values that the effects declare for another fit: a fit may have ended in a nearby local minimum."""
     return [
         {**values, **_moved(structure, effect, start, structure.values_of(effect, values), {})}
         for effect in structure.effects

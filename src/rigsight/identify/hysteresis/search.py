@@ -31,29 +31,15 @@ class SearchBox:
 
     Ranges in characteristic units are spaced by their inverse hyperbolic sine: evenly up to a tenth of a unit, by decades
     beyond.
-
-    Attributes
-    ----------
-    lower, upper
-        Range of each coordinate, shape (n_free,).
     """
 
+    # Range of each coordinate, shape (n_free,).
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
 
     @classmethod
     def around(cls, coordinates: Coordinates, center: NDArray[np.float64], spread: float) -> SearchBox:
-        """Take the declared range of a parameter if it has one, else a range around `center`.
-
-        Parameters
-        ----------
-        coordinates
-            Of the free parameters.
-        center
-            Coordinates of a start, shape (n_free,).
-        spread
-            Factor to either side for a positive parameter without a declared range; for others, multiple of their size.
-        """
+        """Take the declared range of a parameter if it has one, else a range around `center`."""
         structure = coordinates.structure
         of_rig = {p.name for p in structure.rig.parameters}
         lower, upper = coordinates.lower.copy(), coordinates.upper.copy()
@@ -78,31 +64,15 @@ class SearchBox:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Ends of a global search, best first.
+    """Ends of a global search, best first."""
 
-    Attributes
-    ----------
-    coordinates
-        Shape (n_ends, n_free).
-    costs
-        Shape (n_ends,).
-    n_evaluations
-        Number of simulated parameter sets.
-    """
-
-    coordinates: NDArray[np.float64]
-    costs: NDArray[np.float64]
-    n_evaluations: int
+    coordinates: NDArray[np.float64]  # shape (n_ends, n_free)
+    costs: NDArray[np.float64]  # shape (n_ends,)
+    n_evaluations: int  # number of simulated parameter sets
 
     @property
     def usable(self) -> NDArray[np.float64]:
-        """Coordinates of the ends that can be simulated.
-
-        Raises
-        ------
-        InputError
-            If there are none.
-        """
+        """Coordinates of the ends that can be simulated."""
         usable = self.coordinates[self.costs < _UNUSABLE]
         if usable.size == 0:
             raise InputError(
@@ -121,25 +91,7 @@ def search(
     n_ends: int = 8,
     progress: Callable[[int], None] | None = None,
 ) -> Found:
-    """Search the lowest cost over the whole box.
-
-    Parameters
-    ----------
-    cost
-        Cost of coordinates of shape (n_sets, n_free), shape (n_sets,); not finite for a set that cannot be simulated.
-    box
-        Range to search.
-    rng
-        Random numbers.
-    n_generations
-        Largest number of generations.
-    n_sets
-        Sets per generation; the first ones are Sobol points.
-    n_ends
-        Largest number of different ends to return.
-    progress
-        Called with the number of finished generations.
-    """
+    """Search the lowest cost over the whole box."""
     n_free = box.lower.size
     seen: list[NDArray[np.float64]] = []
     paid: list[NDArray[np.float64]] = []

@@ -61,24 +61,7 @@ _LEAST_NOISE = 1e-4
 def any_rig_start(
     rig: Rig, records: Sequence[Record], constants: Mapping[str, float], known: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return a value for every parameter of a rig without effects.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        Estimation records.
-    constants
-        The rig's constants by name.
-    known
-        Parameters that are held at their value.
-
-    Raises
-    ------
-    InputError
-        If no record contains a sensor of the rig, or none that moves.
-    """
+    """Return a value for every parameter of a rig without effects."""
     _check_moves(rig, records)
     sought = [p for p in rig.parameters if p.name not in known]
     if not sought:
@@ -191,10 +174,6 @@ class _Rough:
         """Fit pieces of the records, of double length each time, then the whole records.
 
         Over a short piece, even an unstable or chaotic motion stays close to the measured one.
-
-        Returns
-        -------
-        The fit of the longest pieces whose residual is explained by noise, None if only short ones are, and that of the whole.
         """
         explained: FitResult | None = None
         values, scales = start, scales_at_places(self._rig, self._records, start)

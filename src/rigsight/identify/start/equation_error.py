@@ -32,27 +32,13 @@ Term = tuple[int, NDArray[np.complex128]]
 
 @dataclass(frozen=True)
 class Spectra:
-    """Spectra of one record on its informative lines, shape (n_lines,) each.
+    """Spectra of one record on its informative lines, shape (n_lines,) each."""
 
-    Attributes
-    ----------
-    omega
-        Angular frequencies [rad/s].
-    lines
-        Indices of the lines in the full spectrum.
-    hold
-        Frequency response of the hold.
-    drive
-        Input, multiplied by the response of the hold.
-    response
-        Output.
-    """
-
-    omega: NDArray[np.float64]
-    lines: NDArray[np.intp]
-    hold: NDArray[np.complex128]
-    drive: NDArray[np.complex128]
-    response: NDArray[np.complex128]
+    omega: NDArray[np.float64]  # angular frequencies [rad/s]
+    lines: NDArray[np.intp]  # indices of the lines in the full spectrum
+    hold: NDArray[np.complex128]  # frequency response of the hold
+    drive: NDArray[np.complex128]  # input, multiplied by the response of the hold
+    response: NDArray[np.complex128]  # output
 
     def of(self, signal: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the spectrum of another signal of the record, shape (n_samples,), on the same lines."""
@@ -98,20 +84,7 @@ def solve_in_frequency(
     targets: Sequence[NDArray[np.complex128]],
     denominators: Sequence[NDArray[np.complex128]] | None = None,
 ) -> Solution:
-    """Solve ``sum_i a_i (j omega)^order_i F_i = target + transient`` over all records for the real a_i.
-
-    Parameters
-    ----------
-    blocks
-        Spectra of each record.
-    terms
-        Terms of each record, the same number for all.
-    targets
-        Right-hand side of each record on its lines.
-    denominators
-        Divisors of the equation error of each record, shape (n_lines,); by default the polynomial of the solution's terms whose
-        spectrum is the response, found by iteration.
-    """
+    """Solve ``sum_i a_i (j omega)^order_i F_i = target + transient`` over all records for the real a_i."""
     top = max(float(np.max(block.omega)) for block in blocks)
     n_terms, n_transient = len(terms[0]), _TRANSIENT_ORDER + 1
     weights = list(denominators or [np.ones_like(block.response) for block in blocks])

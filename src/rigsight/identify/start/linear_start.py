@@ -216,22 +216,7 @@ def second_order(
     any_damping: bool = False,
     any_stiffness: bool = False,
 ) -> tuple[float, float, float]:
-    """Return the best-fitting inertia, damping and stiffness of ``m x'' + d x' + k x = gain u``.
-
-    Parameters
-    ----------
-    records, source, response, gain
-        The equation.
-    has_stiffness
-        False for ``k = 0``.
-    any_damping, any_stiffness
-        Whether each may be negative. An inertia is positive: if it comes out negative, a signal has the opposite sign.
-
-    Raises
-    ------
-    InputError
-        If input or response do not move.
-    """
+    """Return the best-fitting inertia, damping and stiffness of ``m x'' + d x' + k x = gain u``."""
     orders = (2, 1, 0) if has_stiffness else (2, 1)
     solution = _equation_error(records, source, response, orders, gain)
     inertia, damping = solution[0], solution[1]

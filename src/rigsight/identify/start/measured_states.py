@@ -31,18 +31,12 @@ _HIDDEN, _WAVES = 0.7, 20
 
 @dataclass(frozen=True)
 class MeasuredStates:
-    """States of a rig measured by its sensors.
+    """States of a rig measured by its sensors."""
 
-    Attributes
-    ----------
-    z
-        Shape (n_states, n_samples), in the order of `RigEquations`; offsets of the readings are not removed.
-    by_reading, by_integral
-        Factors of each sensor's reading, and of its integral, in each coordinate and own state: shape (n_coordinates + n_own,
-        n_sensors), columns in the order of the rig's sensors.
-    """
-
+    # Shape (n_states, n_samples), in the order of `RigEquations`; offsets of the readings are not removed.
     z: Floats
+    # Factors of each sensor's reading, and of its integral, in each coordinate and own state: shape
+    # (n_coordinates + n_own, n_sensors), columns in the order of the rig's sensors.
     by_reading: Floats
     by_integral: Floats
 
@@ -53,15 +47,7 @@ class MeasuredStates:
 
 
 def sensor_factors(equations: RigEquations, free: frozenset[str]) -> dict[str, tuple[sp.Expr, ...]]:
-    """Return the factors of the states in each reading that is a sum of them, by sensor.
-
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    free
-        Names of the unknown parameters.
-    """
+    """Return the factors of the states in each reading that is a sum of them, by sensor."""
     structure = equations.structure
     unknown = {
         symbol
@@ -83,19 +69,7 @@ def measured_states(
     p: Floats,
     factors: Mapping[str, Sequence[sp.Expr]],
 ) -> MeasuredStates | None:
-    """Return the states of a record, or None if its sensors do not show them all.
-
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    record
-        The measured record.
-    p
-        Parameters in the order of the structure; unknown ones may have any value.
-    factors
-        From `sensor_factors`.
-    """
+    """Return the states of a record, or None if its sensors do not show them all."""
     n, n_states = equations.n_coordinates, equations.n_states
     n_own, n_sensors = n_states - 2 * n, len(equations.sensor_names)
     numbers = dict(zip(equations.structure.parameter_symbols, map(float, p), strict=True))
@@ -138,13 +112,7 @@ def measured_states(
 def supposed_states(
     equations: RigEquations, record: Record, p: Floats, factors: Mapping[str, Sequence[sp.Expr]]
 ) -> MeasuredStates:
-    """Return states of plausible size, if sensors do not show them all: derived from other states with the same unit.
-
-    Parameters
-    ----------
-    equations, record, p, factors
-        As for `measured_states`.
-    """
+    """Return states of plausible size, if sensors do not show them all: derived from other states with the same unit."""
     mechanism, n = equations.rig.mechanism, equations.n_coordinates
     numbers = dict(zip(equations.structure.parameter_symbols, map(float, p), strict=True))
     units = [*(c.unit for c in mechanism.free), *(s.unit for s in mechanism.states)]

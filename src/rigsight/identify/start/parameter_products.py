@@ -21,22 +21,7 @@ class MixedError(ValueError):
 def parameter_products(
     expression: sp.Expr, unknown: frozenset[sp.Symbol], signals: frozenset[sp.Symbol]
 ) -> dict[sp.Expr, sp.Expr]:
-    """Return the products of unknown parameters in an expression, each with its factor.
-
-    Parameters
-    ----------
-    expression
-        Expression in parameters and signals.
-    unknown
-        The unknown parameters.
-    signals
-        Symbols that change along a record.
-
-    Raises
-    ------
-    MixedError
-        If an unknown parameter is in a function or a power together with signals.
-    """
+    """Return the products of unknown parameters in an expression, each with its factor."""
     found: dict[sp.Expr, dict[sp.Expr, sp.Expr]] = {}
 
     def products(own: sp.Expr) -> dict[sp.Expr, sp.Expr]:

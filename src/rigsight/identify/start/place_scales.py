@@ -28,17 +28,7 @@ _UNKNOWN = 1.0
 
 
 def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:
-    """Return the size of each base quantity at each place of a rig, and of each of its parameters and states.
-
-    Parameters
-    ----------
-    rig, records, values
-        As for `characteristic_scales`.
-
-    Returns
-    -------
-    As for `characteristic_scales`.
-    """
+    """Return the size of each base quantity at each place of a rig, and of each of its parameters and states."""
     equations = equations_of(rig)
     signals: dict[str, list[Floats]] = {}
     own_sizes: list[Floats] = []

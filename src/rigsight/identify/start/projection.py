@@ -28,26 +28,16 @@ _LEAST_NOISE = 1e-6
 
 @dataclass(frozen=True)
 class Projection:
-    """Integrals of signals times a window and ``e^{-j omega t}`` over stretches of a record.
+    """Integrals of signals times a window and ``e^{-j omega t}`` over stretches of a record."""
 
-    Attributes
-    ----------
-    omega
-        Angular frequencies [rad/s], shape (n_points,).
-    stretch, line
-        Index of the stretch and of the line of each point, shape (n_points,).
-    starts, length
-        First samples of the stretches, and their number of samples.
-    dt
-        Sample time [s].
-    """
-
-    omega: Floats
+    omega: Floats  # angular frequencies [rad/s], shape (n_points,)
+    # Index of the stretch and of the line of each point, shape (n_points,).
     stretch: NDArray[np.intp]
     line: NDArray[np.intp]
+    # First samples of the stretches, and their number of samples.
     starts: NDArray[np.intp]
     length: int
-    dt: float
+    dt: float  # sample time [s]
 
     def of(self, signal: Floats) -> Complexes:
         """Return the integrals of a signal."""
@@ -66,19 +56,7 @@ class Projection:
 def projected(
     equations: RigEquations, record: Record, measured: MeasuredStates, most: int
 ) -> tuple[Projection, Floats]:
-    """Return the projection on informative lines, and the power of each sensor's noise on a line, shape (n_sensors,).
-
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    record
-        The measured record.
-    measured
-        Its states.
-    most
-        Largest number of lines of all stretches together.
-    """
+    """Return the projection on informative lines, and the power of each sensor's noise on a line, shape (n_sensors,)."""
     n_samples = record.n_samples
     length = min(max(n_samples // _STRETCHES, _SHORTEST), n_samples)
     starts = np.unique(np.linspace(0, n_samples - length, max(1, 2 * n_samples // length - 1)).astype(int))

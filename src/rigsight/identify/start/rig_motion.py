@@ -35,17 +35,7 @@ class RigMotion:
 
 
 def simulated_motion(equations: RigEquations, record: Record, values: Mapping[str, float]) -> RigMotion:
-    """Return the motion of a rig in a record according to its equations.
-
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    record
-        Gives the inputs, and the initial state by its first samples.
-    values
-        Constants and parameters by name.
-    """
+    """Return the motion of a rig in a record according to its equations."""
     u = equations.inputs_of(record)[1]
     found: Floats | None = None
     for count in _PIECES:

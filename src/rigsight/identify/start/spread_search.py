@@ -42,17 +42,11 @@ _MOST_EVALUATIONS = 60
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Coordinates of unknown parameters: logarithms of those with one sign, others in units of their size.
+    """Coordinates of unknown parameters: logarithms of those with one sign, others in units of their size."""
 
-    Attributes
-    ----------
-    parameters
-        The unknown parameters.
-    expected
-        The expected value of each, or the expected size of one that may have either sign, shape (n_parameters,).
-    """
-
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[Parameter, ...]  # the unknown parameters
+    # The expected value of each, or the expected size of one that may have either sign, shape
+    # (n_parameters,).
     expected: Floats
 
     @property
@@ -90,15 +84,7 @@ def balanced(
     parameters: Sequence[Parameter],
     terms: Callable[[Floats], Sequence[tuple[int, float, Floats]]],
 ) -> SearchSpace:
-    """Return a space about the values at which the terms of each equation have equal size, as far as that is possible.
-
-    Parameters
-    ----------
-    parameters
-        The unknown parameters.
-    terms
-        Returns, for values of them, each term's equation, size and powers of the parameters in it.
-    """
+    """Return a space about the values at which the terms of each equation have equal size, as far as that is possible."""
     prior = np.array([np.log(abs(p.default)) if p.default else 0.0 for p in parameters])
     # A default has more weight than any term; without one, the size 1 determines only what no equation does.
     weight = np.array([_DEFAULT if p.default else 1e-3 for p in parameters])
@@ -131,19 +117,7 @@ def ends_of_search(
     rng: np.random.Generator,
     agreeing: int = AGREEING,
 ) -> list[tuple[float, Floats]]:
-    """Return the local minima of a sum of squared errors reached from many starts, lowest first: cost and parameter values.
-
-    Parameters
-    ----------
-    space
-        The search space.
-    errors
-        Returns the errors for parameter values, of size one if due to noise alone.
-    rng
-        Source of the starts.
-    agreeing
-        Number of searches that must end in the lowest minimum for it to count as the global one.
-    """
+    """Return the local minima of a sum of squared errors reached from many starts, lowest first: cost and parameter values."""
     first = space.start()
     spreads = [_SPREADS[i % len(_SPREADS)] for i in range(_SCREENED)]
     thetas = [first, *(first + spread * rng.standard_normal(first.size) for spread in spreads)]

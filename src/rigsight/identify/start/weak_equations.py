@@ -56,32 +56,18 @@ class _Term:
 
 @dataclass(frozen=True)
 class _Block:
-    """One record: the terms on its lines, and the response of the equations to noise of the states.
+    """One record: the terms on its lines, and the response of the equations to noise of the states."""
 
-    Attributes
-    ----------
-    omega
-        Angular frequencies [rad/s], shape (n_points,).
-    terms
-        Projected signals of the terms, shape (n_terms, n_points).
-    squares
-        Their squared absolute values.
-    slopes
-        Derivatives of the terms by coordinates and own states, for each power of ``j omega``: (n_terms, 3, n_states').
-    noise
-        Square root of the covariance of coordinates and own states, shape (n_points, n_states', n_sensors).
-    p
-        The record's parameter vector with its own constants.
-    measured, u, projection
-        States, inputs and projection, for terms in which signals and unknown parameters cannot be separated.
-    """
-
-    omega: Floats
-    terms: Complexes
-    squares: Floats
+    omega: Floats  # angular frequencies [rad/s], shape (n_points,)
+    terms: Complexes  # projected signals of the terms, shape (n_terms, n_points)
+    squares: Floats  # their squared absolute values
+    # Derivatives of the terms by coordinates and own states, for each power of ``j omega``: (n_terms, 3,
+    # n_states').
     slopes: Floats
+    # Square root of the covariance of coordinates and own states, shape (n_points, n_states', n_sensors).
     noise: Complexes
-    p: Floats
+    p: Floats  # the record's parameter vector with its own constants
+    # States, inputs and projection, for terms in which signals and unknown parameters cannot be separated.
     measured: MeasuredStates
     u: Floats
     projection: Projection

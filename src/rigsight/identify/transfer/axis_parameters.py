@@ -8,20 +8,7 @@ from rigsight.rigs import AXIS
 
 
 def axis_parameters(fit: TransferFit, gain: float) -> PhysicalEstimates:
-    """Return m, d and k of a PT2 from input to displacement, ``m x'' + d x' + k x = gain u``.
-
-    Parameters
-    ----------
-    fit
-        PT2 from u to x.
-    gain
-        Force per unit of input, positive.
-
-    Raises
-    ------
-    InputError
-        If the fit is not a PT2, or its gain is not positive.
-    """
+    """Return m, d and k of a PT2 from input to displacement, ``m x'' + d x' + k x = gain u``."""
     check_fit(fit, "pt2", "axis", "x / u")
     method = f"gain, break frequency and damping of the {fit.method}"
     return motion_parameters(AXIS, fit, {AXIS.motion.drive_gain.name: gain}, None, method)

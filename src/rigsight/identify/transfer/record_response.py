@@ -49,38 +49,26 @@ _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 
 @dataclass(frozen=True, eq=False)
 class RecordResponse:
-    """A frequency response with its resolution and coherence.
+    """A frequency response with its resolution and coherence."""
 
-    Attributes
-    ----------
-    response
-        The frequency response in the band in which it exceeds its uncertainty.
-    lines_per_value
-        Lines per independent value, by which a covariance that counts lines as independent is too small. A local model of degree
-        two has three coefficients for the response in its band; a Hann window correlates neighbors.
-    resolution
-        Distance of its frequencies [rad/s].
-    narrowest
-        Half-power width of the narrowest peak that the method follows at this resolution [rad/s].
-    coherence
-        H1 with its coherence from segments of the same record; None if it is not requested or the record is too short for it.
-    unused_instrument
-        Reason why the given instrument was not used; empty if it was used, or if there is none.
-    plain
-        The plain ratio of the spectra in the band in which it exceeds its uncertainty, for a fit of a form with the free motion
-        of the record; None if the form of that is unknown, or whole periods were averaged, or an instrument was used.
-    fit
-        The fit of the form of `order` to it; None if there is none.
-    """
-
-    response: FrequencyResponse
+    response: FrequencyResponse  # the frequency response in the band in which it exceeds its uncertainty
+    # Lines per independent value, by which a covariance that counts lines as independent is too small. A
+    # local model of degree two has three coefficients for the response in its band; a Hann window correlates
+    # neighbors.
     lines_per_value: float
-    resolution: float
+    resolution: float  # distance of its frequencies [rad/s]
+    # Half-power width of the narrowest peak that the method follows at this resolution [rad/s].
     narrowest: float
+    # H1 with its coherence from segments of the same record; None if it is not requested or the record is too
+    # short for it.
     coherence: FrequencyResponse | None
+    # Reason why the given instrument was not used; empty if it was used, or if there is none.
     unused_instrument: str = ""
+    # The plain ratio of the spectra in the band in which it exceeds its uncertainty, for a fit of a form with
+    # the free motion of the record; None if the form of that is unknown, or whole periods were averaged, or
+    # an instrument was used.
     plain: PlainRatio | None = None
-    fit: TransferFit | None = None
+    fit: TransferFit | None = None  # the fit of the form of `order` to it; None if there is none
 
 
 def record_response(
@@ -100,48 +88,7 @@ def record_response(
     drive: str | None = None,
     moves_freely: bool = False,
 ) -> RecordResponse:
-    """Return the frequency response of one record.
-
-    Parameters
-    ----------
-    record
-        A sweep, a multisine, or another input that excites a band. Whole periods of a periodic input are averaged, without the
-        first, which contains the transient.
-    source, response
-        Names of the signals.
-    order
-        Assumed order of the response, for the thesis's pipeline and the free motion.
-    method
-        ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
-    resolution
-        Requested width [rad/s] of a local band, or distance of averaged frequencies. None takes the default of the record.
-    hold
-        Hold of the source between its samples, see `rigsight.frequency.hold_response`.
-    band
-        Limits [rad/s] inside which the response is kept; None keeps all that the source excites.
-    least_clearness
-        Power over variance from which a line of a local method counts as clear; 0 keeps all lines.
-    clear_alone
-        True to leave out unclear lines even if few are clear, as needed for errors without weights. A fit has weights and takes
-        all lines in this case.
-    with_coherence
-        False if the coherence is not needed: it takes a third of the time of a local model.
-    wanted
-        Required frequencies [rad/s]; a local method skips other lines. None for all.
-    instrument
-        The reference of a closed loop: a local method divides the responses to it, unless the source does not respond to it.
-    drive
-        The input whose periods are averaged: the noise of a measured source hides its period. None for the source.
-    moves_freely
-        True if the ends of the record excite a free motion with the poles of a form of this `order`. It is fitted to all lines
-        together and removed where a local model cannot distinguish it from the response: where a sweep begins or ends with the
-        record.
-
-    Raises
-    ------
-    InputError
-        If the record is too short or has no excitation, or no line is inside the band.
-    """
+    """Return the frequency response of one record."""
     check_option("The method", method, METHODS)
     drive, unused = drive or source, ""
     if instrument is not None and method not in _BAND_LINES:

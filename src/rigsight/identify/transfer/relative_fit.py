@@ -20,13 +20,6 @@ def fit_with_relative_error(
     """Return a fit and the relative error, the same for every line, with which the form explains the response.
 
     With the variances of the noise alone, the few most certain lines would dominate, wherever they are.
-
-    Parameters
-    ----------
-    response
-        A response with variances.
-    order, magnitude_only
-        As in `fit_frequency_response`.
     """
     assert response.variance is not None
     for share in _SHARES:

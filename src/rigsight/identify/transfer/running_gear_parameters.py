@@ -103,21 +103,7 @@ def motion_parameters(
     constant_errors: Mapping[str, float] | None,
     method: str,
 ) -> PhysicalEstimates:
-    """Return stiffness, inertia and damping of a rig from the PT2 of its motion.
-
-    Parameters
-    ----------
-    rig
-        A rig whose stiffness, inertia and damping are one parameter each.
-    fit
-        PT2 from its input to its displacement.
-    constants
-        Constants of its drive.
-    constant_errors
-        Standard errors of constants, by name; missing ones count as exact.
-    method
-        Description of the method in the result.
-    """
+    """Return stiffness, inertia and damping of a rig from the PT2 of its motion."""
     gain, omega_b, zeta = (fit.values[name] for name in ("gain", "omega_b", "zeta"))
     motion = rig.motion
     assert motion.inertia is not None
@@ -198,22 +184,7 @@ def static_lateral(l_0: float) -> tuple[float, float]:
 
 
 def check_fit(fit: TransferFit, order: str, which: str, ratio: str) -> None:
-    """Raise an error for a fit of another order, or with a negative gain, which shows that a signal has the opposite sign.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    order
-        Required order.
-    which, ratio
-        Parameters to be computed, and ratio of signals, for the message.
-
-    Raises
-    ------
-    InputError
-        If the order is another or the gain is not positive.
-    """
+    """Raise an error for a fit of another order, or with a negative gain, which shows that a signal has the opposite sign."""
     if fit.form.order != order:
         raise InputError(
             f"The {which} parameters need a {order.upper()} ({ratio}), got a {fit.form.order.upper()}."

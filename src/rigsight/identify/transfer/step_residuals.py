@@ -42,26 +42,7 @@ def step_covariance(
     omega_b: float,
     zeta: float | None,
 ) -> NDArray[np.float64]:
-    """Return the covariance of least-squares parameters of a step.
-
-    Parameters
-    ----------
-    residual
-        Measured minus fitted, shape (n_samples,).
-    slopes
-        Derivatives of the residual, shape (n_samples, n_parameters).
-    dt
-        Sample time [s].
-    omega_b
-        Break frequency of the fitted form [rad/s].
-    zeta
-        Damping ratio of a PT2, None for a PT1.
-
-    Returns
-    -------
-    Shape (n_parameters, n_parameters). If the window is so long that its spectral lines resolve the resonance, its spectrum is
-    used (`colored_covariance`).
-    """
+    """Return the covariance of least-squares parameters of a step."""
     per_block = max(math.floor(_PHASE_PER_BLOCK / (omega_b * dt)), 1)
     per_block = max(min(per_block, residual.size // _LEAST_BLOCKS), 1)
     count = residual.size // per_block

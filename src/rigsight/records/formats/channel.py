@@ -34,27 +34,15 @@ Load = Callable[[], NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class TimeAxis:
-    """The time of a channel, where the file keeps one beside the samples.
+    """The time of a channel, where the file keeps one beside the samples."""
 
-    Attributes
-    ----------
-    n_samples
-        Number of stamps.
-    dt, t0
-        Sample time and first stamp of an even axis; `dt` is None where stamps are stored.
-    load
-        Reads stored stamps; None for an even axis.
-    unit
-        Of dt, t0 and stamps.
-    origin
-        Moment from which they count, the same for all channels of a file; None where the file does not say.
-    """
-
-    n_samples: int
+    n_samples: int  # number of stamps
+    # Sample time and first stamp of an even axis; `dt` is None where stamps are stored.
     dt: float | None = None
     t0: float = 0.0
-    load: Load | None = None
-    unit: str = "s"
+    load: Load | None = None  # reads stored stamps; None for an even axis
+    unit: str = "s"  # of dt, t0 and stamps
+    # Moment from which they count, the same for all channels of a file; None where the file does not say.
     origin: np.datetime64 | None = None
 
     def stamps(self) -> NDArray[np.float64]:
@@ -66,33 +54,15 @@ class TimeAxis:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """Samples under a name.
+    """Samples under a name."""
 
-    Attributes
-    ----------
-    name
-        Unique in an opened file; ``group/channel`` where the file has groups.
-    n_samples
-        Number of samples.
-    load
-        Reads the samples: of a reader as they are stored, of an opened file as quantities.
-    unit
-        What the file states, None where it states none.
-    axis
-        Its own time; None where time is a channel like any other.
-    stored
-        How stored numbers become quantities.
-    origin
-        Of a channel of dates, the moment from which its seconds count.
-    """
-
-    name: str
+    name: str  # unique in an opened file; ``group/channel`` where the file has groups
     n_samples: int
-    load: Load
-    unit: str | None = None
-    axis: TimeAxis | None = None
-    stored: Stored = AS_STORED
-    origin: np.datetime64 | None = None
+    load: Load  # reads the samples: of a reader as they are stored, of an opened file as quantities
+    unit: str | None = None  # what the file states, None where it states none
+    axis: TimeAxis | None = None  # its own time; None where time is a channel like any other
+    stored: Stored = AS_STORED  # how stored numbers become quantities
+    origin: np.datetime64 | None = None  # of a channel of dates, the moment from which its seconds count
 
     @property
     def short_name(self) -> str:
@@ -119,31 +89,16 @@ class Refused:
 
 @dataclass(frozen=True, eq=False)
 class ChannelFile:
-    """What a file holds, found out without reading any samples.
+    """What a file holds, found out without reading any samples."""
 
-    Attributes
-    ----------
-    channels
-        In the order of the file; names are made distinct and printable by `open_channels`, not by a reader.
-    refused
-        What else is in it.
-    format
-        Plain name, ``"MATLAB"``; `open_channels` fills it in.
-    """
-
+    # In the order of the file; names are made distinct and printable by `open_channels`, not by a reader.
     channels: tuple[Channel, ...]
-    refused: tuple[Refused, ...] = ()
-    format: str = ""
+    refused: tuple[Refused, ...] = ()  # what else is in it
+    format: str = ""  # plain name, ``"MATLAB"``; `open_channels` fills it in
 
 
 def check_size(file: str, name: str, n_samples: int) -> None:
-    """Refuse a channel that is too long, before it is read.
-
-    Raises
-    ------
-    InputError
-        Naming file, channel, its samples and the limit.
-    """
+    """Refuse a channel that is too long, before it is read."""
     if n_samples > MOST_SAMPLES:
         raise InputError(
             f"{file}, channel '{name}': {n_samples} samples, more than the {MOST_SAMPLES} that are read. "
@@ -152,13 +107,7 @@ def check_size(file: str, name: str, n_samples: int) -> None:
 
 
 def check_count(file: str, n_channels: int) -> None:
-    """Refuse a file with more channels than any measurement has.
-
-    Raises
-    ------
-    InputError
-        Naming the file and the limit.
-    """
+    """Refuse a file with more channels than any measurement has."""
     if n_channels > MOST_CHANNELS:
         raise InputError(
             f"{file} holds more than {MOST_CHANNELS} channels; export those that are needed into a file of their own."
@@ -166,13 +115,7 @@ def check_count(file: str, n_channels: int) -> None:
 
 
 def check_total(file: str, n_samples: int) -> None:
-    """Refuse a file whose channels together are too long, before any is read.
-
-    Raises
-    ------
-    InputError
-        Naming the file, its samples and the limit.
-    """
+    """Refuse a file whose channels together are too long, before any is read."""
     if n_samples > MOST_SAMPLES_IN_ALL:
         raise InputError(
             f"{file}: its channels have {n_samples} samples in total, more than the {MOST_SAMPLES_IN_ALL} that are read. "
@@ -208,19 +151,7 @@ def columns_of(
     unit: str | None = None,
     stored: Stored = AS_STORED,
 ) -> list[Channel] | Refused:
-    """Return the channels of a stored array: one of a vector, one per column of a table.
-
-    Parameters
-    ----------
-    name
-        Of the array; columns are called ``name(:,1)`` and so on.
-    shape
-        As stored; the longer side of a table is time.
-    read
-        Reads the whole array.
-    unit, stored
-        Of all its columns.
-    """
+    """Return the channels of a stored array: one of a vector, one per column of a table."""
     long = [length for length in shape if length != 1]
     if not long or 0 in long:
         return Refused(name, "holds a single number" if not long else "is empty")

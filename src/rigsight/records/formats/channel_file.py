@@ -33,13 +33,7 @@ MEND = "Export it again, or as CSV."
 
 
 def file_format(path: Path) -> Format | None:
-    """Return the format that the content of a file shows, whatever it is called; None for delimited text.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or its name promises a format that its content is not.
-    """
+    """Return the format that the content of a file shows, whatever it is called; None for delimited text."""
     file_size(path)
     try:
         with path.open("rb") as file:
@@ -58,18 +52,7 @@ def file_format(path: Path) -> Format | None:
 
 @contextlib.contextmanager
 def open_channels(path: Path) -> Iterator[ChannelFile]:
-    """Open a measurement file that is no delimited text; its channels can be read inside this context.
-
-    Parameters
-    ----------
-    path
-        A file for which `file_format` names a format.
-
-    Raises
-    ------
-    InputError
-        Naming the file: too large, damaged, or a library is missing that reads it.
-    """
+    """Open a measurement file that is no delimited text; its channels can be read inside this context."""
     known = file_format(path)
     if known is None:
         raise InputError(f"{path.name} is not a measurement file of a known format.")

@@ -19,13 +19,7 @@ from rigsight.records.formats.text_file import read_text
 
 
 def open_measurement(path: Path) -> AbstractContextManager[ChannelFile]:
-    """Open a file of any format, delimited text included; its channels can be read inside this context.
-
-    Raises
-    ------
-    InputError
-        Naming the file and what is wrong with it.
-    """
+    """Open a file of any format, delimited text included; its channels can be read inside this context."""
     return _open_text(path) if file_format(path) is None else open_channels(path)
 
 

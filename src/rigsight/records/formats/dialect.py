@@ -18,18 +18,10 @@ SIGNS_LOOKED_AT = 400_000
 
 @dataclass(frozen=True)
 class Dialect:
-    """How cells and numbers are written.
+    """How cells and numbers are written."""
 
-    Attributes
-    ----------
-    separator
-        Between cells; a blank stands for any run of white space.
-    decimal
-        ``"."`` or ``","``.
-    """
-
-    separator: str
-    decimal: str
+    separator: str  # between cells; a blank stands for any run of white space
+    decimal: str  # ``"."`` or ``","``
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line, without quotes and surrounding blanks."""
@@ -71,15 +63,7 @@ def is_comment(line: str, comment: str | None) -> bool:
 
 
 def sniff(lines: Sequence[str], separator: str | None, decimal: str | None) -> Dialect:
-    """Return the dialect in which most cells of equally wide rows are numbers.
-
-    Parameters
-    ----------
-    lines
-        Lines without comments and blank lines, at least one.
-    separator, decimal
-        What is already known, else None.
-    """
+    """Return the dialect in which most cells of equally wide rows are numbers."""
     sample = _whole_up_to(lines[:LINES_LOOKED_AT])
     last = _whole_up_to(lines[: -LINES_LOOKED_AT - 1 : -1])[::-1] if len(lines) > LINES_LOOKED_AT else sample
     candidates = [

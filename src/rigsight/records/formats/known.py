@@ -23,33 +23,20 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Format:
-    """A format of measurement files.
+    """A format of measurement files."""
 
-    Attributes
-    ----------
-    key
-        Name of its reader.
-    name
-        Name in messages and results.
-    suffixes
-        Of its files, lower case; empty where another format with the same suffix stands for it.
-    recognizes
-        Whether the first `HEAD` bytes of a file are those of this format; no two formats recognize the same file.
-    package
-        Package that reads it; None where rigsight itself does.
-    isolated
-        True if that package is written in C, so that a damaged file could crash it: it is called in a process of its own.
-    advice
-        Sentence for a file with one of the suffixes and other content.
-    """
-
-    key: str
-    name: str
+    key: str  # name of its reader
+    name: str  # name in messages and results
+    # Of its files, lower case; empty where another format with the same suffix stands for it.
     suffixes: tuple[str, ...]
+    # Whether the first `HEAD` bytes of a file are those of this format; no two formats recognize the same
+    # file.
     recognizes: Callable[[bytes], bool]
-    package: str | None = None
+    package: str | None = None  # package that reads it; None where rigsight itself does
+    # True if that package is written in C, so that a damaged file could crash it: it is called in a process
+    # of its own.
     isolated: bool = False
-    advice: str = ""
+    advice: str = ""  # sentence for a file with one of the suffixes and other content
 
 
 def _is_hdf5(head: bytes) -> bool:

@@ -24,30 +24,14 @@ from rigsight.records.formats.thousands import refuse_thousands
 
 @dataclass(frozen=True)
 class Layout:
-    """How the columns of a text file are laid out.
+    """How the columns of a text file are laid out."""
 
-    Attributes
-    ----------
-    dialect
-        How cells and numbers are written.
-    names
-        Of the columns; their numbers where the file has no header.
-    n_above
-        How many of the kept lines stand above the first row of numbers.
-    has_names
-        Whether the file has a header.
-    notes
-        What was assumed.
-    units
-        Cells of a units row, empty where there is none.
-    """
-
-    dialect: Dialect
-    names: tuple[str, ...]
-    n_above: int
-    has_names: bool
-    notes: tuple[str, ...]
-    units: tuple[str, ...] = ()
+    dialect: Dialect  # how cells and numbers are written
+    names: tuple[str, ...]  # of the columns; their numbers where the file has no header
+    n_above: int  # how many of the kept lines stand above the first row of numbers
+    has_names: bool  # whether the file has a header
+    notes: tuple[str, ...]  # what was assumed
+    units: tuple[str, ...] = ()  # cells of a units row, empty where there is none
 
     def unit(self, position: int) -> str | None:
         """Return the unit that the row of units states for a column, None if it states none."""
@@ -87,26 +71,7 @@ def find_layout(
     comment: str | None,
     wanted: Collection[str] = (),
 ) -> Layout:
-    """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out.
-
-    Parameters
-    ----------
-    path
-        For messages.
-    lines
-        All lines.
-    kept
-        Numbers, from 1, of those that are neither blank nor comments.
-    separator, decimal, header, comment
-        As of `read_csv`.
-    wanted
-        Names that are asked for.
-
-    Raises
-    ------
-    InputError
-        If there are too many columns, or the line with their names cannot be determined.
-    """
+    """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out."""
     looked_at = [lines[number - 1] for number in kept[:MOST_HEAD]]
     last = [lines[number - 1] for number in kept[MOST_HEAD:][-LAST_LINES:]]
     dialect = sniff([*looked_at, *last], separator, decimal)

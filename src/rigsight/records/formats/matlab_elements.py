@@ -35,36 +35,18 @@ class DamagedError(ValueError):
 
 @dataclass(frozen=True)
 class Variable:
-    """A declared variable, or a field of one.
-
-    Attributes
-    ----------
-    name
-        Its name.
-    kind
-        MATLAB class; ``"complex"`` and ``"logical"`` for numbers that are.
-    shape
-        Declared dimensions.
-    fields
-        Of a struct, in order; of an array of structs those of all elements, one after the other, in the order of columns.
-    """
+    """A declared variable, or a field of one."""
 
     name: str
-    kind: str
-    shape: tuple[int, ...]
+    kind: str  # MATLAB class; ``"complex"`` and ``"logical"`` for numbers that are
+    shape: tuple[int, ...]  # declared dimensions
+    # Of a struct, in order; of an array of structs those of all elements, one after the other, in the order
+    # of columns.
     fields: tuple[Variable, ...] = ()
 
 
 def declared_variables(data: bytes, file: str) -> Iterator[Variable]:
-    """Yield the variables that the contents of a MATLAB file declare.
-
-    Raises
-    ------
-    DamagedError
-        If the declarations contradict themselves or the file is cut short.
-    InputError
-        If a variable is larger than what is read.
-    """
+    """Yield the variables that the contents of a MATLAB file declare."""
     order = _order(data)
     position, count, unpacked = HEADER, 0, 0
     while position < len(data):

@@ -9,20 +9,7 @@ from rigsight.errors import InputError
 
 
 def file_size(path: Path, what: str = "the file") -> int:
-    """Return the size of a file in bytes.
-
-    Parameters
-    ----------
-    path
-        The file.
-    what
-        What a folder is said to hold: ``"the file"``.
-
-    Raises
-    ------
-    InputError
-        If it does not exist, cannot be looked at, or is a folder, a device or a pipe: those have no size, and no end.
-    """
+    """Return the size of a file in bytes."""
     try:
         found = path.stat()
     except FileNotFoundError:

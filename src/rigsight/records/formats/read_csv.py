@@ -27,26 +27,7 @@ def read_csv(
     header: bool | int | None = None,
     comment: str | None = None,
 ) -> Columns:
-    """Read the columns that `columns` asks for; others may hold anything.
-
-    Parameters
-    ----------
-    path
-        Text file in UTF-8, UTF-16 with a byte order mark, or Latin-1.
-    columns
-        Signal name -> where it stands.
-    optional
-        Signals that may be missing.
-    separator, decimal, header, comment
-        The file's dialect: the separator, the decimal sign, whether there is a line of names or its number from 1, the sign of
-        comments. What is None is found out.
-
-    Raises
-    ------
-    InputError
-        Naming file, line and column, and the mend: the file cannot be read or is too large, a column is missing,
-        a row has another width, a cell is not a finite number.
-    """
+    """Read the columns that `columns` asks for; others may hold anything."""
     if separator is not None and (len(separator) != 1 or separator in '"\r\n'):
         raise InputError(
             f"{path.name}: separator is {separator!r}; give one character that is neither a quote nor a line end."

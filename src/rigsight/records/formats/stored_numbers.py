@@ -23,28 +23,17 @@ _MAY_CONVERT = re.compile(
 
 @dataclass(frozen=True)
 class Stored:
-    """What a file says of the numbers of a channel: ``quantity = scale * stored + offset``.
+    """What a file says of the numbers of a channel: ``quantity = scale * stored + offset``."""
 
-    Attributes
-    ----------
-    scale, offset
-        From the stored number to the quantity, in the unit that the file states.
-    missing
-        Stored numbers that stand for no reading.
-    least, most
-        Smallest and largest valid stored number.
-    unsigned
-        True if the numbers are unsigned, although their type says otherwise.
-    unclear
-        Attributes that may be a conversion, as ``name = value``, but of no known convention.
-    """
-
+    # From the stored number to the quantity, in the unit that the file states.
     scale: float = 1.0
     offset: float = 0.0
-    missing: tuple[float, ...] = ()
+    missing: tuple[float, ...] = ()  # stored numbers that stand for no reading
+    # Smallest and largest valid stored number.
     least: float = -math.inf
     most: float = math.inf
-    unsigned: bool = False
+    unsigned: bool = False  # true if the numbers are unsigned, although their type says otherwise
+    # Attributes that may be a conversion, as ``name = value``, but of no known convention.
     unclear: tuple[str, ...] = ()
 
     @classmethod
@@ -84,13 +73,7 @@ AS_STORED = Stored()
 
 
 def stored_by(attributes: Mapping[str, Any]) -> Stored:
-    """Return what the attributes of a dataset, a channel or a column say of its numbers.
-
-    Parameters
-    ----------
-    attributes
-        Name -> value; texts, arrays and others that are no single number are passed over.
-    """
+    """Return what the attributes of a dataset, a channel or a column say of its numbers."""
     numbers = {name: own for name, value in attributes.items() if (own := _numbers(value))}
     scale, offset = 1.0, 0.0
     known: set[str] = set()

@@ -28,19 +28,12 @@ _REMARKS = "Comment"
 
 @dataclass(frozen=True)
 class Head:
-    """What stands above the rows of numbers; lines are counted from 0.
+    """What stands above the rows of numbers; lines are counted from 0."""
 
-    Attributes
-    ----------
-    names, units
-        Lines of the names and of the units, None where there are none.
-    first_row
-        First line of the rows of numbers.
-    """
-
+    # Lines of the names and of the units, None where there are none.
     names: int | None
     units: int | None
-    first_row: int
+    first_row: int  # first line of the rows of numbers
 
     @property
     def n_passed(self) -> int:
@@ -54,21 +47,11 @@ class UnclearHeadError(ValueError):
 
 @dataclass(frozen=True)
 class RowShape:
-    """What rows of numbers look like.
+    """What rows of numbers look like."""
 
-    Attributes
-    ----------
-    dialect
-        How cells and numbers are written.
-    width
-        Number of cells.
-    numeric
-        Columns that hold numbers.
-    """
-
-    dialect: Dialect
-    width: int
-    numeric: tuple[int, ...]
+    dialect: Dialect  # how cells and numbers are written
+    width: int  # number of cells
+    numeric: tuple[int, ...]  # columns that hold numbers
 
     @classmethod
     def of(cls, dialect: Dialect, lines: Sequence[str]) -> RowShape:
@@ -123,26 +106,7 @@ def find_head(
     header: bool | int | None,
     number_of: Callable[[int], int],
 ) -> Head:
-    """Return what stands above the rows of numbers of a text.
-
-    Parameters
-    ----------
-    dialect
-        How cells and numbers are written.
-    lines
-        Lines that are neither blank nor comments, at least one.
-    wanted
-        Names that are asked for: the line that holds them holds the names.
-    header
-        Whether there are names, or the line of the names, counted from 1 in the file; None if unspecified.
-    number_of
-        Number in the file of a line.
-
-    Raises
-    ------
-    UnclearHeadError
-        If the line with the names cannot be determined.
-    """
+    """Return what stands above the rows of numbers of a text."""
     if isinstance(header, int) and not isinstance(header, bool):
         return _told(dialect, lines, header, number_of)
     shape = RowShape.of(dialect, lines)

@@ -16,13 +16,7 @@ _MOST_LINES = MOST_SAMPLES + 1000
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a file with line feeds only.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is too large, or is no text.
-    """
+    """Return the text of a file with line feeds only."""
     size = file_size(path)
     if size > LARGEST_FILE:
         raise InputError(

@@ -26,22 +26,6 @@ def refuse_thousands(
     """Refuse a column whose decimal sign separates thousands: ``39,998`` beside ``998``.
 
     Decimals are written with as many places in all cells, or without zeros at their end, so that some have less than three.
-
-    Parameters
-    ----------
-    path, name
-        The file and the column.
-    sign
-        The decimal sign.
-    cells
-        Number of each line with its cell.
-    numbers
-        The column as it was read, shape (n_rows,).
-
-    Raises
-    ------
-    InputError
-        Naming the file, the first line with such a number, and the column.
     """
     finite = numbers[np.isfinite(numbers)]
     whole = finite == np.round(finite)

@@ -25,53 +25,26 @@ _MOST_POINTS, _FEWEST_POINTS = 6_000, 600
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One line of a chart, or the area between two.
+    """One line of a chart, or the area between two."""
 
-    Attributes
-    ----------
-    of
-        What it shows: ``"measured"``, or a stage of the diagnosis.
-    x
-        Shape (n,); increasing and finite.
-    y
-        Shape (n,), None for an area.
-    low, high
-        Limits of an area, shape (n,), None for a line.
-    """
-
-    of: str
-    x: NDArray[np.float64]
-    y: NDArray[np.float64] | None = None
+    of: str  # what it shows: ``"measured"``, or a stage of the diagnosis
+    x: NDArray[np.float64]  # shape (n,); increasing and finite
+    y: NDArray[np.float64] | None = None  # shape (n,), None for an area
+    # Limits of an area, shape (n,), None for a line.
     low: NDArray[np.float64] | None = None
     high: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class ChartPanel:
-    """One of the panels that share an axis.
+    """One of the panels that share an axis."""
 
-    Attributes
-    ----------
-    label
-        Quantity and unit.
-    share
-        Height relative to the other panels.
-    curves
-        What is drawn.
-    cap
-        Values beyond which nothing needs to be seen; None for no limit.
-    band
-        Half-width of a band about zero, None for none.
-    degrees
-        True if the values are angles in degrees.
-    """
-
-    label: str
-    share: int
-    curves: Sequence[Curve]
-    cap: tuple[float, float] | None = None
-    band: float | None = None
-    degrees: bool = False
+    label: str  # quantity and unit
+    share: int  # height relative to the other panels
+    curves: Sequence[Curve]  # what is drawn
+    cap: tuple[float, float] | None = None  # values beyond which nothing needs to be seen; None for no limit
+    band: float | None = None  # half-width of a band about zero, None for none
+    degrees: bool = False  # true if the values are angles in degrees
 
 
 @dataclass(frozen=True)
@@ -86,24 +59,12 @@ class Detail:
 
 @dataclass(frozen=True)
 class Chart:
-    """A figure that reacts: its static drawing, which is printed and stands in where no script runs, and its curves.
+    """A figure that reacts: its static drawing, which is printed and stands in where no script runs, and its curves."""
 
-    Attributes
-    ----------
-    key
-        Its id, unique in the page.
-    drawings
-        Static figures of the same curves.
-    data
-        The curves as JSON that is safe inside a script element.
-    caption
-        What it shows, for everyone.
-    """
-
-    key: str
-    drawings: tuple[PageFigure, ...]
-    data: Markup
-    caption: str
+    key: str  # its id, unique in the page
+    drawings: tuple[PageFigure, ...]  # static figures of the same curves
+    data: Markup  # the curves as JSON that is safe inside a script element
+    caption: str  # what it shows, for everyone
 
 
 def curve_names(diagnosis: Diagnosis) -> dict[str, str]:
@@ -141,25 +102,7 @@ def chart_data(
     detail: Detail | None = None,
     label: str = "",
 ) -> Markup:
-    """Return a chart's curves as JSON for the page's script.
-
-    Parameters
-    ----------
-    title
-        What it shows, for who cannot see it.
-    axis
-        Symbol and unit of what the panels share.
-    panels
-        From top to bottom.
-    names
-        What each kind of curve is called.
-    log
-        True for a logarithmic shared axis.
-    detail
-        A part worth looking at.
-    label
-        What stands at the shared axis, by default its quantity and unit.
-    """
+    """Return a chart's curves as JSON for the page's script."""
     symbol, unit = axis
     ends = [float(curve.x[i]) for panel in panels for curve in panel.curves for i in (0, -1)]
     content = {

@@ -54,15 +54,7 @@ def comparison_figures(comparison: Comparison) -> list[ComparisonFigure]:
 
 
 def record_figures(comparison: Comparison, index: int) -> list[ComparisonFigure]:
-    """Return the figures of one record: its responses or its step, or none.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    index
-        Place of the record in it.
-    """
+    """Return the figures of one record: its responses or its step, or none."""
     record = comparison.records[index]
     styles = model_styles([c.name for c in comparison.competitors])
     stem = f"{index + 1:02d}_{re.sub(r'[^A-Za-z0-9.-]+', '_', record.record.name)}"

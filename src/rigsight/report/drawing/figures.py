@@ -32,37 +32,15 @@ _HEIGHT = re.compile(r'(<svg\b[^>]*?) height="[^"]*"')
 
 @dataclass(frozen=True)
 class PageFigure:
-    """A figure as it stands in the page.
+    """A figure as it stands in the page."""
 
-    Attributes
-    ----------
-    key
-        Its id, unique in the page.
-    image
-        ``<svg>`` or ``<img>``.
-    caption
-        What it shows, for everyone.
-    """
-
-    key: str
-    image: Markup
-    caption: str
+    key: str  # its id, unique in the page
+    image: Markup  # ``<svg>`` or ``<img>``
+    caption: str  # what it shows, for everyone
 
 
 def page_figure(figure: Figure, key: str, alt: str, caption: str) -> PageFigure:
-    """Return a figure for the page.
-
-    Parameters
-    ----------
-    figure
-        Drawn figure.
-    key
-        Id, unique in the page; letters, digits and hyphens.
-    alt
-        What it shows, for who cannot see it: the message with its numbers.
-    caption
-        What it shows, for everyone.
-    """
+    """Return a figure for the page."""
     svg = _svg(figure, key, alt)
     image = svg if len(svg) <= _LARGEST_SVG else _png(figure, alt)
     return PageFigure(key, image, caption)

@@ -36,34 +36,17 @@ _PER_TICK = 24.0
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One line, or points without one.
+    """One line, or points without one."""
 
-    Attributes
-    ----------
-    x, y
-        Shape (n,); where `y` is not finite, there is a gap.
-    color
-        As in ``"#0072b2"``.
-    width
-        Of the line, or of each point.
-    dashes
-        Lengths of dashes and gaps in units of the width; empty for a solid line.
-    opacity
-        1 for a line that hides what is below.
-    label
-        Its name in the legend; empty for none.
-    as_points
-        True for points.
-    """
-
+    # Shape (n,); where `y` is not finite, there is a gap.
     x: NDArray[np.float64]
     y: NDArray[np.float64]
-    color: str
-    width: float = 1.0
-    dashes: tuple[float, ...] = ()
-    opacity: float = 1.0
-    label: str = ""
-    as_points: bool = False
+    color: str  # as in ``"#0072b2"``
+    width: float = 1.0  # of the line, or of each point
+    dashes: tuple[float, ...] = ()  # lengths of dashes and gaps in units of the width; empty for a solid line
+    opacity: float = 1.0  # 1 for a line that hides what is below
+    label: str = ""  # its name in the legend; empty for none
+    as_points: bool = False  # true for points
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,28 +62,15 @@ class Area:
 
 @dataclass(frozen=True, eq=False)
 class DrawnPanel:
-    """One of the panels over each other.
+    """One of the panels over each other."""
 
-    Attributes
-    ----------
-    label
-        Quantity and unit.
-    share
-        Height relative to the other panels.
-    limits
-        Lowest and highest value that is seen.
-    lines, areas
-        What is drawn; areas lie below.
-    turns
-        True for angles in degrees, whose ticks are parts of a turn.
-    """
-
-    label: str
-    share: int
-    limits: tuple[float, float]
+    label: str  # quantity and unit
+    share: int  # height relative to the other panels
+    limits: tuple[float, float]  # lowest and highest value that is seen
+    # What is drawn; areas lie below.
     lines: Sequence[Line]
     areas: Sequence[Area] = ()
-    turns: bool = False
+    turns: bool = False  # true for angles in degrees, whose ticks are parts of a turn
 
 
 def around(
@@ -133,27 +103,7 @@ def line_drawing(
     marked: tuple[float, float] | None = None,
     title: str = "",
 ) -> Markup:
-    """Return panels over each other as SVG.
-
-    Parameters
-    ----------
-    panels
-        From top to bottom.
-    axis
-        Label of the shared axis.
-    key
-        Makes the ids, so that they are unique in the page.
-    alt
-        What it shows, for who cannot see it.
-    size
-        Width and height [inch].
-    log
-        True for a logarithmic shared axis.
-    marked
-        Part of the shared axis that a bar marks in the first panel.
-    title
-        Stands above the first panel.
-    """
+    """Return panels over each other as SVG."""
     width, height = _POINTS * size[0], _POINTS * size[1]
     named, legend_height = _legend([line for panel in panels for line in panel.lines if line.label], width)
     top = _TOP + legend_height + (_TITLED if title else 0.0)

@@ -28,11 +28,6 @@ def loop_figures(diagnosis: Diagnosis) -> list[PageFigure]:
 
     Of several records with the same amplitude the one that was scored is shown, else the first. Records that tell no amplitude
     are shown one by one.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
     """
     rig = rig_of(diagnosis)
     if rig is None or rig.is_driven or not rig.has_one_motion or diagnosis.windows is not None:

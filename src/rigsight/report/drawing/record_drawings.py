@@ -47,21 +47,7 @@ def time_drawing(
     window: slice | None = None,
     marked: slice | None = None,
 ) -> Markup:
-    """Return measured against simulated over time, with the errors and a band of twice the noise floor below.
-
-    Parameters
-    ----------
-    diagnosis, trace, output
-        What is drawn.
-    stages
-        Simulations drawn, with their names for people.
-    key, alt
-        Id, and what it shows for who cannot see it.
-    window
-        Samples to draw; all where None.
-    marked
-        Samples to mark with a bar in a drawing of the whole record.
-    """
+    """Return measured against simulated over time, with the errors and a band of twice the noise floor below."""
     shown = window or slice(None)
     since_origin = trace.t - time_origin(trace.t)
     t, measured = since_origin[shown], np.asarray(trace.measured[output][shown], dtype=np.float64)
@@ -110,19 +96,7 @@ def time_drawing(
 def response_drawing(
     path: str, response: PathResponse, stages: Mapping[Stage, str], key: str, alt: str
 ) -> Markup:
-    """Return magnitude above phase of one path: measured as points with its 95 % band, each stage as a line.
-
-    Parameters
-    ----------
-    path
-        Its name for people.
-    response
-        Measured and simulated.
-    stages
-        Simulations drawn, with their names for people.
-    key, alt
-        Id, and what it shows for who cannot see it.
-    """
+    """Return magnitude above phase of one path: measured as points with its 95 % band, each stage as a line."""
     measured = thinned(response.measured, _PRINTED_LINES)
     omega, size, phase = measured.omega, measured.magnitude_db, np.degrees(measured.phase)
     simulated = {stage: thinned(response.simulated[stage], _PRINTED_LINES) for stage in stages}
@@ -152,19 +126,7 @@ def response_drawing(
 def overlaid_drawing(
     title: str, labeled: Sequence[tuple[str, PathResponse]], stage: Stage, key: str, alt: str
 ) -> Markup:
-    """Return the magnitudes of one path over each other: measured solid, simulated dashed.
-
-    Parameters
-    ----------
-    title
-        Stands above.
-    labeled
-        Response and its name, such as its amplitude, in order.
-    stage
-        Simulation that is drawn.
-    key, alt
-        Id, and what it shows for who cannot see it.
-    """
+    """Return the magnitudes of one path over each other: measured solid, simulated dashed."""
     lines: list[Line] = []
     for color, (label, response) in zip(amplitude_colors(len(labeled)), labeled, strict=True):
         measured, simulated = (

@@ -22,19 +22,7 @@ _BELOW = 3.0
 
 
 def response_chart(record: str, response: PathResponse, names: Mapping[str, str], key: str) -> Chart:
-    """Return magnitude and phase of one path of one record, measured and at each stage.
-
-    Parameters
-    ----------
-    record
-        Its name.
-    response
-        The path.
-    names
-        What is drawn, with its name for people.
-    key
-        Id, unique in the page.
-    """
+    """Return magnitude and phase of one path of one record, measured and at each stage."""
     path = response.path.replace("->", "\u2192")
     stages = [stage for stage in STAGES if stage in names and stage in response.simulated]
     errors = [f"{names[stage]} {response.decibel[stage]:.2g} dB" for stage in stages]
@@ -84,15 +72,7 @@ def response_chart(record: str, response: PathResponse, names: Mapping[str, str]
 def amplitude_figures(
     diagnosis: Diagnosis, responses: Mapping[str, tuple[PathResponse, ...]]
 ) -> list[tuple[str, list[PageFigure]]]:
-    """Return, for each path, the magnitudes at all amplitudes over each other: one figure per stage.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    responses
-        Frequency responses by record.
-    """
+    """Return, for each path, the magnitudes at all amplitudes over each other: one figure per stage."""
     names = curve_names(diagnosis)
     found = []
     paths = list(dict.fromkeys(response.path for own in responses.values() for response in own))

@@ -77,17 +77,7 @@ class Declaration:
         self.symbols = self._declared_symbols()
 
     def refuse(self, path: Path, message: str, within: int | None = None) -> NoReturn:
-        """Raise a message with the place of a value, or of the nearest table around it.
-
-        Parameters
-        ----------
-        path
-            Keys of the value.
-        message
-            What is wrong, what was got and what to write, without a full stop.
-        within
-            Character of the value that it is about, from 0.
-        """
+        """Raise a message with the place of a value, or of the nearest table around it."""
         place, length = None, 0
         for length in range(len(path), 0, -1):
             own = path[:length]

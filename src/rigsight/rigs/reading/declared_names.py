@@ -21,13 +21,7 @@ _PLACES = ("joints", "drives", "sensors")
 
 
 def check_declared_names(declaration: Declaration) -> None:
-    """Refuse names that are none, that are taken, and those that stand for nothing where a name must.
-
-    Raises
-    ------
-    InputError
-        With the place of the name.
-    """
+    """Refuse names that are none, that are taken, and those that stand for nothing where a name must."""
     table = declaration.table
     for key, what in _NEEDED.items():
         # Where every motion is prescribed, sensors alone may be what is identified.
@@ -131,13 +125,7 @@ def _check_references(declaration: Declaration) -> None:
 
 
 def check_names_read(declaration: Declaration) -> None:
-    """Refuse names that an expression cannot read.
-
-    Raises
-    ------
-    InputError
-        With the place of the name.
-    """
+    """Refuse names that an expression cannot read."""
     for path, expression in declaration.expressions.items():
         allowed = _allowed(declaration, path)
         for name, place in expression.reads.items():
@@ -228,13 +216,7 @@ def _why_not(declaration: Declaration, path: Path, name: str, allowed: set[str])
 
 
 def check_all_used(declaration: Declaration) -> None:
-    """Refuse what no equation reads: it would be ignored.
-
-    Raises
-    ------
-    InputError
-        With the place of its table.
-    """
+    """Refuse what no equation reads: it would be ignored."""
     table, expressions = declaration.table, declaration.expressions
     read = {name for expression in expressions.values() for name in expression.reads}
     if table.simulator is not None:

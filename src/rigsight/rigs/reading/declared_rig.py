@@ -23,20 +23,7 @@ _LARGEST, _LEAST = 1e18, 1e-15
 
 
 def rig_of(declaration: Declaration, order: list[Path]) -> Rig:
-    """Return the rig.
-
-    Parameters
-    ----------
-    declaration
-        The rig file, with its names checked.
-    order
-        Paths of signals, drives and sensors, each behind those that it reads.
-
-    Raises
-    ------
-    InputError
-        If the bounds of a number are none.
-    """
+    """Return the rig."""
     table = declaration.table
     mechanism = _mechanism(declaration, order)
     one_motion = mechanism.has_one_motion

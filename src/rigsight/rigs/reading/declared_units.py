@@ -11,20 +11,7 @@ _ENERGY = "J"
 
 
 def check_units_add_up(declaration: Declaration, order: list[Path]) -> None:
-    """Reject unknown or inconsistent units.
-
-    Parameters
-    ----------
-    declaration
-        The rig file.
-    order
-        Paths of signals, drives and sensors, each behind those that it reads.
-
-    Raises
-    ------
-    InputError
-        With the place of the expression, its unit and the one that it should have.
-    """
+    """Reject unknown or inconsistent units."""
     _Units(declaration).check(order)
 
 

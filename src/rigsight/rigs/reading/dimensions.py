@@ -37,13 +37,7 @@ class UnitError(ValueError):
 
 @cache
 def dimension(unit: str) -> Dimension:
-    """Return what a unit measures.
-
-    Raises
-    ------
-    UnitError
-        If the unit is unknown, or is not the SI unit of its quantity: equations are in SI units only.
-    """
+    """Return what a unit measures."""
     from pint.errors import PintError
 
     text = (
@@ -130,20 +124,7 @@ def _plain(units: Any) -> str:
 
 
 def dimension_of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimension:
-    """Return what an expression measures.
-
-    Parameters
-    ----------
-    expression
-        Parsed.
-    dimensions
-        What each name, and each rate as ``"d(name)"``, measures.
-
-    Raises
-    ------
-    ExpressionError
-        If it adds or compares what cannot be, or takes a function of what is no plain number.
-    """
+    """Return what an expression measures."""
     return _Walk(expression.text, dimensions).of(expression.tree)
 
 

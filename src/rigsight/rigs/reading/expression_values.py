@@ -17,20 +17,7 @@ _LARGEST = 1e300
 
 
 def to_sympy(expression: Expression, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
-    """Return an expression as sympy sees it.
-
-    Parameters
-    ----------
-    expression
-        Parsed.
-    symbols
-        What each name, and each rate as ``"d(name)"``, stands for.
-
-    Raises
-    ------
-    ExpressionError
-        If a name stands for nothing, or a number is none: too large, a root of what is negative, a division by zero.
-    """
+    """Return an expression as sympy sees it."""
     built = _built(expression.tree, symbols)
     if built.has(sp.I, sp.nan, sp.zoo, sp.oo):
         raise ExpressionError("this has no real value")

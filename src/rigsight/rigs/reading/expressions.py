@@ -55,18 +55,10 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed expression.
+    """A parsed expression."""
 
-    Attributes
-    ----------
-    text
-        As it was written.
-    tree
-        Its syntax.
-    """
-
-    text: str
-    tree: Tree[Token]
+    text: str  # as it was written
+    tree: Tree[Token]  # its syntax
 
     @property
     def reads(self) -> dict[str, int]:
@@ -79,13 +71,7 @@ class Expression:
 
 
 def parsed(text: str) -> Expression:
-    """Return the syntax of an expression.
-
-    Raises
-    ------
-    ExpressionError
-        If the text is none, or calls something that is not known.
-    """
+    """Return the syntax of an expression."""
     if len(text) > _LONGEST:
         raise ExpressionError(f"an expression may have {_LONGEST} characters, this one has {len(text)}")
     depth = deepest = 0

@@ -12,21 +12,12 @@ from rigsight.effects.symbols import positive_part
 
 @dataclass(frozen=True)
 class Function:
-    """A function that expressions may call.
+    """A function that expressions may call."""
 
-    Attributes
-    ----------
-    arguments
-        How many it takes, for messages: their names.
-    build
-        The expression it stands for.
-    kind
-        ``"pure"`` takes and gives plain numbers, ``"same"`` takes one unit and gives it, ``"sign"`` takes any unit and gives a
-        plain number, ``"root"`` gives the root of its unit.
-    """
-
-    arguments: tuple[str, ...]
-    build: Callable[..., sp.Expr]
+    arguments: tuple[str, ...]  # how many it takes, for messages: their names
+    build: Callable[..., sp.Expr]  # the expression it stands for
+    # ``"pure"`` takes and gives plain numbers, ``"same"`` takes one unit and gives it, ``"sign"`` takes any
+    # unit and gives a plain number, ``"root"`` gives the root of its unit.
     kind: str
 
 

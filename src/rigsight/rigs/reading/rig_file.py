@@ -44,24 +44,7 @@ def read_rig_file(path: Path) -> Rig:
 def rig_of_text(
     text: str, source: str = "rig file", *, check_units: bool = True, folder: Path | None = None
 ) -> Rig:
-    """Return the rig that a text declares.
-
-    Parameters
-    ----------
-    text
-        TOML.
-    source
-        How messages call it.
-    check_units
-        False for a text whose units are known to add up.
-    folder
-        In which the model of a simulator is looked for.
-
-    Raises
-    ------
-    InputError
-        As `read_rig_file`.
-    """
+    """Return the rig that a text declares."""
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

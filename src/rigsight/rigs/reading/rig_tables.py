@@ -131,13 +131,7 @@ _FORMULA = "constrained-str"
 
 
 def path_and_sentence(error: Any) -> tuple[tuple[str | int, ...], str]:
-    """Return the path of what pydantic found, and one sentence for it.
-
-    Parameters
-    ----------
-    error
-        One of the ``errors()`` of a ValidationError of `RigTable`.
-    """
+    """Return the path of what pydantic found, and one sentence for it."""
     path = tuple(error["loc"])
     key = str(path[-1]) if path else ""
     if error["type"] == "extra_forbidden":

@@ -10,15 +10,7 @@ _OF_A_JOINT = {"stiffness": "force x^-1", "damping": "force time x^-1", "rest": 
 
 
 def sized_by(name: str, unit: str, mechanism: Mechanism) -> str:
-    """Return the dimension text (`rigsight.units`) of a parameter on a rig with one joint; ``""`` where nothing tells its size.
-
-    Parameters
-    ----------
-    name, unit
-        Of the parameter.
-    mechanism
-        The rig's equations.
-    """
+    """Return the dimension (`rigsight.units`) of a parameter on a rig with one joint; ``""`` where nothing sets its size."""
     if len(mechanism.joints) == 1 and len(mechanism.coordinates) == 1:
         joint = mechanism.joints[0]
         for part, dimension in _OF_A_JOINT.items():

@@ -9,13 +9,7 @@ from rigsight.rigs.reading.declaration import Declaration, Path
 
 
 def signal_order(declaration: Declaration) -> list[Path]:
-    """Return the paths of signals, drives and sensors so that each reads only those in front of it.
-
-    Raises
-    ------
-    InputError
-        If some read each other in a loop without a state in it.
-    """
+    """Return the paths of signals, drives and sensors so that each reads only those in front of it."""
     table = declaration.table
     own: dict[str, Path] = {
         **{name: ("signals", name) for name in table.signals},

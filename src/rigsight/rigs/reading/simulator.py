@@ -14,13 +14,7 @@ _KEY = "simulator"
 
 
 def check_simulator(declaration: Declaration) -> None:
-    """Refuse a simulator of an unknown kind, and names in its table that are not declared.
-
-    Raises
-    ------
-    InputError
-        With the place of the name.
-    """
+    """Refuse a simulator of an unknown kind, and names in its table that are not declared."""
     table, own = declaration.table, declaration.table.simulator
     if own is None:
         return
@@ -66,13 +60,7 @@ def check_simulator(declaration: Declaration) -> None:
 
 
 def simulated_bodies(declaration: Declaration) -> Bodies | None:
-    """Return the bodies that a rig file leaves to another program, or None; the program is opened to see that it has them.
-
-    Raises
-    ------
-    InputError
-        With the place of the simulator's file, if it or a name in it cannot be found.
-    """
+    """Return the bodies that a rig file leaves to another program, or None; the program is opened to see that it has them."""
     table, own = declaration.table, declaration.table.simulator
     if own is None:
         return None
@@ -96,15 +84,7 @@ def simulated_bodies(declaration: Declaration) -> Bodies | None:
 
 
 def with_whole_path(content: dict[str, object], folder: Path) -> dict[str, object]:
-    """Return the tables of a rig file with the simulator's model by its absolute path, so that results find it.
-
-    Parameters
-    ----------
-    content
-        The tables.
-    folder
-        Of the rig file.
-    """
+    """Return the tables of a rig file with the simulator's model by its absolute path, so that results find it."""
     own = content.get(_KEY)
     if not isinstance(own, dict) or own.get("kind") == "python" or not isinstance(own.get("file"), str):
         return content

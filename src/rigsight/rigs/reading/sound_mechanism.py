@@ -11,13 +11,7 @@ from rigsight.rigs.reading.mass import dependent_coordinates, is_quadratic, nega
 
 
 def check_mechanism(declaration: Declaration, mechanism: Mechanism) -> None:
-    """Refuse a mechanism whose equations cannot be solved, or in which something is read or acts in vain.
-
-    Raises
-    ------
-    InputError
-        With the place of the expression.
-    """
+    """Refuse a mechanism whose equations cannot be solved, or in which something is read or acts in vain."""
     # An FMU is a program, and reading a rig file runs none.
     if mechanism.bodies is None or mechanism.bodies.kind != "fmu":
         _check_mass(declaration, mechanism)

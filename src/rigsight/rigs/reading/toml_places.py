@@ -21,11 +21,6 @@ def value_places(text: str) -> dict[Path, Place]:
     """Return the line and column, from 1, of every value by its path of keys, and of every table's header by its own.
 
     Values within arrays have no place of their own.
-
-    Parameters
-    ----------
-    text
-        Valid TOML.
     """
     places: dict[Path, Place] = {}
     table: Path = ()

@@ -13,27 +13,13 @@ from rigsight.robots.drafting.naming import Names
 
 @dataclass(frozen=True)
 class Field:
-    """A number of a MuJoCo model: attribute of an element, and which of several numbers it is.
+    """A number of a MuJoCo model: attribute of an element, and which of several numbers it is."""
 
-    Attributes
-    ----------
-    element
-        ``"joint"``, ``"actuator"`` or ``"body"``.
-    index
-        Its number in the model.
-    attribute
-        As MuJoCo's XML calls it.
-    entry
-        Which number of an attribute of several.
-    sign
-        -1 where a rig file and MuJoCo count it the other way.
-    """
-
-    element: str
-    index: int
-    attribute: str
-    entry: int = 0
-    sign: float = 1.0
+    element: str  # ``"joint"``, ``"actuator"`` or ``"body"``
+    index: int  # its number in the model
+    attribute: str  # as MuJoCo's XML calls it
+    entry: int = 0  # which number of an attribute of several
+    sign: float = 1.0  # -1 where a rig file and MuJoCo count it the other way
 
 
 class DeclaredNumbers:

@@ -30,18 +30,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gear:
-    """The gear between the rotor of a joint and the moved body.
+    """The gear between the rotor of a joint and the moved body."""
 
-    Attributes
-    ----------
-    joint
-        Number of the joint in the model.
-    coordinate
-        Deflection of the gear.
-    """
-
-    joint: int
-    coordinate: str
+    joint: int  # number of the joint in the model
+    coordinate: str  # deflection of the gear
 
 
 @dataclass(frozen=True)
@@ -106,24 +98,6 @@ def draft_rig(
 
     Damping, dry friction, stiffness and armature of joints are parameters, masses, lengths and gains constants. Bodies that are
     simulated in MuJoCo have no masses and lengths in the rig file, and all their constraints are kept.
-
-    Parameters
-    ----------
-    model
-        Compiled.
-    name
-        Name of the rig.
-    with_drives
-        Give a model without actuators a force or torque at every joint: a URDF has none.
-    gears
-        Name of a joint -> stiffness of its gear, through which its rotor moves the body; other joints move it rigidly.
-    as_it_is
-        Path of the model's file, as the rig file is to name it, if its bodies are left to MuJoCo.
-
-    Raises
-    ------
-    InputError
-        If a joint is no hinge or slide, nothing moves, or a joint cannot have a gear.
     """
     names, notes = Names(), []
     numbers = DeclaredNumbers(names)

@@ -15,27 +15,18 @@ from rigsight.robots.reading.tree import TreeJoint
 
 @dataclass(frozen=True)
 class DriveTables:
-    """A drive with what belongs to it.
+    """A drive with what belongs to it."""
 
-    Attributes
-    ----------
-    name, table
-        ``[drives.NAME]``.
-    told, control
-        ``[inputs.NAME]``, its command.
-    index, control_index
-        Numbers of the actuator and of its control; -1 for a drive that was added.
-    states
-        ``[states.NAME]`` by name.
-    """
-
+    # ``[drives.NAME]``.
     name: str
     table: Mapping[str, Any]
+    # ``[inputs.NAME]``, its command.
     told: str
     control: Mapping[str, Any]
+    # Numbers of the actuator and of its control; -1 for a drive that was added.
     index: int = -1
     control_index: int = -1
-    states: Mapping[str, Any] = field(default_factory=dict)
+    states: Mapping[str, Any] = field(default_factory=dict)  # ``[states.NAME]`` by name
 
 
 def plain_drive(joint: TreeJoint, coordinate: str, names: Names) -> DriveTables:
@@ -57,15 +48,6 @@ def drive_of(
 
     Its signal is the control, as MuJoCo delays and limits that: effects of the actuator act in front of the position or velocity
     controller.
-
-    Parameters
-    ----------
-    actuator, joint
-        The actuator and its joint.
-    coordinate
-        Name of the joint's coordinate.
-    names, numbers
-        Where names are taken and numbers declared.
     """
     # Actuators are mostly called as their joints are.
     wished = f"{coordinate}_motor" if actuator.name in ("", coordinate) else actuator.name

@@ -21,22 +21,13 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class _Frame:
-    """Where a body is carried to: all in its own frame.
+    """Where a body is carried to: all in its own frame."""
 
-    Attributes
-    ----------
-    turning, moving
-        Angular velocity, and velocity of its origin.
-    up
-        Against gravity, times its acceleration.
-    lift
-        Potential energy of its origin per mass.
-    """
-
+    # Angular velocity, and velocity of its origin.
     turning: sp.Matrix
     moving: sp.Matrix
-    up: sp.Matrix
-    lift: sp.Expr
+    up: sp.Matrix  # against gravity, times its acceleration
+    lift: sp.Expr  # potential energy of its origin per mass
 
     @property
     def is_still(self) -> bool:
@@ -55,18 +46,12 @@ class _Frame:
 
 @dataclass
 class Energies:
-    """The energies, and the signals that they are made of.
+    """The energies, and the signals that they are made of."""
 
-    Attributes
-    ----------
-    kinetic, potential
-        One term for each body.
-    signals
-        Name -> expression, each behind those that it reads.
-    """
-
+    # One term for each body.
     kinetic: list[sp.Expr] = field(default_factory=list)
     potential: list[sp.Expr] = field(default_factory=list)
+    # Name -> expression, each behind those that it reads.
     signals: dict[str, sp.Expr] = field(default_factory=dict)
 
 
@@ -77,21 +62,7 @@ def energies_of(
     gravity: Floats,
     numbers: DeclaredNumbers,
 ) -> Energies:
-    """Return the energies of a tree.
-
-    Parameters
-    ----------
-    bodies
-        Behind their parents.
-    names
-        What each of them is called.
-    coordinates
-        Symbol of each joint's coordinate, by its index.
-    gravity
-        Acceleration of gravity in the frame of the world [m/s^2], shape (3,).
-    numbers
-        Where lengths, masses and inertias are declared.
-    """
+    """Return the energies of a tree."""
     found = Energies()
     up = [_gravity(gravity, axis, numbers) for axis in range(3)]
     frames = {0: _Frame(sp.zeros(3, 1), sp.zeros(3, 1), sp.Matrix(up), sp.S.Zero)}

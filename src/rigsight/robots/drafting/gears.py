@@ -25,22 +25,7 @@ _DAMPING_RATIO = 0.1
 def split_joints(
     model: mujoco.MjModel, bodies: Sequence[TreeBody], gears: Mapping[str, float]
 ) -> tuple[tuple[TreeBody, ...], dict[int, TreeJoint]]:
-    """Return the bodies with a second joint behind each that has a gear, and these by the number of the first.
-
-    Parameters
-    ----------
-    model
-        Compiled.
-    bodies
-        Its bodies.
-    gears
-        Name of a joint -> stiffness of its gear.
-
-    Raises
-    ------
-    InputError
-        If there is no such joint, its stiffness is not positive, or it has no armature.
-    """
+    """Return the bodies with a second joint behind each that has a gear, and these by the number of the first."""
     joints = {joint.name: joint for body in bodies for joint in body.joints}
     for name, stiffness in gears.items():
         if name not in joints:
@@ -73,21 +58,7 @@ def split_joints(
 def gear_table(
     model: mujoco.MjModel, joint: TreeJoint, name: str, play: str, stiffness: float, numbers: DeclaredNumbers
 ) -> dict[str, Any]:
-    """Return ``[joints.NAME_gear]``, with its stiffness and damping declared as parameters.
-
-    Parameters
-    ----------
-    model
-        Compiled.
-    joint
-        The joint that has the gear.
-    name, play
-        Its coordinate, and that of the second joint.
-    stiffness
-        Of the gear.
-    numbers
-        Where they are declared.
-    """
+    """Return ``[joints.NAME_gear]``, with its stiffness and damping declared as parameters."""
     force, way = force_unit(joint), way_unit(joint)
     damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * float(model.dof_armature[joint.dof]))
     return {

@@ -30,17 +30,6 @@ def joint_table(
 
     The inertia that moves with it is that of the model as it is drawn. Effects that read one, a flexible mode, take it for
     constant.
-
-    Parameters
-    ----------
-    model
-        Compiled.
-    joint
-        One of its joints.
-    name
-        Of its coordinate.
-    numbers
-        Where they are declared.
     """
     way, force = way_unit(joint), force_unit(joint)
     table: dict[str, Any] = {"motion": name}

@@ -17,15 +17,7 @@ class Names:
         self._taken = {*FUNCTIONS, "t", "d", "force"}
 
     def free(self, wished: str, otherwise: str = "part") -> str:
-        """Return the requested name if it is valid and free, or a similar one.
-
-        Parameters
-        ----------
-        wished
-            As MuJoCo calls it.
-        otherwise
-            Beginning of the name if that contains no letter.
-        """
+        """Return the requested name if it is valid and free, or a similar one."""
         name = re.sub(r"\W+", "_", wished, flags=re.ASCII).strip("_")[:_LONGEST] or otherwise
         name = name if not name[0].isdigit() else f"{otherwise}_{name}"
         found, count = name, 1

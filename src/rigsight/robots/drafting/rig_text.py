@@ -10,22 +10,7 @@ from rigsight.robots.drafting.draft import RigDraft
 
 
 def rig_text(draft: RigDraft, source: str, folder: Path) -> str:
-    """Return the text of a rig file.
-
-    Parameters
-    ----------
-    draft
-        The rig of a model.
-    source
-        How the text calls the file of the model.
-    folder
-        Where the text will stand.
-
-    Raises
-    ------
-    InputError
-        If what writes TOML is not installed.
-    """
+    """Return the text of a rig file."""
     try:
         import tomli_w
     except ImportError:

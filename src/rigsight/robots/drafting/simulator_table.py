@@ -20,24 +20,7 @@ def simulator_table(
     joints: Sequence[tuple[TreeJoint, str]],
     fields: Mapping[str, tuple[Field, ...]],
 ) -> dict[str, Any]:
-    """Return the table.
-
-    Parameters
-    ----------
-    model
-        Compiled.
-    file
-        Absolute path of its file.
-    joints
-        Its joints with the names of their coordinates.
-    fields
-        Parameter -> the numbers of the model that it stands for.
-
-    Raises
-    ------
-    InputError
-        If a joint has no name.
-    """
+    """Return the table."""
     for joint, _ in joints:
         if not joint.name:
             raise InputError(

@@ -11,34 +11,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TreeActuator:
-    """An actuator at a hinge or slide joint: ``gear * clip(gain * a + bias_0 + bias_1 * length + bias_2 * speed)``.
+    """An actuator at a hinge or slide joint: ``gear * clip(gain * a + bias_0 + bias_1 * length + bias_2 * speed)``."""
 
-    Attributes
-    ----------
-    index, control, joint
-        Its number in the model, and those of its control and its joint.
-    name
-        As MuJoCo calls it; empty without a name.
-    gear
-        Its length is so many times the coordinate, its force at the joint so many times its own.
-    gain, bias
-        Numbers of the law; a is the control, or what a filter makes of it.
-    control_range, force_range
-        Where the control and the force end; None without an end.
-    time_constant
-        Of the filter between the control and a [s]; 0 without one.
-    """
-
+    # Its number in the model, and those of its control and its joint.
     index: int
     control: int
     joint: int
-    name: str
-    gear: float
+    name: str  # as MuJoCo calls it; empty without a name
+    gear: float  # its length is so many times the coordinate, its force at the joint so many times its own
+    # Numbers of the law; a is the control, or what a filter makes of it.
     gain: float
     bias: tuple[float, float, float]
+    # Where the control and the force end; None without an end.
     control_range: tuple[float, float] | None
     force_range: tuple[float, float] | None
-    time_constant: float
+    time_constant: float  # of the filter between the control and a [s]; 0 without one
 
     @property
     def holds_position(self) -> bool:

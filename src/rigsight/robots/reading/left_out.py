@@ -13,15 +13,7 @@ _LISTED = 3
 
 
 def left_out_of(model: mujoco.MjModel, *, as_it_is: bool = False) -> list[str]:
-    """Return descriptions of what is not taken over of a model, apart from its actuators and sensors.
-
-    Parameters
-    ----------
-    model
-        Compiled.
-    as_it_is
-        True if its bodies stay in MuJoCo, and with them all that binds them.
-    """
+    """Return descriptions of what is not taken over of a model, apart from its actuators and sensors."""
     found = [f"the option that switches off {what}, which the rig has" for what in _switched_off(model)]
     if not as_it_is:
         found += _between_bodies(model)

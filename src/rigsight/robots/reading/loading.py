@@ -16,13 +16,7 @@ LARGEST_FILE = 20_000_000
 
 
 def load_model(path: Path) -> mujoco.MjModel:
-    """Return the model of an MJCF or URDF file.
-
-    Raises
-    ------
-    InputError
-        As `load_spec`.
-    """
+    """Return the model of an MJCF or URDF file."""
     return load_spec(path).compile()
 
 
@@ -30,11 +24,6 @@ def load_spec(path: Path) -> mujoco.MjSpec:
     """Return the content of an MJCF or URDF file as a specification that can be changed and compiled.
 
     Where a mesh is missing, shapes are left out of bodies that have an inertia of their own: only what moves is taken over.
-
-    Raises
-    ------
-    InputError
-        If MuJoCo is not installed, the file is missing, or MuJoCo cannot compile it.
     """
     try:
         import mujoco

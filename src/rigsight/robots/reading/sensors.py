@@ -13,37 +13,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TreeSensor:
-    """A sensor that reads so many times the coordinate of a joint, or its rate.
+    """A sensor that reads so many times the coordinate of a joint, or its rate."""
 
-    Attributes
-    ----------
-    index, joint
-        Its number in the model, and that of its joint.
-    name
-        As MuJoCo calls it; empty without a name.
-    factor
-        1, or the gear of an actuator.
-    is_rate
-        True if it reads the rate.
-    """
-
+    # Its number in the model, and that of its joint.
     index: int
     joint: int
-    name: str
-    factor: float
-    is_rate: bool
+    name: str  # as MuJoCo calls it; empty without a name
+    factor: float  # 1, or the gear of an actuator
+    is_rate: bool  # true if it reads the rate
 
 
 def sensors_of(model: mujoco.MjModel, actuators: list[TreeActuator]) -> tuple[list[TreeSensor], list[str]]:
-    """Return the sensors that a rig file can represent, and descriptions of the others.
-
-    Parameters
-    ----------
-    model
-        The model.
-    actuators
-        Those that are taken over.
-    """
+    """Return the sensors that a rig file can represent, and descriptions of the others."""
     import mujoco
 
     sort = mujoco.mjtSensor

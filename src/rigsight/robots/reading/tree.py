@@ -22,65 +22,35 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class TreeJoint:
-    """A hinge or slide joint.
+    """A hinge or slide joint."""
 
-    Attributes
-    ----------
-    index, dof
-        Its numbers in the model, and that of its degree of freedom.
-    name
-        As MuJoCo calls it; empty without a name.
-    slides
-        True for a slide, False for a hinge.
-    axis, anchor
-        In the frame of its body, shape (3,) each.
-    reference
-        Coordinate at which the body stands as the model draws it.
-    """
-
+    # Its numbers in the model, and that of its degree of freedom.
     index: int
     dof: int
-    name: str
-    slides: bool
+    name: str  # as MuJoCo calls it; empty without a name
+    slides: bool  # true for a slide, False for a hinge
+    # In the frame of its body, shape (3,) each.
     axis: Floats
     anchor: Floats
-    reference: float
+    reference: float  # coordinate at which the body stands as the model draws it
 
 
 @dataclass(frozen=True)
 class TreeBody:
-    """A body and how it hangs on its parent.
+    """A body and how it hangs on its parent."""
 
-    Attributes
-    ----------
-    index, parent
-        Its number in the model, and that of its parent; 0 is the world.
-    name
-        As MuJoCo calls it; empty without a name.
-    position, rotation
-        Of its frame in that of its parent, shapes (3,) and (3, 3).
-    mass
-        Mass [kg].
-    weight
-        Part of it that gravity acts on: less where the model compensates gravity.
-    center
-        Center of mass in its own frame, shape (3,).
-    inertia
-        About its center, along the axes of its own frame, shape (3, 3).
-    joints
-        In the order in which they move it.
-    """
-
+    # Its number in the model, and that of its parent; 0 is the world.
     index: int
     parent: int
-    name: str
+    name: str  # as MuJoCo calls it; empty without a name
+    # Of its frame in that of its parent, shapes (3,) and (3, 3).
     position: Floats
     rotation: Floats
-    mass: float
-    weight: float
-    center: Floats
-    inertia: Floats
-    joints: tuple[TreeJoint, ...]
+    mass: float  # mass [kg]
+    weight: float  # part of it that gravity acts on: less where the model compensates gravity
+    center: Floats  # center of mass in its own frame, shape (3,)
+    inertia: Floats  # about its center, along the axes of its own frame, shape (3, 3)
+    joints: tuple[TreeJoint, ...]  # in the order in which they move it
 
 
 def bodies_of(model: mujoco.MjModel) -> tuple[TreeBody, ...]:

@@ -17,21 +17,11 @@ _LINEAR = 1
 
 @dataclass(frozen=True)
 class EffectField:
-    """Where an effect is written.
+    """Where an effect is written."""
 
-    Attributes
-    ----------
-    element
-        ``"joint"``, ``"actuator"`` or ``"sensor"``.
-    attribute
-        For people.
-    write
-        Does it.
-    """
-
-    element: str
-    attribute: str
-    write: Write
+    element: str  # ``"joint"``, ``"actuator"`` or ``"sensor"``
+    attribute: str  # for people
+    write: Write  # does it
 
 
 def _added(attribute: str, own: str, entry: int | None = None) -> Write:

@@ -39,22 +39,7 @@ class _Settings:
 
 
 def isaac_settings(model: Model, source: Path, step: float | None = None) -> WrittenBack:
-    """Return the YAML of Isaac Lab's actuators for a model that was made from an MJCF or URDF file.
-
-    Parameters
-    ----------
-    model
-        Identified, or with the effects that a diagnosis named.
-    source
-        The file that ``rigsight init --mjcf`` read.
-    step
-        Step of the physics [s], of which delays are whole numbers; default is the file's.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or the rig has places that are not in it.
-    """
+    """Return the YAML of Isaac Lab's actuators for a model that was made from an MJCF or URDF file."""
     try:
         import yaml
     except ImportError:

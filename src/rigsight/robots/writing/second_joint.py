@@ -20,15 +20,7 @@ _IMPEDANCE = 0.01
 
 
 def with_gears(spec: mujoco.MjSpec, draft: RigDraft) -> mujoco.MjModel:
-    """Return the compiled model with the second joint of each gear, as a spring.
-
-    Parameters
-    ----------
-    spec
-        The model, which is changed.
-    draft
-        Its rig.
-    """
+    """Return the compiled model with the second joint of each gear, as a spring."""
     joints = {joint.id: joint for joint in spec.joints}
     for place, gear in draft.gears.items():
         add_second_joint(
@@ -46,17 +38,6 @@ def add_second_joint(spec: mujoco.MjSpec, first: Any, stiffness: float, damping:
 
     Without play it is a spring. With play the spring acts beyond a range, as the limit of the joint, whose stiffness MuJoCo
     counts by the inertia that it moves.
-
-    Parameters
-    ----------
-    spec
-        The model, which can be compiled.
-    first
-        Joint of the rotor.
-    stiffness, damping
-        Of the gear.
-    play
-        Half of the play.
     """
     import mujoco
 

@@ -23,38 +23,15 @@ _SAME = 1e-12
 
 @dataclass(frozen=True)
 class WrittenBack:
-    """A MuJoCo model with the parameter values and effects of another model.
+    """A MuJoCo model with the parameter values and effects of another model."""
 
-    Attributes
-    ----------
-    text
-        MJCF.
-    written
-        Descriptions of the changed fields.
-    without_field
-        Descriptions of what MuJoCo has no field for.
-    """
-
-    text: str
-    written: tuple[str, ...]
-    without_field: tuple[str, ...]
+    text: str  # MJCF
+    written: tuple[str, ...]  # descriptions of the changed fields
+    without_field: tuple[str, ...]  # descriptions of what MuJoCo has no field for
 
 
 def write_back(model: Model, source: Path) -> WrittenBack:
-    """Return the MuJoCo model of a file with the numbers and effects of a rig that was made from it.
-
-    Parameters
-    ----------
-    model
-        Identified, or with the effects that a diagnosis named.
-    source
-        The MJCF or URDF file that ``rigsight init --mjcf`` read.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or the rig has places that are not in it.
-    """
+    """Return the MuJoCo model of a file with the numbers and effects of a rig that was made from it."""
     robot = read_for(model, source)
     structure = model.structure
     own = frozenset(structure.parameter_name(e, p.name) for e in structure.effects for p in e.parameters)
@@ -69,13 +46,7 @@ def write_back(model: Model, source: Path) -> WrittenBack:
 
 
 def read_for(model: Model, source: Path) -> RobotFile:
-    """Return the robot of a file with the gears that a rig which was made from it has.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or the model's rig has places that are not in it.
-    """
+    """Return the robot of a file with the gears that a rig which was made from it has."""
     robot = read_robot(source)
     places = {joint.name for joint in model.structure.rig.mechanism.joints}
     gears = {

@@ -18,24 +18,15 @@ from rigsight.simulate.equations.straight_line import straight_line
 
 @dataclass(frozen=True)
 class EliminatedForms:
-    """Changes of expressions that contain accelerations.
+    """Changes of expressions that contain accelerations."""
 
-    Attributes
-    ----------
-    factors
-        Symbol -> the derivative or part of the elimination that it denotes; they are the same for all changes.
-    parts
-        Symbols in the factors -> their expressions, in any order.
-    steps
-        Symbols in the sums -> their expressions in factors, constants and changes: the changes of the accelerations.
-    sums
-        Change of each expression, in terms of factors, constants, changes and steps.
-    """
-
+    # Symbol -> the derivative or part of the elimination that it denotes; they are the same for all changes.
     factors: Mapping[sp.Symbol, sp.Expr]
-    parts: Mapping[sp.Symbol, sp.Expr]
+    parts: Mapping[sp.Symbol, sp.Expr]  # symbols in the factors -> their expressions, in any order
+    # Symbols in the sums -> their expressions in factors, constants and changes: the changes of the
+    # accelerations.
     steps: Mapping[sp.Symbol, sp.Expr]
-    sums: tuple[sp.Expr, ...]
+    sums: tuple[sp.Expr, ...]  # change of each expression, in terms of factors, constants, changes and steps
 
 
 def eliminated_forms(
@@ -45,21 +36,7 @@ def eliminated_forms(
     elimination: Elimination,
     steps: Mapping[sp.Symbol, sp.Expr],
 ) -> EliminatedForms:
-    """Return the changes of expressions with accelerations due to changes of symbols, with all signs held constant.
-
-    Parameters
-    ----------
-    expressions
-        The expressions.
-    changes
-        Symbol -> its change.
-    constants
-        Symbols that may appear in the sums themselves.
-    elimination
-        The elimination that gives the accelerations.
-    steps
-        Masses, loads and the steps of the elimination.
-    """
+    """Return the changes of expressions with accelerations due to changes of symbols, with all signs held constant."""
     n, begun = elimination.size, elimination.begun(steps)
     by = [*changes, *elimination.accelerations]
     whole = straight_line([*elimination.left, *expressions], begun)

@@ -120,32 +120,7 @@ class Kernel:
         n_samples: int,
         steps: NDArray[np.intc] | None = None,
     ) -> tuple[int, Floats, Floats]:
-        """Advance one parameter set accurately.
-
-        Parameters
-        ----------
-        held
-            Input between its samples.
-        p
-            Parameters, shape (n_parameters,).
-        state
-            States at the start, shape (n_states,).
-        tolerance
-            Error allowed per step, relative to the largest excursion of each state.
-        n_samples
-            Samples of the input.
-        steps
-            Array for the number of steps taken in each piece of the input, shape (n_pieces,).
-
-        Returns
-        -------
-        status
-            0 for success; 1 too many steps, 2 diverging motion, 3 not enough memory.
-        out
-            Computed outputs at each sample, shape (n_samples, n_computed).
-        state
-            States at the end, shape (n_states,).
-        """
+        """Advance one parameter set accurately."""
         c, p = _doubles(held.coefficients), _doubles(p)
         x = np.zeros(self._n_states)
         x[: state.size] = state
@@ -161,25 +136,7 @@ class Kernel:
     def simulate_lanes(
         self, held: HeldInput, p: Floats, states: Floats, substeps: NDArray[np.intc], n_samples: int
     ) -> Floats:
-        """Advance many parameter sets side by side.
-
-        Parameters
-        ----------
-        held
-            Input between its samples.
-        p
-            Parameters, shape (n_parameters, n_sets).
-        states
-            States at the start, shape (n_states, n_sets).
-        substeps
-            Runge-Kutta steps in each piece of the input, shape (n_pieces,).
-        n_samples
-            Samples of the input.
-
-        Returns
-        -------
-        Shape (n_samples, n_computed, n_sets); NaN or infinity for a set that diverges.
-        """
+        """Advance many parameter sets side by side."""
         c, p = _doubles(held.coefficients), _doubles(p)
         n_sets = p.shape[1]
         x = np.zeros((self._n_states, n_sets))
@@ -193,27 +150,7 @@ class Kernel:
         return out
 
     def normal_equations(self, records: Sequence[FittedRecord], p: Floats, states: Floats) -> Floats:
-        """Simulate parameter sets on records, and return the products that least squares needs.
-
-        Parameters
-        ----------
-        records
-            The fitted records.
-        p
-            Parameters, shape (n_parameters, n_sets).
-        states
-            States at the start, shape (n_records, n_states, n_sets).
-
-        Returns
-        -------
-        Shape (n_records, n_sets, n_sets): products, summed over outputs and samples, of the weighted residual of the first set
-        and of the weighted outputs of the first set minus those of each other one; NaN or infinity for a set that diverges.
-
-        Raises
-        ------
-        MachineError
-            If there is no memory.
-        """
+        """Simulate parameter sets on records, and return the products that least squares needs."""
         n_sets = p.shape[1]
         x = np.zeros((len(records), self._n_states, n_sets))
         x[:, : states.shape[1]] = states
@@ -232,31 +169,7 @@ class Kernel:
     def tangent_equations(
         self, records: Sequence[FittedRecord], p: Floats, dp: Floats, states: Floats, dstates: Floats
     ) -> Floats:
-        """Simulate one parameter set on records with its derivatives, and return the products that least squares needs.
-
-        Parameters
-        ----------
-        records
-            The fitted records.
-        p
-            Parameters, shape (n_parameters,).
-        dp
-            Their derivatives along each direction, shape (n_parameters, n_directions).
-        states
-            States at the start, shape (n_records, n_states).
-        dstates
-            Their derivatives, shape (n_states, n_directions); the same for all records.
-
-        Returns
-        -------
-        Shape (n_records, 1 + n_directions, 1 + n_directions): products, summed over outputs and samples, of the weighted
-        residual and its derivatives; NaN or infinity if the simulation diverges.
-
-        Raises
-        ------
-        MachineError
-            If there is no memory.
-        """
+        """Simulate one parameter set on records with its derivatives, and return the products that least squares needs."""
         width = 1 + dp.shape[1]
         products = np.empty((len(records), width, width))
         self._carry(records, p, dp, states, dstates, products.ctypes.data, None)
@@ -266,30 +179,7 @@ class Kernel:
         self, held: HeldInput, p: Floats, dp: Floats, state: Floats, dstate: Floats,
         substeps: NDArray[np.intc], n_samples: int,
     ) -> Floats:  # fmt: skip
-        """Simulate one parameter set with its derivatives.
-
-        Parameters
-        ----------
-        held
-            Input between its samples.
-        p, dp
-            As for `tangent_equations`.
-        state, dstate
-            States at the start, shape (n_states,), and their derivatives, shape (n_states, n_directions).
-        substeps
-            Runge-Kutta steps in each piece of the input, shape (n_pieces,).
-        n_samples
-            Samples of the input.
-
-        Returns
-        -------
-        Shape (n_samples, n_computed, 1 + n_directions): computed outputs at each sample, and their derivatives.
-
-        Raises
-        ------
-        MachineError
-            If there is no memory.
-        """
+        """Simulate one parameter set with its derivatives."""
         out = np.empty((n_samples, self._n_computed, 1 + dp.shape[1]))
         record = FittedRecord(held, substeps, np.zeros((0, self._n_computed)), np.zeros(self._n_computed))
         self._carry([record], p, dp, state[None], dstate, None, out.ctypes.data)

@@ -21,15 +21,7 @@ _made: dict[str, threading.Lock] = {}
 
 
 def kernel_of(structure: Structure) -> Kernel:
-    """Return the compiled kernels of a structure, compiling them if this machine has not yet done so.
-
-    Raises
-    ------
-    InputError
-        If there is no C compiler.
-    MachineError
-        If the cache folder cannot be written, or the compiler fails.
-    """
+    """Return the compiled kernels of a structure, compiling them if this machine has not yet done so."""
     known = _loaded(structure)
     if known is not None:
         return known

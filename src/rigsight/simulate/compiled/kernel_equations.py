@@ -55,15 +55,7 @@ class KernelEquations:
         self.limits = dict(zip(limited_states, self._groups["limits"], strict=True))
 
     def text(self, parameters: str, parameter_names: Sequence[str]) -> str:
-        """Return the part of a C file that contains the equations.
-
-        Parameters
-        ----------
-        parameters
-            Declaration of the parameters in a function, ``const double *p``.
-        parameter_names
-            Name of each parameter in the code, ``p[0]``.
-        """
+        """Return the part of a C file that contains the equations."""
         structure, frictions = self.structure, self.frozen.frictions
         single, dependent = self.frozen.single_friction, self.frozen.dependent_modes
         n_states, n_modes, n_late = len(structure.states), len(self.frozen.modes), len(structure.histories)

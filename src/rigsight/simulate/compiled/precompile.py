@@ -8,18 +8,5 @@ from rigsight.simulate.equations.structure import Structure
 
 
 def compile_kernels(structure: Structure) -> None:
-    """Compile the kernels of a structure and keep them on disk.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-
-    Raises
-    ------
-    InputError
-        If there is no C compiler.
-    MachineError
-        If the cache folder cannot be written, or the compiler fails.
-    """
+    """Compile the kernels of a structure and keep them on disk."""
     kernel_of(structure)

@@ -15,15 +15,7 @@ from rigsight.simulate.equations.straight_line import StraightLine, in_order, of
 
 
 def slopes_of(line: StraightLine, by: Sequence[sp.Symbol]) -> StraightLine:
-    """Return the derivatives of each expression, evaluated in parts, with respect to each of some arguments.
-
-    Parameters
-    ----------
-    line
-        The expressions.
-    by
-        The arguments; the derivative of a sign is taken as zero.
-    """
+    """Return the derivatives of each expression, evaluated in parts, with respect to each of some arguments."""
     own = {key: _own_slopes(expression, {*line.parts, *by}) for key, expression in line.parts.items()}
     shown = [_own_slopes(result, {*line.parts, *by}) for result in line.results]
     parts, columns = dict(line.parts), []

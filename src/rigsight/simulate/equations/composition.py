@@ -185,13 +185,6 @@ def without_vanished_effects(
     """Leave out the effects whose parameters are at the values at which they vanish.
 
     A vanished lag would divide by its time constant, and every vanished kink would still cost events.
-
-    Returns
-    -------
-    structure
-        The structure without them; the same object if none has vanished.
-    values
-        Value of each of its parameters, by its name in that structure.
     """
     known = {**dict(structure.fixed), **values}
 

@@ -37,15 +37,7 @@ class DefinedSignals:
         """Expressions of signals, drives and sensors, by the symbols that denote them in the rig."""
 
     def stands_for(self, symbol: sp.Symbol, expression: sp.Expr) -> None:
-        """From here on an expression stands for a drive or a sensor.
-
-        Parameters
-        ----------
-        symbol
-            Denotes the drive or the sensor in the rig.
-        expression
-            Its signal after the effects on it.
-        """
+        """From here on an expression stands for a drive or a sensor."""
         self._values[symbol] = expression
 
     def bound(self, expression: sp.Expr) -> sp.Expr:

@@ -34,43 +34,28 @@ def slope_functions(structure: Structure) -> SlopeFunctions:
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Derivatives of the equations at one point.
+    """Derivatives of the equations at one point."""
 
-    Attributes
-    ----------
-    states, inputs
-        Of the rates of the states, by states, shape (n_states, n_states), and by inputs and their first and second time
-        derivatives, shape (3, n_states, n_inputs).
-    outputs_by_states, outputs_by_inputs
-        Of the outputs, shapes (n_outputs, n_states) and (3, n_outputs, n_inputs).
-    rests
-        Whether the point is an equilibrium.
-    """
-
+    # Of the rates of the states, by states, shape (n_states, n_states), and by inputs and their first and
+    # second time derivatives, shape (3, n_states, n_inputs).
     states: Floats
     inputs: Floats
+    # Of the outputs, shapes (n_outputs, n_states) and (3, n_outputs, n_inputs).
     outputs_by_states: Floats
     outputs_by_inputs: Floats
-    rests: bool
+    rests: bool  # whether the point is an equilibrium
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """The equations of motion, and the rates of the other states, as functions of states, inputs and parameters.
+    """The equations of motion, and the rates of the other states, as functions of states, inputs and parameters."""
 
-    Attributes
-    ----------
-    mass
-        The mass matrix, shape (n, n).
-    balance, changes
-        Forces, then rates of the states other than the motion, and their derivatives by states and inputs, shape (n_rows, n_by).
-    turned
-        Derivatives of the mass matrix times the accelerations, which are the last arguments, shape (n, n_by).
-    """
-
-    mass: Callable[..., Any]
+    mass: Callable[..., Any]  # the mass matrix, shape (n, n)
+    # Forces, then rates of the states other than the motion, and their derivatives by states and inputs,
+    # shape (n_rows, n_by).
     balance: Callable[..., Any]
     changes: Callable[..., Floats]
+    # Derivatives of the mass matrix times the accelerations, which are the last arguments, shape (n, n_by).
     turned: Callable[..., Floats]
 
 
@@ -127,13 +112,7 @@ class SlopeFunctions:
         return state
 
     def at(self, state: Floats, inputs: Floats, p: Floats) -> Slopes:
-        """Return the derivatives at a state under constant inputs.
-
-        Raises
-        ------
-        LinAlgError
-            If the mass matrix is singular.
-        """
+        """Return the derivatives at a state under constant inputs."""
         n, n_states, n_inputs = self._n, self._n_states, self._n_inputs
         place = self._place(state, inputs, p)
         slopes = np.zeros((n_states, n_states + 3 * n_inputs))

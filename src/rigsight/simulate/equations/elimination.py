@@ -30,18 +30,11 @@ def acceleration_symbols(count: int) -> tuple[sp.Symbol, ...]:
 
 @dataclass(frozen=True)
 class Elimination:
-    """The steps that lead from a mass matrix and loads to accelerations.
+    """The steps that lead from a mass matrix and loads to accelerations."""
 
-    Attributes
-    ----------
-    mass
-        Symbol of each entry of the lower half that is not zero, by row and column.
-    size
-        Number of degrees of freedom.
-    """
-
+    # Symbol of each entry of the lower half that is not zero, by row and column.
     mass: Mapping[tuple[int, int], sp.Symbol]
-    size: int
+    size: int  # number of degrees of freedom
 
     @classmethod
     def of(cls, mass: sp.ImmutableMatrix) -> Elimination:
@@ -90,15 +83,7 @@ class Elimination:
         return {symbol: step for symbol, step in steps.items() if symbol not in self.steps}
 
     def solved(self, loads: Sequence[sp.Expr], name: str) -> dict[sp.Symbol, sp.Expr]:
-        """Return the steps that solve the system for other loads, with the existing factors of the matrix.
-
-        Parameters
-        ----------
-        loads
-            The right side.
-        name
-            Name of the solution, see `solution`.
-        """
+        """Return the steps that solve the system for other loads, with the existing factors of the matrix."""
         (factors, _), n = self._factors, self.size
         found: dict[sp.Symbol, sp.Expr] = {}
         forward = [_symbol(f"{name} forward", i) for i in range(n)]
@@ -136,22 +121,7 @@ class Elimination:
 def steps_to_accelerations(
     elimination: Elimination, masses: Sequence[sp.Expr], loads: Sequence[Sequence[sp.Expr]]
 ) -> dict[sp.Symbol, sp.Expr]:
-    """Return all steps to the accelerations, from the expressions in the equations of motion.
-
-    Parameters
-    ----------
-    elimination
-        The elimination that gives the accelerations.
-    masses
-        Nonzero entries of the mass matrix, in the order of `Elimination.mass`.
-    loads
-        The parts of each generalized force.
-
-    Returns
-    -------
-    Symbol -> its expression in states, inputs, parameters and earlier symbols. No kink contains such a symbol, so that its sign
-    does not depend on intermediate values.
-    """
+    """Return all steps to the accelerations, from the expressions in the equations of motion."""
     long = [term for terms in loads for term in terms if _is_long(term)]
     shared = _shared(tuple(e for e in (*masses, *long) if not e.has(*_KINKS)))
     short = dict(zip(shared[0], shared[1].results, strict=True))

@@ -10,15 +10,7 @@ import sympy as sp
 def hoist_constants(
     expressions: Sequence[sp.Expr], constants: set[sp.Symbol]
 ) -> tuple[list[sp.Expr], dict[sp.Symbol, sp.Expr]]:
-    """Replace every largest subexpression that contains only constants by a symbol.
-
-    Returns
-    -------
-    expressions
-        The expressions with those subexpressions replaced.
-    hoisted
-        Symbol -> the subexpression that it replaces.
-    """
+    """Replace every largest subexpression that contains only constants by a symbol."""
     hoisted: dict[sp.Expr, sp.Symbol] = {}
     walked: dict[sp.Expr, sp.Expr] = {}
 
@@ -54,15 +46,6 @@ def gathered(expression: sp.Expr, constants: set[sp.Symbol], modes: set[sp.Symbo
     """Return an expression as a sum of products with one constant coefficient each, if that takes fewer operations.
 
     Arguments of functions are not changed.
-
-    Parameters
-    ----------
-    expression
-        Any expression.
-    constants
-        Symbols whose functions are computed once, in advance.
-    modes
-        Signs; a sum of them is not expanded, because it must be able to cancel to exactly zero.
     """
     inner = {
         atom: sp.Dummy(f"inner{i}", real=True)

@@ -55,15 +55,7 @@ class Jumps:
     def numbers(
         self, expressions: Sequence[sp.Expr], further: Mapping[sp.Symbol, sp.Expr] | None = None
     ) -> list[sp.Expr]:
-        """Return the values of expressions at the point.
-
-        Parameters
-        ----------
-        expressions
-            Expressions in states, inputs, parameters and steps.
-        further
-            Steps after those to the accelerations.
-        """
+        """Return the values of expressions at the point."""
         line = straight_line(expressions, {**self._steps, **(further or {})})
         numbers = dict(self._place)
         for symbol, part in line.parts.items():

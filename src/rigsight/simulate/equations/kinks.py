@@ -36,49 +36,31 @@ class absolute(sp.Function):  # type: ignore[misc]  # noqa: N801
 
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction at a joint.
+    """Dry friction at a joint."""
 
-    Attributes
-    ----------
-    mode
-        Index of its sign among the modes.
-    velocity
-        Index of the state that it holds at zero while it sticks; None if the joint's velocity is a sum of several states.
-    alone
-        Whether it affects no other velocity, so that the holding force need not be computed.
-    """
-
-    mode: int
+    mode: int  # index of its sign among the modes
+    # Index of the state that it holds at zero while it sticks; None if the joint's velocity is a sum of
+    # several states.
     velocity: int | None
-    alone: bool
+    alone: bool  # whether it affects no other velocity, so that the holding force need not be computed
 
 
 @dataclass(frozen=True)
 class FrozenStructure:
-    """A structure with each kink's sign as a symbol.
+    """A structure with each kink's sign as a symbol."""
 
-    Attributes
-    ----------
-    rates, outputs
-        Expressions in states, parameters, `modes` and the symbols of `steps`; smooth between events.
-    modes
-        Symbols that take the values -1 and +1.
-    switches
-        Expression whose sign each mode is; it may contain modes of earlier switches.
-    frictions
-        The modes of dry friction: signs of a velocity whose change makes its own acceleration jump, so that it can stay at zero.
-    replacements
-        The replacements of kinks, in the order in which they were made.
-    steps
-        Intermediate values computed before rates and outputs, as `Structure.remembering_steps`.
-    """
-
+    # Expressions in states, parameters, `modes` and the symbols of `steps`; smooth between events.
     rates: tuple[sp.Expr, ...]
     outputs: tuple[sp.Expr, ...]
-    modes: tuple[sp.Symbol, ...]
+    modes: tuple[sp.Symbol, ...]  # symbols that take the values -1 and +1
+    # Expression whose sign each mode is; it may contain modes of earlier switches.
     switches: tuple[sp.Expr, ...]
+    # The modes of dry friction: signs of a velocity whose change makes its own acceleration jump, so that it
+    # can stay at zero.
     frictions: tuple[Friction, ...]
+    # The replacements of kinks, in the order in which they were made.
     replacements: tuple[Mapping[sp.Expr, sp.Expr], ...] = ()
+    # Intermediate values computed before rates and outputs, as `Structure.remembering_steps`.
     steps: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
     def in_modes(self, expression: sp.Expr) -> sp.Expr:

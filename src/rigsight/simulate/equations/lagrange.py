@@ -20,19 +20,7 @@ Bound = Callable[[sp.Expr], sp.Expr]
 def equations_of_motion(
     rig: Rig, bound: Bound, resisting: Mapping[str, tuple[sp.Expr, ...]], pulled: sp.Matrix | None = None
 ) -> EquationsOfMotion:
-    """Return the equations of motion of a rig with n degrees of freedom.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    bound
-        Replaces the symbols of the rig's declaration in an expression by those of a structure.
-    resisting
-        Joint -> the forces that resist its motion, in the structure's symbols.
-    pulled
-        Accelerations by which an observer corrects the motion, shape (n, 1).
-    """
+    """Return the equations of motion of a rig with n degrees of freedom."""
     mechanism, free = rig.mechanism, rig.mechanism.free
     terms: list[list[sp.Expr]] = [[] for _ in free]
 

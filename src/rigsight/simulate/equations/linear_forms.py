@@ -17,34 +17,17 @@ _TINY = sp.Float(1e-300)
 
 @dataclass(frozen=True)
 class LinearForms:
-    """Changes of expressions as sums of products.
+    """Changes of expressions as sums of products."""
 
-    Attributes
-    ----------
-    factors
-        Symbol -> the derivative that it denotes; they are the same for all changes.
-    sums
-        Change of each expression, in terms of factors, constants and changes.
-    """
-
+    # Symbol -> the derivative that it denotes; they are the same for all changes.
     factors: Mapping[sp.Symbol, sp.Expr]
-    sums: tuple[sp.Expr, ...]
+    sums: tuple[sp.Expr, ...]  # change of each expression, in terms of factors, constants and changes
 
 
 def linear_forms(
     expressions: Sequence[sp.Expr], changes: Mapping[sp.Symbol, sp.Expr], constants: set[sp.Symbol]
 ) -> LinearForms:
-    """Return the changes of expressions due to changes of their symbols, with all signs held constant.
-
-    Parameters
-    ----------
-    expressions
-        The expressions.
-    changes
-        Symbol -> its change.
-    constants
-        Symbols that may appear in the sums themselves.
-    """
+    """Return the changes of expressions due to changes of their symbols, with all signs held constant."""
     factors: dict[sp.Expr, sp.Symbol] = {}
 
     def factor(derivative: sp.Expr) -> sp.Expr:

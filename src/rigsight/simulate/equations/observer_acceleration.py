@@ -15,15 +15,7 @@ from rigsight.rigs import Coordinate
 
 
 def measured_before(shown: Sequence[sp.Expr], delay: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Return value and rate of a measured motion before a delay, by a Taylor series that is valid for small delays.
-
-    Parameters
-    ----------
-    shown
-        The measured motion, and its first and second time derivative.
-    delay
-        Delay of the sensor [s], minus the time by which its motion is advanced (`read_ahead.py`).
-    """
+    """Return value and rate of a measured motion before a delay, by a Taylor series that is valid for small delays."""
     value, rate, curvature = shown
     return value + delay * rate + delay**2 / 2 * curvature, rate + delay * curvature
 
@@ -35,21 +27,7 @@ def observer_acceleration(
     measured: tuple[sp.Expr, sp.Expr],
     bandwidth: sp.Expr,
 ) -> sp.Matrix:
-    """Return the accelerations of the free coordinates with which the error of one sensor decays, shape (n_degrees, 1).
-
-    Parameters
-    ----------
-    free
-        Coordinates that move freely.
-    reads
-        The sensor's reading as an expression of them, without its effects; a velocity or a position.
-    shown
-        The simulated reading with the sensor's effects but without a delay, and its rate.
-    measured
-        The measured reading, and its rate.
-    bandwidth
-        Bandwidth of the observer [rad/s].
-    """
+    """Return the accelerations of the free coordinates with which the error of one sensor decays, shape (n_degrees, 1)."""
     slopes = sp.Matrix([derivative(reads, c.rate) for c in free])
     if any(slope != 0 for slope in slopes):
         wanted = bandwidth * (measured[0] - shown[0])

@@ -40,25 +40,7 @@ def equation_tree(
     offsets: tuple[str, ...] = (),
     observed: tuple[str, ...] = (),
 ) -> EquationTree:
-    """Return the equations of a rig with effects.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    effects
-        Effects in the order of the signal path.
-    symbols
-        Symbol of each parameter of the structure, by its name in the structure.
-    unique
-        Name of each effect's parameter in the structure, by (effect, own name).
-    fixed
-        Values of parameters that appear in the equations as numbers.
-    offsets
-        Sensors whose readings are shifted, each by a constant state.
-    observed
-        Sensors of an observer, which corrects the motion towards their measured readings.
-    """
+    """Return the equations of a rig with effects."""
     bandwidths = {sensor: symbols[bandwidth_name(sensor)] for sensor in observed}
     ahead = {s: symbols[ahead_name(s)] for s in observed if ahead_name(s) in symbols}
     return _Path(Binder(rig, symbols, unique, fixed), rig, effects, offsets, bandwidths, ahead).tree()
@@ -67,17 +49,7 @@ def equation_tree(
 def bound_to(
     rig: Rig, symbols: Mapping[str, sp.Symbol], expressions: Sequence[sp.Expr]
 ) -> tuple[sp.Expr, ...]:
-    """Return expressions of a rig's declaration in the symbols of its structure, with drives and sensors without effects.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    symbols
-        Symbol of each parameter of the structure, by its name in the structure.
-    expressions
-        Expressions in the rig's own names; none may contain the force of a joint.
-    """
+    """Return expressions of a rig's declaration in the symbols of its structure, with drives and sensors without effects."""
     path = _Path(Binder(rig, symbols, {}, {}), rig, ())
     return path.bound(expressions)
 
@@ -274,15 +246,7 @@ class _Path:
     def _spring(
         self, effects: Sequence[Effect], signals: Mapping[str, sp.Expr], memories: list[FirstOrderState]
     ) -> tuple[sp.Expr, sp.Expr]:
-        """Chain the effects between displacement and spring, then those on the spring's torque.
-
-        Returns
-        -------
-        torque
-            Torque of the spring.
-        rate
-            Rate of its deflection.
-        """
+        """Chain the effects between displacement and spring, then those on the spring's torque."""
         deflection, rate = signals["x"], signals["v"]
         for effect in effects:
             if effect.deflection is not None:

@@ -13,29 +13,13 @@ _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 
 @dataclass(frozen=True)
 class StraightLine:
-    """Expressions in parts.
+    """Expressions in parts."""
 
-    Attributes
-    ----------
-    parts
-        Symbol -> its expression in arguments and earlier symbols.
-    results
-        The expressions in terms of arguments and parts.
-    """
-
-    parts: Mapping[sp.Symbol, sp.Expr]
-    results: tuple[sp.Expr, ...]
+    parts: Mapping[sp.Symbol, sp.Expr]  # symbol -> its expression in arguments and earlier symbols
+    results: tuple[sp.Expr, ...]  # the expressions in terms of arguments and parts
 
     def function(self, arguments: Sequence[sp.Symbol], modules: list[Any]) -> Callable[..., Any]:
-        """Return a function of numbers or arrays that returns the results as a list.
-
-        Parameters
-        ----------
-        arguments
-            Its arguments.
-        modules
-            As for `sympy.lambdify`.
-        """
+        """Return a function of numbers or arrays that returns the results as a list."""
         # Valid Python names, because sympy would search all parts to replace each invalid one.
         plain = {s: sp.Symbol(f"v{i}", real=True) for i, s in enumerate((*arguments, *self.parts))}
         parts = [(plain[s], part.xreplace(plain)) for s, part in self.parts.items()]
@@ -51,17 +35,7 @@ def straight_line(
     steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
     name: str = "shared",
 ) -> StraightLine:
-    """Return expressions in parts.
-
-    Parameters
-    ----------
-    expressions
-        The expressions.
-    steps
-        Symbols in them that are parts already -> their expressions in earlier symbols.
-    name
-        Prefix of the names of further parts, followed by a number.
-    """
+    """Return expressions in parts."""
     expressions = tuple(map(sp.sympify, expressions))
     steps = needed_steps(expressions, steps)
     names = (sp.Symbol(f"{name} {i}", real=True) for i in range(1_000_000))
@@ -73,15 +47,7 @@ def straight_line(
 def needed_steps(
     expressions: Iterable[sp.Expr], steps: Mapping[sp.Symbol, sp.Expr]
 ) -> dict[sp.Symbol, sp.Expr]:
-    """Return those of the steps that expressions need.
-
-    Parameters
-    ----------
-    expressions
-        The expressions.
-    steps
-        Symbol -> its expression in earlier symbols.
-    """
+    """Return those of the steps that expressions need."""
     waiting = [s for expression in expressions for s in expression.free_symbols if s in steps]
     found: set[sp.Symbol] = set()
     while waiting:
@@ -93,15 +59,7 @@ def needed_steps(
 
 
 def of_parts(parts: Mapping[sp.Symbol, sp.Expr], results: tuple[sp.Expr, ...]) -> StraightLine:
-    """Return results with the parts that they need, each part after those on which it depends.
-
-    Parameters
-    ----------
-    parts
-        Symbol -> its expression, in any order.
-    results
-        The results.
-    """
+    """Return results with the parts that they need, each part after those on which it depends."""
     ordered: dict[sp.Symbol, sp.Expr] = {}
     inner = {s: [i for i in in_order(part.free_symbols) if i in parts] for s, part in parts.items()}
     for result in results:

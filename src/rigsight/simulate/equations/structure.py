@@ -49,21 +49,11 @@ class StateEquation:
 
 @dataclass(frozen=True)
 class History:
-    """A signal that is delayed within the rig, so that its history is stored.
+    """A signal that is delayed within the rig, so that its history is stored."""
 
-    Attributes
-    ----------
-    symbol
-        Symbol of the delayed signal.
-    signal
-        The signal as an expression in states, inputs, parameters and other histories.
-    delay
-        The delay as an expression in parameters.
-    """
-
-    symbol: sp.Symbol
-    signal: sp.Expr
-    delay: sp.Expr
+    symbol: sp.Symbol  # symbol of the delayed signal
+    signal: sp.Expr  # the signal as an expression in states, inputs, parameters and other histories
+    delay: sp.Expr  # the delay as an expression in parameters
 
 
 @dataclass(frozen=True, eq=False)

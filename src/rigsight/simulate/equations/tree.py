@@ -40,52 +40,33 @@ class shifted(late):  # noqa: N801
 
 @dataclass(frozen=True)
 class Definition:
-    """A named value: the output of an effect, or a named quantity of the rig.
+    """A named value: the output of an effect, or a named quantity of the rig."""
 
-    Attributes
-    ----------
-    symbol
-        Its symbol in later definitions and equations.
-    expression
-        Its expression in inputs, states, parameters and earlier definitions; a delay is `late` of a signal.
-    kind
-        Its kind in the signal path.
-    owner
-        Name of the effect to which it belongs; None for the rig.
-    rate_of
-        Symbol of the definition whose time derivative this is, if it is one; it is displayed as a dot instead of an equation.
-    name
-        Its name in the rig: a signal, a drive with a control law, a sensor read by a law. None for that of an effect.
-    """
-
-    symbol: sp.Symbol
+    symbol: sp.Symbol  # its symbol in later definitions and equations
+    # Its expression in inputs, states, parameters and earlier definitions; a delay is `late` of a signal.
     expression: sp.Expr
-    kind: Kind
-    owner: str | None
+    kind: Kind  # its kind in the signal path
+    owner: str | None  # name of the effect to which it belongs; None for the rig
+    # Symbol of the definition whose time derivative this is, if it is one; it is displayed as a dot instead
+    # of an equation.
     rate_of: sp.Symbol | None = None
+    # Its name in the rig: a signal, a drive with a control law, a sensor read by a law. None for that of an
+    # effect.
     name: str | None = None
 
 
 @dataclass(frozen=True)
 class EquationsOfMotion:
-    """``mass @ accelerations = forces``, for n degrees of freedom; n = 0 if the motion is prescribed.
+    """``mass @ accelerations = forces``, for n degrees of freedom; n = 0 if the motion is prescribed."""
 
-    Attributes
-    ----------
-    coordinates, velocities
-        Symbols of the states, n each.
-    mass
-        Mass matrix (n, n) in terms of parameters, coordinates and definitions.
-    terms
-        The parts of the generalized force of each coordinate, with their signs, in display order.
-    dimensions, rate_dimensions
-        Dimension texts of the coordinates and of the velocities, n each.
-    """
-
+    # Symbols of the states, n each.
     coordinates: tuple[sp.Symbol, ...] = ()
     velocities: tuple[sp.Symbol, ...] = ()
+    # Mass matrix (n, n) in terms of parameters, coordinates and definitions.
     mass: sp.ImmutableMatrix = field(default_factory=lambda: sp.ImmutableMatrix(0, 0, []))
+    # The parts of the generalized force of each coordinate, with their signs, in display order.
     terms: tuple[tuple[sp.Expr, ...], ...] = ()
+    # Dimension texts of the coordinates and of the velocities, n each.
     dimensions: tuple[str, ...] = ()
     rate_dimensions: tuple[str, ...] = ()
 
@@ -111,27 +92,13 @@ class EquationsOfMotion:
 
 @dataclass(frozen=True)
 class FirstOrderState:
-    """A state other than the motion: a memory, a lag, the lateral displacement.
-
-    Attributes
-    ----------
-    symbol
-        Its symbol.
-    terms
-        The parts of its rate, in display order.
-    dimension
-        Dimension text.
-    limit
-        Half-width of the range that it cannot leave, if any.
-    owner
-        Name of the effect to which it belongs; None for the rig.
-    """
+    """A state other than the motion: a memory, a lag, the lateral displacement."""
 
     symbol: sp.Symbol
-    terms: tuple[sp.Expr, ...]
-    dimension: str
-    limit: sp.Expr | None
-    owner: str | None
+    terms: tuple[sp.Expr, ...]  # the parts of its rate, in display order
+    dimension: str  # dimension text
+    limit: sp.Expr | None  # half-width of the range that it cannot leave, if any
+    owner: str | None  # name of the effect to which it belongs; None for the rig
 
     @property
     def rate(self) -> sp.Expr:
@@ -154,27 +121,13 @@ class Output:
 
 @dataclass(frozen=True)
 class EquationTree:
-    """The equations of a rig with effects; every expression refers to the definitions.
+    """The equations of a rig with effects; every expression refers to the definitions."""
 
-    Attributes
-    ----------
-    inputs
-        Symbols of the recorded inputs of the rig, before any delay.
-    definitions
-        Named values in the order of evaluation.
-    motion
-        The equations of motion.
-    states
-        The states other than the motion.
-    outputs
-        The recorded quantities.
-    """
-
-    inputs: tuple[sp.Symbol, ...]
-    definitions: tuple[Definition, ...]
-    motion: EquationsOfMotion
-    states: tuple[FirstOrderState, ...]
-    outputs: tuple[Output, ...]
+    inputs: tuple[sp.Symbol, ...]  # symbols of the recorded inputs of the rig, before any delay
+    definitions: tuple[Definition, ...]  # named values in the order of evaluation
+    motion: EquationsOfMotion  # the equations of motion
+    states: tuple[FirstOrderState, ...]  # the states other than the motion
+    outputs: tuple[Output, ...]  # the recorded quantities
 
     def flattened(self, expression: sp.Expr) -> sp.Expr:
         """Return an expression without definitions and without delays."""

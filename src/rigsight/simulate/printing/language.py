@@ -45,19 +45,7 @@ class Language:
         names: Mapping[sp.Symbol, str],
         steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
     ) -> list[str]:
-        """Return statements that assign expressions to targets, sharing common parts.
-
-        Parameters
-        ----------
-        targets
-            Left-hand sides.
-        expressions
-            Right-hand sides, same length.
-        names
-            Name in the code of each symbol.
-        steps
-            Symbols without a name -> their expressions; those that are needed are computed first.
-        """
+        """Return statements that assign expressions to targets, sharing common parts."""
         if needed_steps(expressions, steps):
             return self.written(targets, straight_line(expressions, steps), names)
         known = _symbols(names)
@@ -73,17 +61,7 @@ class Language:
     def written(
         self, targets: Sequence[str], line: StraightLine, names: Mapping[sp.Symbol, str]
     ) -> list[str]:
-        """Return statements that assign expressions, whose parts are known, to targets.
-
-        Parameters
-        ----------
-        targets
-            Left-hand sides.
-        line
-            Right-hand sides.
-        names
-            Name in the code of each symbol that is not a part.
-        """
+        """Return statements that assign expressions, whose parts are known, to targets."""
         own = {part: part_name(part) for part in line.parts}
         every = {**names, **own}
         known = _symbols(every)

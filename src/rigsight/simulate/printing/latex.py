@@ -21,15 +21,7 @@ _ACCENTS = ("", r"\dot", r"\ddot")
 
 
 def latex_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]) -> tuple[str, str]:
-    """Return both sides of an equation as LaTeX for math mode.
-
-    Parameters
-    ----------
-    equation
-        The equation.
-    names
-        Name of each symbol.
-    """
+    """Return both sides of an equation as LaTeX for math mode."""
     left, right = equation.written(LatexPrinter(names).expression, _JOINED, _WITHIN)
     return left, right.strip()
 

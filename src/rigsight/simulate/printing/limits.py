@@ -11,13 +11,7 @@ _MIN, _MAX, _CLIP = map(sp.Function, ("min", "max", "clip"))
 
 
 def with_limits(expression: sp.Expr) -> sp.Expr:
-    """Return an expression with its limits as named functions.
-
-    Parameters
-    ----------
-    expression
-        Any expression; limits in the equations are sums of `positive_part`.
-    """
+    """Return an expression with its limits as named functions."""
     if not expression.has(positive_part):
         return expression
     if expression.is_Add:

@@ -21,15 +21,7 @@ _WITHIN = "<mo>,</mo><mspace width='1em'/><mo>|</mo>%s<mo>|</mo><mo>&le;</mo>%s"
 
 
 def mathml_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]) -> str:
-    """Return an equation as a block of MathML; every name passes through a printer that escapes it.
-
-    Parameters
-    ----------
-    equation
-        The equation.
-    names
-        Name of each symbol.
-    """
+    """Return an equation as a block of MathML; every name passes through a printer that escapes it."""
     left, right = equation.written(MathMLPrinter(names).expression, _JOINED, _WITHIN)
     return f'<math display="block"><mrow>{left}<mo>=</mo>{right}</mrow></math>'
 

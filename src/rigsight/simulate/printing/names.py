@@ -30,21 +30,11 @@ _LETTERS = {
 
 @dataclass(frozen=True)
 class ShownName:
-    """A displayed name.
+    """A displayed name."""
 
-    Attributes
-    ----------
-    letter
-        The name without subscript: a letter, the name of a Greek letter, or a word.
-    below
-        Words of the subscript.
-    dots
-        Number of derivatives with respect to time.
-    """
-
-    letter: str
-    below: tuple[str, ...] = ()
-    dots: int = 0
+    letter: str  # the name without subscript: a letter, the name of a Greek letter, or a word
+    below: tuple[str, ...] = ()  # words of the subscript
+    dots: int = 0  # number of derivatives with respect to time
 
     @property
     def plain(self) -> str:
@@ -95,13 +85,6 @@ def rate_symbol(symbol: sp.Symbol) -> sp.Symbol:
 
 def shown_names(structure: Structure, label: Callable[[str], str] = in_words) -> dict[sp.Symbol, ShownName]:
     """Return the name of every symbol in a structure's tree, of the rates of its states and of its outputs.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    label
-        Returns the displayed form of an effect's name.
 
     Notes
     -----

@@ -31,26 +31,14 @@ class moved(sp.Function):  # type: ignore[misc]  # noqa: N801
 
 @dataclass(frozen=True)
 class ShownEquation:
-    """``left = sum of terms``.
+    """``left = sum of terms``."""
 
-    Attributes
-    ----------
-    owner
-        Name of the effect to which it belongs; None for the rig.
-    left
-        A symbol, or masses times accelerations.
-    terms
-        Terms of the right-hand side, in display order.
-    limit
-        A state and the half-width of the range that it cannot leave.
-    inertia
-        The masses with their accelerations whose sum is `left`, in display order.
-    """
-
-    owner: str | None
-    left: sp.Expr
-    terms: tuple[sp.Expr, ...]
+    owner: str | None  # name of the effect to which it belongs; None for the rig
+    left: sp.Expr  # a symbol, or masses times accelerations
+    terms: tuple[sp.Expr, ...]  # terms of the right-hand side, in display order
+    # A state and the half-width of the range that it cannot leave.
     limit: tuple[sp.Symbol, sp.Expr] | None = None
+    # The masses with their accelerations whose sum is `left`, in display order.
     inertia: tuple[tuple[sp.Expr, sp.Symbol], ...] = ()
 
     @property
@@ -63,17 +51,7 @@ class ShownEquation:
     def written(
         self, expression: Callable[[sp.Expr], str], joined: Mapping[str, str], within: str
     ) -> tuple[str, str]:
-        """Return both sides in a language.
-
-        Parameters
-        ----------
-        expression
-            Prints an expression.
-        joined
-            Form of the sign of a term in the language, by ``+``, ``-``, or empty for a positive first term.
-        within
-            Form of the statement that a state stays within a half-width, with a ``%s`` for each of the two.
-        """
+        """Return both sides in a language."""
 
         def summed(signed: Iterable[tuple[str, sp.Expr]]) -> str:
             return "".join(joined[sign] + expression(term) for sign, term in signed)
@@ -101,17 +79,10 @@ def _signed(parts: Iterable[sp.Expr]) -> tuple[tuple[str, sp.Expr], ...]:
 
 @dataclass(frozen=True)
 class ShownEquations:
-    """The equations of a structure with the names of their symbols.
+    """The equations of a structure with the names of their symbols."""
 
-    Attributes
-    ----------
-    names
-        Name of each symbol.
-    equations
-        The equations; those of one owner follow each other, the rig's come first.
-    """
-
-    names: Mapping[sp.Symbol, ShownName]
+    names: Mapping[sp.Symbol, ShownName]  # name of each symbol
+    # The equations; those of one owner follow each other, the rig's come first.
     equations: tuple[ShownEquation, ...]
 
     @property
@@ -122,15 +93,7 @@ class ShownEquations:
 
 
 def shown_equations(structure: Structure, label: Callable[[str], str] = in_words) -> ShownEquations:
-    """Return the equations of a structure in the form in which they are displayed.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    label
-        Returns the displayed form of an effect's name.
-    """
+    """Return the equations of a structure in the form in which they are displayed."""
     tree = structure.tree
     names = shown_names(structure, label)
     effects = [
@@ -144,15 +107,7 @@ def shown_equations(structure: Structure, label: Callable[[str], str] = in_words
 
 
 def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -> ShownEquations:
-    """Return the equations of a structure without definitions, one for each degree of freedom, state and output.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    numbers
-        Parameters that are written as numbers, with their values.
-    """
+    """Return the equations of a structure without definitions, one for each degree of freedom, state and output."""
     tree = structure.tree
     values: dict[sp.Symbol, sp.Expr] = {}
     for definition in tree.definitions:

@@ -37,15 +37,7 @@ def measured_files(folder: Path) -> list[Path]:
 def proposed_records(
     files: Sequence[Path], rigs: Sequence[Rig]
 ) -> tuple[list[Proposal], list[tuple[str, str]]]:
-    """Return every file as a record of one rig, and the files that cannot be records with the reason.
-
-    Parameters
-    ----------
-    files
-        Measured files.
-    rigs
-        Possible rigs; the one that matches most of the files is taken.
-    """
+    """Return every file as a record of one rig, and the files that cannot be records with the reason."""
     found: dict[Path, Proposal] = {}
     left_out = []
     for file in files:
@@ -85,25 +77,7 @@ def campaign_text(
     proposals: Sequence[Proposal],
     left_out: Sequence[tuple[str, str]],
 ) -> tuple[str, int]:
-    """Return the campaign as text, and the number of blanks in it.
-
-    Parameters
-    ----------
-    folder
-        Where it is written.
-    rig
-        The rig.
-    file
-        The rig's file, inside the folder; None for a built-in rig.
-    others
-        Rigs that it was chosen from, where it is a guess.
-    values
-        Parameters of the given simulation, where they are known.
-    proposals
-        Its records.
-    left_out
-        Other measured files, and why they were not taken.
-    """
+    """Return the campaign as text, and the number of blanks in it."""
     open_constants = [constant for constant in rig.constants if constant.default is None]
     n_blanks = len(open_constants) + sum(proposal.n_blanks for proposal in proposals)
     lines = [

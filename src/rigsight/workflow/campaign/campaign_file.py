@@ -91,13 +91,7 @@ class CampaignTable(FileTable):
 
 
 def locate(campaign: Path) -> Path:
-    """Return the toml file for a toml file or its folder.
-
-    Raises
-    ------
-    InputError
-        If there is none; a folder's other toml files are listed.
-    """
+    """Return the toml file for a toml file or its folder."""
     if not campaign.exists():
         raise InputError(f"{campaign} does not exist; name a campaign.toml or the folder that contains it.")
     if not campaign.is_dir():
@@ -115,13 +109,7 @@ def locate(campaign: Path) -> Path:
 
 
 def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
-    """Return the checked contents of a campaign file, and where its keys stand.
-
-    Raises
-    ------
-    InputError
-        Naming the file with line and column, and the key.
-    """
+    """Return the checked contents of a campaign file, and where its keys stand."""
     try:
         if file_size(path, "the campaign.toml") > LARGEST_FILE:
             raise InputError(
@@ -147,13 +135,7 @@ def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
 
 
 def checked_file(where: Where, data: dict[str, Any], table: type[Checked]) -> Checked:
-    """Return what a file holds as a table.
-
-    Raises
-    ------
-    InputError
-        Naming the file and, for each of the first mistakes, the key, what was got and what is allowed.
-    """
+    """Return what a file holds as a table."""
     try:
         return table.model_validate(data)
     except ValidationError as error:

@@ -13,22 +13,7 @@ from rigsight.workflow.campaign.where import Location, Where
 
 
 def rig_named(where: Where, name: str, known: Mapping[str, Rig]) -> Rig:
-    """Return the rig that ``rig.model`` names.
-
-    Parameters
-    ----------
-    where
-        Where keys stand.
-    name
-        Its name.
-    known
-        All rigs by name.
-
-    Raises
-    ------
-    InputError
-        Naming the nearest rig, all of them, and how a rig of one's own is named.
-    """
+    """Return the rig that ``rig.model`` names."""
     if name not in known:
         raise InputError(
             f"{where.at('rig', 'model')}: is '{name}'.{nearest(name, known)} Allowed: {', '.join(known)}; for a rig of your own "
@@ -45,26 +30,7 @@ def checked_simulation(
     parameters: Mapping[str, float],
     of_records: Collection[str] = (),
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return constants and parameters of the given simulation, all defaults filled in.
-
-    Parameters
-    ----------
-    where
-        Where keys stand: in a file, or in a campaign in memory.
-    rig
-        The rig.
-    modelled
-        Effects that the simulation has already, at their places.
-    constants, parameters
-        Known numbers by name [SI].
-    of_records
-        Constants that every record gives itself, so that no common value is needed.
-
-    Raises
-    ------
-    InputError
-        Naming the key of what is unknown, missing or out of range, and what is allowed.
-    """
+    """Return constants and parameters of the given simulation, all defaults filled in."""
     _check_tables(where, rig, constants, parameters)
     known = _constants(where, rig, constants, of_records)
     try:
@@ -77,24 +43,7 @@ def checked_simulation(
 def checked_numbers(
     where: Where, key: Location, rig: Rig, allowed: Iterable[Parameter], given: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return given numbers, each one that is allowed and within its range.
-
-    Parameters
-    ----------
-    where, key
-        Where keys stand, and the table in which the numbers are.
-    rig
-        Whose numbers they are.
-    allowed
-        What may be given.
-    given
-        Numbers by name [SI].
-
-    Raises
-    ------
-    InputError
-        Naming what is unknown, the nearest and all known names, or what is out of range.
-    """
+    """Return given numbers, each one that is allowed and within its range."""
     known = {parameter.name: parameter for parameter in allowed}
     checked = {}
     for name, value in given.items():

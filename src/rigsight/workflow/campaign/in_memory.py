@@ -140,18 +140,7 @@ def make_model(
 
 
 def rig_of(rig: str | Rig) -> Rig:
-    """Return a rig that was given by the name of a built-in one, or as it is.
-
-    Parameters
-    ----------
-    rig
-        Name or rig.
-
-    Raises
-    ------
-    InputError
-        Naming the nearest and all built-in rigs where a name is unknown.
-    """
+    """Return a rig that was given by the name of a built-in one, or as it is."""
     if isinstance(rig, str):
         return RIGS[check_option("The rig", rig, RIGS)]
     # A rig with the same declaration is reused if there is one, so that its equations are derived only once.
@@ -159,32 +148,14 @@ def rig_of(rig: str | Rig) -> Rig:
 
 
 def effects_of(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
-    """Return effects that were given by name or as declarations.
-
-    Parameters
-    ----------
-    effects
-        One or several.
-
-    Raises
-    ------
-    InputError
-        Naming the nearest and all effects of the catalogue where a name is unknown.
-    """
+    """Return effects that were given by name or as declarations."""
     # A single string is a sequence of letters too.
     given = (effects,) if isinstance(effects, str | Effect) else effects
     return tuple(effect if isinstance(effect, Effect) else effect_named(effect) for effect in given)
 
 
 def _checked(called: str, record: Record, rig: Rig) -> Record:
-    """Return a record in the units of its rig.
-
-    Raises
-    ------
-    InputError
-        If it lacks a required signal, a required signal never changes, a unit is unknown or measures something else, or it has
-        constants of another rig.
-    """
+    """Return a record in the units of its rig."""
     outputs = rig.required_outputs or tuple(s.name for s in rig.outputs if s.name in record)
     if not outputs:
         listed = ", ".join(signal.name for signal in rig.outputs)

@@ -18,22 +18,7 @@ from rigsight.workflow.campaign.where import Location, Where
 
 
 def inside(path: Path, where: str, asked: str) -> Path:
-    """Return a file that another file names; it must lie in the same folder, so that a received campaign cannot read other files.
-
-    Parameters
-    ----------
-    path
-        The file that names it.
-    where
-        How messages begin.
-    asked
-        The name.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it lies outside the folder of `path`.
-    """
+    """Return a file that another file names, in the same folder: a received campaign must not read other files."""
     folder = path.parent.resolve()
     name = Path(asked)
     try:
@@ -56,24 +41,7 @@ def inside(path: Path, where: str, asked: str) -> Path:
 
 
 def file_inside(path: Path, number: int, record: RecordTable, where: Where | None = None) -> Path:
-    """Return the file of a record.
-
-    Parameters
-    ----------
-    path
-        The file that lists the record.
-    number
-        Place of the record in that file, from 1.
-    record
-        What is listed.
-    where
-        Where the keys of that file stand, if it is known.
-
-    Raises
-    ------
-    InputError
-        As `inside`.
-    """
+    """Return the file of a record."""
     # The message names the file by itself.
     where = replace(where or Where(path.name), data={})
     return inside(path, where.at("records", number - 1, "file"), record.file)
@@ -89,30 +57,7 @@ def read_listed_record(
     given: Collection[str] = (),
     other: Rig | None = None,
 ) -> tuple[Record, ...]:
-    """Read a record as described in the file that lists it; it is split where its clock pauses.
-
-    Parameters
-    ----------
-    path
-        The file that lists the record.
-    rig
-        Rig whose signals it holds.
-    number
-        Place of the record in that file, from 1.
-    record
-        What is listed.
-    file, where
-        See `file_inside`.
-    given
-        Names of the constants that hold for all records.
-    other
-        The same rig in other units, which its columns may state.
-
-    Raises
-    ------
-    InputError
-        Naming the file that lists it, the record, and line and column of what cannot be used.
-    """
+    """Read a record as described in the file that lists it; it is split where its clock pauses."""
     where = where or Where(path.name, {"records": [None] * (number - 1) + [{"file": record.file}]})
     own = ("records", number - 1)
     columns = _columns(path, where, own, rig, record)

@@ -72,20 +72,7 @@ def read_model(model: str | Path, own_effects: Iterable[Effect] = (), own_rigs: 
 
 
 def model_of(content: Mapping[str, Any], own_effects: Iterable[Effect] = ()) -> Model:
-    """Return the model in a result.
-
-    Parameters
-    ----------
-    content
-        What ``model.json`` would hold.
-    own_effects
-        Effects that the model may name beside those of the catalogue and of installed packages.
-
-    Raises
-    ------
-    InputError
-        Naming the key of what cannot be used.
-    """
+    """Return the model in a result."""
     return _model(Path(MODEL_FILE), dict(content), own_effects)
 
 
@@ -98,20 +85,7 @@ def _model(
 
 
 def named_model(model: str | Path, own_effects: Iterable[Effect] = (), own_rigs: Iterable[Rig] = ()) -> Model:
-    """Read a model, or take a published set.
-
-    Parameters
-    ----------
-    model
-        A ``model.json``, the folder that contains one, or the name of a published set.
-    own_effects, own_rigs
-        As in `read_model`.
-
-    Raises
-    ------
-    InputError
-        As `read_model`, or listing the published sets where it is none of these.
-    """
+    """Read a model, or take a published set."""
     if Path(model).exists() or str(model).endswith(".json"):
         return read_model(model, own_effects, own_rigs)
     sets = published_sets()

@@ -118,24 +118,7 @@ def _read_all(
 
 
 def listed_rig(path: Path, table: RigTable, where: Where, own_rigs: Iterable[Rig] = ()) -> Rig:
-    """Return the rig that a campaign names, or whose file it names.
-
-    Parameters
-    ----------
-    path
-        The campaign's file.
-    table
-        Its ``[rig]``.
-    where
-        Where its keys stand.
-    own_rigs
-        Rigs that it may name beside the built-in ones.
-
-    Raises
-    ------
-    InputError
-        If not exactly one of ``model`` and ``file`` is given, there is no such rig, or its file cannot be used.
-    """
+    """Return the rig that a campaign names, or whose file it names."""
     if table.model is not None and table.file is not None:
         raise InputError(
             f"{where.at('rig', 'file')}: cannot be given together with rig.model; give one of the two."
@@ -171,17 +154,7 @@ def _check_simulator(rig: Rig, table: RigTable, where: Where) -> None:
 def of_first_record(
     rig: Rig, known: Mapping[str, float], records: Sequence[Record]
 ) -> tuple[dict[str, float], str]:
-    """Return all constants; one that only the records give has the value of the first record, which a note reports.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    known
-        Its constants that hold for all records [SI].
-    records
-        All records of the campaign.
-    """
+    """Return all constants; one that only the records give has the value of the first record, which a note reports."""
     first = {name: value for name, value in records[0].constants.items() if name not in known}
     values = {**known, **first}
     constants = {constant.name: values[constant.name] for constant in rig.constants}

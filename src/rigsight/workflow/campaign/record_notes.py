@@ -17,17 +17,7 @@ _RATES_APART = 100.0
 
 
 def record_notes(called: str, rig: Rig, records: Sequence[Record]) -> tuple[str, ...]:
-    """Return a sentence for each finding.
-
-    Parameters
-    ----------
-    called
-        Name of the campaign in messages: its file or its title.
-    rig
-        The rig.
-    records
-        All records of the campaign.
-    """
+    """Return a sentence for each finding."""
     found = [
         *_rates_apart(records),
         *_other_units(rig, records),

@@ -38,28 +38,15 @@ KNOWN_HOLD = 'hold = "zoh"  # the controller holds each command until the next o
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """A file as a record of a campaign.
+    """A file as a record of a campaign."""
 
-    Attributes
-    ----------
-    file
-        Its name, as the campaign is to call it.
-    guess
-        The probable channel of each signal.
-    kind, amplitude
-        What probably drove the rig.
-    lines
-        Lines of TOML below ``role``, with what must be checked as comments.
-    n_blanks
-        How many values are left to be filled in.
-    """
-
-    file: str
-    guess: FileGuess
+    file: str  # its name, as the campaign is to call it
+    guess: FileGuess  # the probable channel of each signal
+    # What probably drove the rig.
     kind: Kind
     amplitude: float | None
-    lines: tuple[str, ...]
-    n_blanks: int
+    lines: tuple[str, ...]  # lines of TOML below ``role``, with what must be checked as comments
+    n_blanks: int  # how many values are left to be filled in
 
     def toml(self, role: Role, remark: str = "", hold: str = ASSUMED_HOLD) -> str:
         """Return the ``[[records]]`` entry, for a role that is explained by a remark, with the line on the hold of the input."""
@@ -73,24 +60,7 @@ class Proposal:
 
 
 def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None = None) -> Proposal:
-    """Return how an open file is written into a campaign.
-
-    Parameters
-    ----------
-    path
-        The file.
-    file
-        Its channels.
-    rigs
-        Those that come into question.
-    name
-        How the campaign calls the file, by default its name.
-
-    Raises
-    ------
-    InputError
-        If a channel cannot be read.
-    """
+    """Return how an open file is written into a campaign."""
     guess = guess_file(file.channels, rigs, _rising(file.channels))
     no_time = ""
     if guess.time.channel is not None and not _rises(guess.time.channel):

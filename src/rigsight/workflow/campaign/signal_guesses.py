@@ -22,31 +22,16 @@ _MOVING, _TURNING = "x", "angle"
 
 @dataclass(frozen=True)
 class Guess:
-    """The guessed channel of a signal.
+    """The guessed channel of a signal."""
 
-    Attributes
-    ----------
-    signal, si
-        Signal of the rig and its unit.
-    channel
-        The best matching channel; None if none or several match.
-    unit
-        Unit of the channel: stated by the file, or else in its name.
-    is_stated
-        Whether the file itself states the unit, in a place made for it.
-    candidates
-        Names of the channels that match equally well, if there are several.
-    is_alone
-        Whether the only reason for the guess is that no other channel remains.
-    """
-
+    # Signal of the rig and its unit.
     signal: str
     si: str
-    channel: Channel | None = None
-    unit: str | None = None
-    is_stated: bool = False
-    candidates: tuple[str, ...] = ()
-    is_alone: bool = False
+    channel: Channel | None = None  # the best matching channel; None if none or several match
+    unit: str | None = None  # unit of the channel: stated by the file, or else in its name
+    is_stated: bool = False  # whether the file itself states the unit, in a place made for it
+    candidates: tuple[str, ...] = ()  # names of the channels that match equally well, if there are several
+    is_alone: bool = False  # whether the only reason for the guess is that no other channel remains
 
     @property
     def is_clear(self) -> bool:
@@ -82,17 +67,7 @@ def telling(rig: Rig) -> tuple[str, ...]:
 
 
 def guess_file(channels: Sequence[Channel], rigs: Iterable[Rig], rising: Channel | None = None) -> FileGuess:
-    """Return the rig that matches the channels best, with the channel of each signal.
-
-    Parameters
-    ----------
-    channels
-        Of an open file; none is read.
-    rigs
-        Those that come into question.
-    rising
-        Channel that is the time if none is called like it.
-    """
+    """Return the rig that matches the channels best, with the channel of each signal."""
     own = own_clocks([channel.name for channel in channels])
     times = [channels[number] for number in set(own.values())]
     guesses = [_guess_rig(rig, channels, rising, times) for rig in rigs]

@@ -37,11 +37,6 @@ def in_units_of(rig: Rig, record: Record) -> Record:
     """Return a record with its signals in the units of a rig, with a note for each that was converted.
 
     A signal without a unit is taken to be in that of the rig.
-
-    Raises
-    ------
-    InputError
-        If a unit is unknown or measures something else.
     """
     units, signals, notes = dict(record.units), dict(record.signals), list(record.notes)
     amplitude = record.amplitude

@@ -29,27 +29,16 @@ def _default_noise() -> Mapping[str, float]:
 
 @dataclass(frozen=True)
 class VirtualRig:
-    """A running gear with known true parameters.
+    """A running gear with known true parameters."""
 
-    Attributes
-    ----------
-    truth
-        Parameter set that is simulated.
-    noise
-        Standard deviation of the white sensor noise, by output [rad], [m].
-    disturbance
-        Standard deviation of the torque disturbance [N m].
-    disturbance_corner
-        Angular frequency below which the disturbance is white [rad/s]; above, it falls by 20 dB per decade.
-    dt
-        Sample time [s].
-    """
-
+    # Parameter set that is simulated.
     truth: PublishedSet = field(default_factory=lambda: published_sets()[VIRTUAL_RIG_SET])
+    # Standard deviation of the white sensor noise, by output [rad], [m].
     noise: Mapping[str, float] = field(default_factory=_default_noise)
-    disturbance: float = 1e-3
+    disturbance: float = 1e-3  # standard deviation of the torque disturbance [N m]
+    # Angular frequency below which the disturbance is white [rad/s]; above, it falls by 20 dB per decade.
     disturbance_corner: float = 5.0
-    dt: float = DT
+    dt: float = DT  # sample time [s]
 
     @property
     def structure(self) -> Structure:
@@ -71,19 +60,7 @@ class VirtualRig:
         amplitude: float | None = None,
         hold: Hold = "foh",
     ) -> Record:
-        """Drive the rig with a current and return the measured record.
-
-        Parameters
-        ----------
-        name
-            Name of the record.
-        u
-            Motor current, shape (n_samples,) [A].
-        rng
-            Source of noise and disturbance.
-        kind, role, amplitude, hold
-            As in a campaign; `hold` is the behavior of the current between samples.
-        """
+        """Drive the rig with a current and return the measured record."""
         torque = self._torque_disturbance(u.size, rng)
         values = self.truth.values()
         per_ampere = evaluated(self.structure.rig.motion.drive_gain, values)

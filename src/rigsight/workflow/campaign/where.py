@@ -16,20 +16,12 @@ Location = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Where:
-    """The locations of keys.
+    """The locations of keys."""
 
-    Attributes
-    ----------
-    name
-        The file, or the name of a campaign in memory.
-    data
-        The contents of the file, so that a record can be named by its file.
-    places
-        Line and column of each value by its keys; empty if unknown.
-    """
-
-    name: str
+    name: str  # the file, or the name of a campaign in memory
+    # The contents of the file, so that a record can be named by its file.
     data: Mapping[str, Any] = field(default_factory=dict)
+    # Line and column of each value by its keys; empty if unknown.
     places: Mapping[Location, Place] = field(default_factory=dict)
 
     @classmethod

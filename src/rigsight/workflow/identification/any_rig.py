@@ -100,24 +100,7 @@ def _diverges(campaign: Campaign) -> bool:
 def identify_any_rig(
     campaign: Campaign, options: EstimationOptions, n_jobs: int, listener: Listener
 ) -> Identification:
-    """Identify a rig of any shape.
-
-    Parameters
-    ----------
-    campaign
-        A campaign that was read or made of records.
-    options
-        How its records are to be read.
-    n_jobs
-        Records read at the same time.
-    listener
-        Told of every finished step.
-
-    Raises
-    ------
-    InputError
-        If the method is only for rigs that are identified record by record.
-    """
+    """Identify a rig of any shape."""
     campaign = with_weighed_spring(campaign)
     rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
     check_option(

@@ -17,21 +17,7 @@ def start_with_effects(
     held: Mapping[str, float],
     sizes: Mapping[str, float],
 ) -> dict[str, float]:
-    """Return the parameters of the best of several fits: from the given values, and from inside of bounds at which they lie.
-
-    Parameters
-    ----------
-    campaign
-        Its simulation has effects.
-    windows
-        The estimation records, cut as they are fitted.
-    start
-        Start values of the rig's own parameters, without the effects.
-    held
-        Parameters that keep their value.
-    sizes
-        How much each output moves.
-    """
+    """Return the parameters of the best of several fits: from the given values, and from inside of bounds at which they lie."""
     structure = compose(campaign.rig, campaign.modelled)
     begin = {**campaign.constants, **start, **held}
     scales = characteristic_scales(campaign.rig, windows, begin)

@@ -35,13 +35,7 @@ _FORMS = {"pt1": "PT1", "pt2": "PT2"}
 
 
 def identification_figures(identification: Identification) -> dict[str, tuple[str, str]]:
-    """Return file name -> what the figure shows, and the figure as SVG.
-
-    Parameters
-    ----------
-    identification
-        The result.
-    """
+    """Return file name -> what the figure shows, and the figure as SVG."""
     found: dict[str, tuple[str, str]] = {}
     for number, view in enumerate(identification.views, 1):
         if view.measured is not None:
@@ -92,15 +86,7 @@ def responses_figure(identification: Identification) -> Figure | None:
 
 
 def view_figure(view: LinearView, units: Mapping[str, str]) -> Figure:
-    """Return the grid of the responses of every sensor to every input, measured against the linearized model.
-
-    Parameters
-    ----------
-    view
-        Of a rig with inputs.
-    units
-        Unit by signal.
-    """
+    """Return the grid of the responses of every sensor to every input, measured against the linearized model."""
     assert view.measured is not None
     linear, measured = view.linearization, view.measured
     paths = {

@@ -32,20 +32,7 @@ _HARDLY = 0.9
 
 
 def structure_with_memory(campaign: Campaign, effects: Sequence[Effect]) -> Structure:
-    """Return the rig with these effects and those that the campaign's simulation has already.
-
-    Parameters
-    ----------
-    campaign
-        A campaign that was read or made of records.
-    effects
-        With places or without.
-
-    Raises
-    ------
-    InputError
-        If none of the effects has memory, the rig does not offer one, it has several motions, or nothing brings it back to rest.
-    """
+    """Return the rig with these effects and those that the campaign's simulation has already."""
     rig = campaign.rig
     names = " ".join(f"--effect {effect.name}" for effect in effects)
     instead = f"'rigsight diagnose {names}' fits effects to such a rig."
@@ -82,28 +69,7 @@ def with_hysteresis(
     n_jobs: int,
     listener: Listener,
 ) -> Identification:
-    """Calibrate a structure to the records of an identification, beginning at its joint fit.
-
-    Parameters
-    ----------
-    identification
-        Of the rig alone.
-    campaign
-        What it was found from.
-    structure
-        From `structure_with_memory`.
-    seed
-        Of search and intervals.
-    n_jobs
-        Records simulated at the same time.
-    listener
-        Told of every finished step.
-
-    Raises
-    ------
-    InputError
-        If no parameter set in the range can be simulated.
-    """
+    """Calibrate a structure to the records of an identification, beginning at its joint fit."""
     joint = identification.joint
     fitted = [record for record in campaign.estimation if record.name not in joint.left_out]
     outputs = [s.name for s in structure.rig.outputs if all(s.name in record for record in fitted)]

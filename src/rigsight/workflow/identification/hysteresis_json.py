@@ -13,13 +13,7 @@ from rigsight.workflow.identification.linear_json import finite
 
 
 def hysteresis_json(found: HysteresisIdentification) -> dict[str, Any]:
-    """Return the content of the key ``hysteresis``.
-
-    Parameters
-    ----------
-    found
-        The result.
-    """
+    """Return the content of the key ``hysteresis``."""
     fit, derived = found.calibration.fit, found.calibration.derived
     width = float(norm.ppf(0.5 + 0.5 * LEVEL))
     errors = fit.standard_errors

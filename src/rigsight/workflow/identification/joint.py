@@ -38,20 +38,7 @@ _BELOW = 1e-6
 
 
 def identify_jointly(campaign: Campaign, found: Sequence[RecordIdentification]) -> JointIdentification:
-    """Fit one set to all estimation records that show the motion, and one to each alone; score every record.
-
-    Parameters
-    ----------
-    campaign
-        The campaign.
-    found
-        What each estimation record shows by itself. A record whose motion could not be identified is left out.
-
-    Raises
-    ------
-    InputError
-        If no record shows the motion.
-    """
+    """Fit one set to all estimation records that show the motion, and one to each alone; score every record."""
     records = [r.record for r in found if not r.motion.problem]
     if not records:
         reasons = "\n".join(f"- {r.record.name}: {r.motion.problem}" for r in found)
@@ -105,23 +92,7 @@ def fit_any_rig_jointly(
     known: Mapping[str, float],
     length: float | None,
 ) -> JointIdentification:
-    """Fit one set of all parameters to all estimation records of a rig of any shape, and one to each alone; score every record.
-
-    Parameters
-    ----------
-    campaign
-        The campaign.
-    structure
-        Its rig.
-    found
-        What each estimation record shows by itself.
-    start
-        Start value of every parameter.
-    known
-        Parameters that keep their value.
-    length
-        Of windows into which records are cut [s]; None leaves them whole.
-    """
+    """Fit one set of parameters to all estimation records of a rig of any shape, and one to each; score every record."""
     records = [r.record for r in found]
     windows = cut(records, length)
     fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=_ORIGIN)
@@ -180,15 +151,7 @@ def _start(found: Sequence[RecordIdentification], known: Mapping[str, float]) ->
 
 
 def held_parameters(campaign: Campaign, records: Sequence[Record]) -> dict[str, float]:
-    """Return values for parameters that these records do not determine: no spring, outputs that were not measured.
-
-    Parameters
-    ----------
-    campaign
-        Of a built-in rig of one motion.
-    records
-        Those that are fitted.
-    """
+    """Return values for parameters that these records do not determine: no spring, outputs that were not measured."""
     rig = campaign.rig
     known: dict[str, float] = {}
     names = {parameter.name for parameter in rig.parameters}

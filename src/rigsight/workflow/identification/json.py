@@ -26,15 +26,7 @@ SCHEMA_VERSION = 1
 
 
 def identification_json(identification: Identification, figures: Mapping[str, str]) -> dict[str, Any]:
-    """Return the content of ``identification.json``.
-
-    Parameters
-    ----------
-    identification
-        The result.
-    figures
-        File name -> what it shows.
-    """
+    """Return the content of ``identification.json``."""
     units = identification.units
     told = identification.identifiability
     # Rigs of one motion with transfer functions of their own have neither.

@@ -18,13 +18,7 @@ def finite(value: float | None) -> float | None:
 
 
 def identifiability_json(found: Identifiability) -> dict[str, Any]:
-    """Return what the records determine.
-
-    Parameters
-    ----------
-    found
-        The result.
-    """
+    """Return what the records determine."""
     return {
         "sentence": found.sentence,
         "determined": list(found.determined),
@@ -46,15 +40,7 @@ def identifiability_json(found: Identifiability) -> dict[str, Any]:
 
 
 def view_json(view: LinearView, units: Mapping[str, str]) -> dict[str, Any]:
-    """Return the rig close to its rest in records with the same constants.
-
-    Parameters
-    ----------
-    view
-        The rig close to its rest.
-    units
-        Unit by signal.
-    """
+    """Return the rig close to its rest in records with the same constants."""
     linear = view.linearization
     return {
         "constants": view.constants,
@@ -118,13 +104,7 @@ def _path(view: LinearView, source: str, response: str, units: Mapping[str, str]
 
 
 def response_json(response: FrequencyResponse) -> dict[str, Any]:
-    """Return a frequency response as it stands in the file.
-
-    Parameters
-    ----------
-    response
-        The response.
-    """
+    """Return a frequency response as it stands in the file."""
     return {
         "method": response.method,
         "unit": response.unit,

@@ -93,17 +93,7 @@ def campaign_warnings(
 def any_rig_warnings(
     campaign: Campaign, views: Sequence[LinearView], joint: JointIdentification
 ) -> list[str]:
-    """Return the notes on records, responses, poles and fit of a general rig, a sentence each.
-
-    Parameters
-    ----------
-    campaign
-        The campaign.
-    views
-        The rig close to its rest.
-    joint
-        The fit.
-    """
+    """Return the notes on records, responses, poles and fit of a general rig, a sentence each."""
     told = list(campaign.notes)
     told += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
     told += closed_loop_notes(campaign.records, campaign.rig, _NOT_OF_ANY_RIG)
@@ -117,19 +107,7 @@ def any_rig_warnings(
 def offsets_of_records(
     campaign: Campaign, joint: JointIdentification, held: Mapping[str, float], length: float | None = None
 ) -> list[str]:
-    """Return the sensor offsets that were estimated in each record, or a hint that they should be estimated.
-
-    Parameters
-    ----------
-    campaign
-        The campaign.
-    joint
-        The fit.
-    held
-        Parameters that cannot be distinguished from such offsets, and the values at which they were held.
-    length
-        Of the windows into which records were cut [s]; None where they were fitted whole.
-    """
+    """Return the sensor offsets that were estimated in each record, or a hint that they should be estimated."""
     fit, rig = joint.fit.fit, campaign.rig
     fitted = cut([r for r in campaign.estimation if r.name not in joint.left_out], length)
     units = {signal.name: signal.unit for signal in rig.outputs}

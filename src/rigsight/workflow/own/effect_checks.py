@@ -47,25 +47,15 @@ _SEEN = 0.3
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig with parameter values on which an effect is checked.
+    """A rig with parameter values on which an effect is checked."""
 
-    Attributes
-    ----------
-    rig, values
-        The rig and its numbers.
-    output
-        The output that the effect acts on.
-    swept
-        The parameter values of the rig in the sweeps from which the effect must be recovered.
-    free
-        Parameters of the rig that are fitted together with those of the effect.
-    """
-
+    # The rig and its numbers.
     rig: Rig
     values: dict[str, float]
-    output: str
+    output: str  # the output that the effect acts on
+    # The parameter values of the rig in the sweeps from which the effect must be recovered.
     swept: dict[str, float]
-    free: tuple[str, ...]
+    free: tuple[str, ...]  # parameters of the rig that are fitted together with those of the effect
 
 
 AXIS_BENCH = Bench(
@@ -198,17 +188,7 @@ def gives_no_energy(effect: Effect) -> str | None:
 
 
 def energy_of_cycles(effect: Effect) -> list[tuple[dict[str, float], float]]:
-    """Return what an effect takes of the work of each steady cycle below resonance; motions that do not settle are left out.
-
-    Parameters
-    ----------
-    effect
-        An effect on the dynamics.
-
-    Returns
-    -------
-    Parameter values, and the energy that the effect takes as a share of the work, negative if it gives energy.
-    """
+    """Return what an effect takes of the work of each steady cycle below resonance; motions that do not settle are left out."""
     bench = bench_of(effect)
     pushed, moved = ("u", "x") if bench is AXIS_BENCH else ("force", "x")
     found = []

@@ -10,22 +10,7 @@ from rigsight.rigs import Rig
 
 
 def effects_on(rig: Rig, effects: Iterable[Effect], where: str) -> tuple[Effect, ...]:
-    """Return declared effects as they act on a rig.
-
-    Parameters
-    ----------
-    rig
-        Where they act.
-    effects
-        With places or without, see `effect_on`.
-    where
-        How messages begin.
-
-    Raises
-    ------
-    InputError
-        As `effect_on`.
-    """
+    """Return declared effects as they act on a rig."""
     catalogue = {effect.name: effect for effect in CATALOGUE}
     found = []
     for effect in effects:
@@ -40,24 +25,7 @@ def effects_on(rig: Rig, effects: Iterable[Effect], where: str) -> tuple[Effect,
 
 
 def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> Effect:
-    """Return the effect that a name means on a rig.
-
-    Parameters
-    ----------
-    rig
-        Where it acts.
-    name
-        Of an effect, or ``effect@place``; the place may be left out if the effect applies at no other place.
-    known
-        Effects by name, without places.
-    where
-        How messages begin.
-
-    Raises
-    ------
-    InputError
-        If the effect is unknown or does not apply to the rig, or its place is unknown or missing.
-    """
+    """Return the effect that a name means on a rig."""
     kind, place = kind_of(name), name.partition(AT)[2]
     if kind not in known:
         raise InputError(f"{where}: '{kind}' is unknown.{nearest(kind, known)} Known: {', '.join(known)}.")

@@ -88,11 +88,6 @@ def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return the effects of the catalogue and `own` with these names; all of them if no name is given.
 
     A name may say where the effect acts, ``coulomb_friction@shaft``; whether the rig has this place is checked later.
-
-    Raises
-    ------
-    InputError
-        Naming the nearest and all known effects.
     """
     known = {effect.name: effect for effect in (*CATALOGUE, *own)}
     found = []

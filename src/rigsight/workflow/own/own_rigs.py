@@ -10,18 +10,7 @@ from rigsight.rigs import RIGS, Rig, read_rig_file
 
 
 def own_rigs(files: Iterable[str | Path]) -> dict[Path, Rig]:
-    """Return the rigs that files declare.
-
-    Parameters
-    ----------
-    files
-        Rig files; one that is given twice is read once.
-
-    Raises
-    ------
-    InputError
-        Naming file, line and column of what cannot be used, or the file whose rig has a name that is taken.
-    """
+    """Return the rigs that files declare."""
     found: dict[Path, Rig] = {}
     taken = dict.fromkeys(RIGS, "a built-in rig")
     for path in {Path(file).resolve(): Path(file) for file in files}.values():
@@ -36,11 +25,5 @@ def own_rigs(files: Iterable[str | Path]) -> dict[Path, Rig]:
 
 
 def known_rigs(own: Iterable[Rig] = ()) -> Mapping[str, Rig]:
-    """Return all rigs by name.
-
-    Parameters
-    ----------
-    own
-        Rigs beside the built-in ones.
-    """
+    """Return all rigs by name."""
     return {**RIGS, **{rig.name: rig for rig in own}}

@@ -13,18 +13,7 @@ _WRITTEN = "--simulator expects a Python file and a function in it, for instance
 
 
 def own_simulators(named: Iterable[str]) -> None:
-    """Execute Python files and register functions of them as simulators.
-
-    Parameters
-    ----------
-    named
-        ``FILE.py:FUNCTION`` each; a rig file refers to it by ``file = "FUNCTION"``.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be run or has no such function.
-    """
+    """Execute Python files and register functions of them as simulators."""
     taken: dict[str, str] = {}
     for one in named:
         file, colon, name = one.rpartition(":")

@@ -14,22 +14,7 @@ _LARGEST_FILE = 1_000_000
 
 
 def run_python_file(path: Path, what: str, if_missing: str) -> tuple[ModuleType, ast.Module]:
-    """Execute a file, and return its module and its syntax tree.
-
-    Parameters
-    ----------
-    path
-        The file: code that the user chose to run.
-    what
-        Its description in messages.
-    if_missing
-        Hint in the message if the file does not exist.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, is not valid Python or raises an exception; with the line of the error.
-    """
+    """Execute a file, and return its module and its syntax tree."""
     source = _source(path, what, if_missing)
     try:
         tree = ast.parse(source, filename=str(path))

@@ -92,13 +92,7 @@ class FitJournal:
 
 
 def _checked(entry: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return an entry whose parts have the types that a fit needs.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError
-        If they have not.
-    """
+    """Return an entry whose parts have the types that a fit needs."""
     return {
         "theta": [float(value) for value in entry["theta"]],
         "success": bool(entry["success"]),

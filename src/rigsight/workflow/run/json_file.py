@@ -13,22 +13,7 @@ LARGEST_FILE = 10_000_000
 
 
 def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
-    """Return the object that a file holds.
-
-    Parameters
-    ----------
-    path
-        The file.
-    what
-        The kind of file in messages: ``"model"``.
-    mend
-        A sentence on where such a file comes from or what it contains.
-
-    Raises
-    ------
-    InputError
-        Naming the file, and line and column of invalid JSON; also for repeated keys and NaN, which Python would accept.
-    """
+    """Return the object that a file holds."""
     try:
         if file_size(path) > LARGEST_FILE:
             raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB, so it is not a {what}.")

@@ -20,13 +20,7 @@ _MOST_JOBS = 1024
 
 
 def checked_jobs(n_jobs: int | None) -> int:
-    """Return the number of parallel jobs: one per processor that this process may use, unless it is given.
-
-    Raises
-    ------
-    InputError
-        If it is not between 1 and 1024.
-    """
+    """Return the number of parallel jobs: one per processor that this process may use, unless it is given."""
     if n_jobs is not None:
         return int(check_in_range("The number of jobs", n_jobs, 1, _MOST_JOBS))
     if hasattr(os, "sched_getaffinity"):
@@ -43,22 +37,7 @@ def structures_to_try(
 
 
 def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: Listener = silent) -> None:
-    """Compile the kernels that are not in the cache of this machine yet, several at a time.
-
-    Parameters
-    ----------
-    structures
-        What is going to be simulated.
-    n_jobs
-        Compilers side by side.
-    listener
-        Called for every compiled kernel; not at all if there is nothing to compile.
-
-    Raises
-    ------
-    InputError
-        If there is no C compiler, or it fails, or the cache folder cannot be written.
-    """
+    """Compile the kernels that are not in the cache of this machine yet, several at a time."""
     missing = [structure for structure in structures if not compiled(structure)]
     if not missing:
         return

@@ -8,20 +8,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Step:
-    """One finished step.
+    """One finished step."""
 
-    Attributes
-    ----------
-    stage
-        What is being done.
-    detail
-        What has just been finished; empty at the start of a stage.
-    done, total
-        Steps of the stage that are finished, and all of them; both 0 for a remark.
-    """
-
-    stage: str
-    detail: str
+    stage: str  # what is being done
+    detail: str  # what has just been finished; empty at the start of a stage
+    # Steps of the stage that are finished, and all of them; both 0 for a remark.
     done: int
     total: int
 

@@ -50,32 +50,12 @@ def noting_folders() -> Iterator[Sequence[Path]]:
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """Return content as indented JSON in its own order, with a final line end.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite, which JSON cannot represent.
-    """
+    """Return content as indented JSON in its own order, with a final line end."""
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def check_writable(folder: Path, *names: str) -> None:
-    """Check before long work that results can be written into a folder, which may not exist yet.
-
-    Parameters
-    ----------
-    folder
-        The folder.
-    *names
-        Files that are to be written there.
-
-    Raises
-    ------
-    InputError
-        If a file or a link to nothing is in the way, the folder cannot be made or written, or one of the names belongs to
-        something other than a file.
-    """
+    """Check before long work that results can be written into a folder, which may not exist yet."""
     existing = folder.absolute()
     try:
         while not existing.exists():
@@ -96,13 +76,7 @@ def check_writable(folder: Path, *names: str) -> None:
 
 
 def check_target(file: Path) -> None:
-    """Check before long work that one result file can be written or replaced.
-
-    Raises
-    ------
-    InputError
-        If the name belongs to something other than a file, or its folder cannot be written.
-    """
+    """Check before long work that one result file can be written or replaced."""
     check_writable(file.parent)
     _check_replaceable(file)
 
@@ -114,24 +88,6 @@ def write_together(
 
     Even after Ctrl-C or kill, the folder contains all old files or all new ones. Only SIGKILL during the final renaming can leave
     a mixture. Temporary files of such a run are removed by the next one.
-
-    Parameters
-    ----------
-    folder
-        Created, with its parent folders, if it does not exist.
-    contents
-        File name, or path inside the folder -> text, or bytes of a picture.
-    mend
-        Hint in the message if the folder cannot be written.
-
-    Returns
-    -------
-    The files written, in order.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be made or written, something is in the way, or the disk is full.
     """
     # Links are kept; the files to which they point are replaced.
     token = secrets.token_hex(4)

@@ -29,13 +29,7 @@ def temporary_path(target: Path, token: str, ending: str) -> Path:
 
 
 def write_locked(path: Path, content: bytes) -> IO[bytes]:
-    """Write a new file and return it open; it is locked while it is open.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write a new file and return it open; it is locked while it is open."""
     file = path.open("xb")
     try:
         _lock(file)
@@ -48,13 +42,7 @@ def write_locked(path: Path, content: bytes) -> IO[bytes]:
 
 
 def keep_locked(target: Path, path: Path) -> IO[bytes]:
-    """Give a file a second hard link, or copy it where that is not possible; return it open and locked.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Give a file a second hard link, or copy it where that is not possible; return it open and locked."""
     try:
         path.hardlink_to(target)
     except (OSError, NotImplementedError):

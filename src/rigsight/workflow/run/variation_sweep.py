@@ -47,26 +47,7 @@ class Pair:
 def variation_sweep(
     model: Model, pair: Pair, amplitude: float, band: tuple[float, float] | None, slowness: float = 1.0
 ) -> tuple[Record, SpectralRatio]:
-    """Return the sweep, with the other inputs at rest, and the estimator of the response.
-
-    Parameters
-    ----------
-    model
-        The model.
-    pair
-        Swept input and output.
-    amplitude
-        In the unit of the input.
-    band
-        Angular frequencies [rad/s]; None for a band about the natural frequencies.
-    slowness
-        Duration over that of a sweep as slow as the thesis's. The estimator averages over as much less of the frequency.
-
-    Raises
-    ------
-    InputError
-        If the band is invalid, or the model has no natural frequency.
-    """
+    """Return the sweep, with the other inputs at rest, and the estimator of the response."""
     rig = model.structure.rig
     slowest = None
     if band is None:

@@ -69,13 +69,6 @@ class OtherForms:
 
         A pair that leaves only noise stands: nothing is left for another form. A third effect was compared with other forms of
         the first two before it was tried.
-
-        Parameters
-        ----------
-        singles
-            Every effect alone, fitted and scored.
-        larger
-            Of several effects, fitted and scored, with the effect first that explains more by itself.
         """
         alone = {
             model.names[0]: model
@@ -104,13 +97,6 @@ def beyond_disturbance(
 
     A disturbance excites the resonances of a rig, and a second effect with its own motion can follow that in each record. If the
     form of the first is slightly wrong, a second that excites the rig may compensate a slow error but cause a fast one.
-
-    Parameters
-    ----------
-    evidence
-        Of models of these records.
-    singles, larger
-        Of one effect and of several, fitted and scored.
     """
     alone = [model for model in singles if model.residuals]
     if not larger or not alone:

@@ -32,21 +32,12 @@ _DEPENDENT = 1e-6
 
 @dataclass(frozen=True)
 class EffectSet:
-    """Effects whose responses explain a residual together.
+    """Effects whose responses explain a residual together."""
 
-    Attributes
-    ----------
-    effects
-        In the order of the candidates.
-    values
-        Values of their own parameters at which the responses have that size, for each effect by its own names.
-    share
-        Share of the squared residual that they explain.
-    """
-
-    effects: tuple[Effect, ...]
+    effects: tuple[Effect, ...]  # in the order of the candidates
+    # Values of their own parameters at which the responses have that size, for each effect by its own names.
     values: tuple[Mapping[str, float], ...]
-    share: float
+    share: float  # share of the squared residual that they explain
 
     @property
     def names(self) -> frozenset[str]:
@@ -55,21 +46,7 @@ class EffectSet:
 
 
 def best_sets(responses: Sequence[Response], residual: Floats, size: int) -> list[EffectSet]:
-    """Return the sets of effects that explain most of a residual together, best first.
-
-    Parameters
-    ----------
-    responses
-        Response to each effect from each of its starts.
-    residual
-        What is to be explained, shape (n,).
-    size
-        Number of effects in a set, at least 2.
-
-    Returns
-    -------
-    Several starts of the same effects are separate sets. Sets in which an effect had a size that it cannot have are left out.
-    """
+    """Return the sets of effects that explain most of a residual together, best first."""
     total = float(residual @ residual)
     if not responses or not total > 0.0:
         return []
@@ -83,22 +60,13 @@ def best_sets(responses: Sequence[Response], residual: Floats, size: int) -> lis
 
 @dataclass(frozen=True)
 class _Columns:
-    """Responses of unit length, none twice.
+    """Responses of unit length, none twice."""
 
-    Attributes
-    ----------
-    responses
-        With their own lengths.
-    gram, along
-        Products of the columns with each other and with the residual, shapes (n, n) and (n,).
-    reversible
-        Whether an effect may have either sign, shape (n,).
-    """
-
-    responses: tuple[Response, ...]
+    responses: tuple[Response, ...]  # with their own lengths
+    # Products of the columns with each other and with the residual, shapes (n, n) and (n,).
     gram: Floats
     along: Floats
-    reversible: NDArray[np.bool_]
+    reversible: NDArray[np.bool_]  # whether an effect may have either sign, shape (n,)
 
     @classmethod
     def of(cls, responses: Sequence[Response], residual: Floats) -> _Columns:
@@ -115,18 +83,7 @@ class _Columns:
         return cls(chosen, gram[np.ix_(kept, kept)], unit[:, kept].T @ residual, reversible)
 
     def extended(self, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
-        """Return sets with one more effect each, best first, and the squared residual that each explains.
-
-        Parameters
-        ----------
-        chosen
-            Indices of the columns of each set, shape (n_sets, size).
-
-        Returns
-        -------
-        chosen, explained
-            Shapes (n_new, size + 1) and (n_new,), at most `SEARCH.joint_beam` sets.
-        """
+        """Return sets with one more effect each, best first, and the squared residual that each explains."""
         names = np.array([response.effect.name for response in self.responses])
         found: dict[tuple[int, ...], float] = {}
         for own in chosen:

@@ -37,25 +37,7 @@ def with_joint_starts(
     is_adequate: Callable[[Scored], bool],
     prepare: Prepare | None = None,
 ) -> list[Scored]:
-    """Return the models of several effects, with those pairs similar to the best one that explain more.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    reidentified
-        The equations without an effect.
-    models
-        Of several effects, fitted and scored.
-    singles
-        Every effect alone, fitted and scored.
-    effects
-        Candidates.
-    is_adequate
-        Says whether the residual of a model is noise and disturbance: then no other pair is searched.
-    prepare
-        Called with the structures that are about to be looked at, to compile them side by side.
-    """
+    """Return the models of several effects, with those pairs similar to the best one that explain more."""
     nearest = _plainest_of_the_best(models)
     if not nearest or len(nearest[0].effects) != 2:
         return list(models)

@@ -29,15 +29,6 @@ def split_distinguishable(
 
     Such pairs compete only if no single effect comes near the floor and the best of them reaches it or leaves only noise and
     disturbance: the residual of an imitation correlates with the motion.
-
-    Parameters
-    ----------
-    pairs, singles
-        Scored models.
-    allowed
-        Error that a named cause may leave, in units of the noise floor.
-    is_adequate
-        Says whether the residual of a model is noise and disturbance.
     """
     best = min((model.error_over_noise for model in singles), default=float("inf"))
     of_one_law = [pair for pair in pairs if _has_one_law(pair)]
@@ -56,26 +47,12 @@ def _has_one_law(model: Scored) -> bool:
 
 
 def is_one_law(model: Scored) -> bool:
-    """Return True for a pair of effects that act as one law.
-
-    Parameters
-    ----------
-    model
-        With any number of effects.
-    """
+    """Return True for a pair of effects that act as one law."""
     return are_one_law(model.effects, model.fit.structure.rig)
 
 
 def are_one_law(effects: Sequence[Effect], rig: Rig) -> bool:
-    """Return True for effects that act as one law on a rig.
-
-    Parameters
-    ----------
-    effects
-        Any number, each at its place.
-    rig
-        The rig.
-    """
+    """Return True for effects that act as one law on a rig."""
     at_one_place = len({effect.at for effect in effects}) == 1
     return len(effects) > 1 and ((at_one_place and _one_force(effects)) or _one_linear_system(effects, rig))
 
@@ -99,13 +76,7 @@ def _one_linear_system(effects: Sequence[Effect], rig: Rig) -> bool:
 
 
 def is_linear(effect: Effect) -> bool:
-    """Return True if an effect leaves a linear rig linear.
-
-    Parameters
-    ----------
-    effect
-        Of the catalogue or from elsewhere.
-    """
+    """Return True if an effect leaves a linear rig linear."""
     signals = [canonical.x, canonical.v, canonical.u, canonical.reading, canonical.spring_torque]
     signals += [canonical.position, canonical.load, canonical.acceleration]
     signals += [

@@ -32,29 +32,7 @@ def with_one_more(
     least_share: float = 0.0,
     enough: float = float("inf"),
 ) -> list[Scored]:
-    """Return a model with each effect added that lowers its cost clearly, fitted and scored.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    parent
-        The model that is extended.
-    effects
-        Candidates to add.
-    known
-        Models with as many effects that need not be tried again.
-    singles
-        Every effect alone, fitted and scored.
-    prepare
-        Called with the structures that are about to be looked at, to compile them side by side.
-    least_share
-        Share of the squared residual above the noise that the push of one of the effects must explain; otherwise only those are
-        tried that no push represents.
-    enough
-        Error, in units of the noise floor, above which effects that the screening puts last are tried, too, if a parameter
-        changes the shape of their force.
-    """
+    """Return a model with each effect added that lowers its cost clearly, fitted and scored."""
     context = context.looking_at_residual(parent.fit)
     open_ones = [
         effect

@@ -40,33 +40,7 @@ def grown(
     is_enough: Callable[[Scored], bool],
     prepare: Prepare | None = None,
 ) -> list[Scored]:
-    """Return fitted models of two and three effects that close at least half of the error of the best with one less.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    singles
-        Every effect alone, fitted and scored.
-    effects
-        Candidates for the second place.
-    at_floor
-        Held-out error in units of the noise floor at which nothing is left to explain.
-    worthwhile
-        Held-out error up to which an effect is believed to explain anything.
-    forms
-        Says which effects are worth trying beside another.
-    together
-        Models whose effects explain most together.
-    is_enough
-        Says whether a pair near the floor leaves only noise and disturbance, as far as that can be told; else it is extended.
-    prepare
-        Called with the structures that are about to be looked at, to compile them side by side.
-
-    Returns
-    -------
-    Each with the effect that explains more alone in first place.
-    """
+    """Return fitted models of two and three effects that close at least half of the error of the best with one less."""
     usable = sorted(
         (m for m in singles if m.residuals and np.isfinite(m.error_over_noise)),
         key=lambda m: m.error_over_noise,
@@ -178,13 +152,7 @@ def _lowest(models: Sequence[Scored]) -> float:
 
 
 def each_once(models: Sequence[Scored]) -> list[Scored]:
-    """Return of the models with the same effects the best, best first.
-
-    Parameters
-    ----------
-    models
-        Fitted and scored.
-    """
+    """Return of the models with the same effects the best, best first."""
     found: dict[frozenset[str], Scored] = {}
     for model in sorted(models, key=lambda model: model.error_over_noise):
         found.setdefault(frozenset(model.names), model)
@@ -192,15 +160,7 @@ def each_once(models: Sequence[Scored]) -> list[Scored]:
 
 
 def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Scored]:
-    """Return models with the effect that explains more alone in first place.
-
-    Parameters
-    ----------
-    models
-        Of several effects.
-    singles
-        Every effect alone, fitted and scored.
-    """
+    """Return models with the effect that explains more alone in first place."""
     alone = {model.names[0]: model.error_over_noise for model in singles}
 
     def left(effect: Effect) -> float:
@@ -225,15 +185,6 @@ def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequenc
     """Return the singles, refitted where they are better from their values in a pair than from their own starts.
 
     A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    singles
-        Every effect alone, fitted and scored.
-    pairs
-        From `grown`.
     """
     better = {model.names: model for model in singles}
     for pair in sorted(pairs, key=lambda pair: pair.error_over_noise)[: SEARCH.most_refitted]:

@@ -20,19 +20,7 @@ from rigsight.diagnose.search.starts import start_values
 def pairs_in_windows(
     context: FitContext, windows: FitContext, reidentified: Scored, pairs: Sequence[Scored]
 ) -> list[Scored]:
-    """Return the best pairs, fitted and scored in windows.
-
-    Parameters
-    ----------
-    context
-        Whole records, scales and noise.
-    windows
-        The same cut into windows.
-    reidentified
-        The re-identified equations on whole records.
-    pairs
-        Fitted to whole records; models of more effects are left out.
-    """
+    """Return the best pairs, fitted and scored in windows."""
     of_two = [pair for pair in pairs if len(pair.effects) == 2]
     nearest = sorted(of_two, key=lambda pair: pair.error_over_noise)[: SEARCH.most_windowed_pairs]
 

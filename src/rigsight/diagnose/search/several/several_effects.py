@@ -33,29 +33,6 @@ def several_effects(
 
     Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
     bound.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    reidentified
-        The equations without an effect.
-    singles
-        Every effect alone, fitted and scored.
-    effects
-        Candidates.
-    forms
-        Says which effects are worth trying beside another.
-    checks
-        Say whether the residual of a model is noise and disturbance.
-    lower_bound
-        True if the noise floor is only a lower bound.
-    prepare
-        Called with the structures that are about to be looked at.
-
-    Returns
-    -------
-    Each with the effect that explains more alone in first place.
     """
     best = min(singles, key=lambda model: model.error_over_noise, default=None)
     is_excused = lower_bound and best is not None and best.error_over_noise <= VERDICT.at_lower_bound

@@ -27,19 +27,6 @@ def with_similar(
 
     One of the two may be right and the other only similar to the right one, or records cannot distinguish them. What each of the
     two explains is the residual of the pair's other parameters without it.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    pairs
-        At least one, fitted and scored.
-    singles
-        Every effect alone, fitted and scored.
-    effects
-        Candidates.
-    prepare
-        Called with the structures that are about to be looked at, to compile them side by side.
     """
     found = list(pairs)
     replaced: Scored | None = None
@@ -65,15 +52,7 @@ def _without_the_other(context: FitContext, pair: Scored, kept: Effect) -> Score
 
 
 def with_other_forms(search: PairSearch, pairs: Sequence[Scored]) -> list[Scored]:
-    """Return the pairs with those in which a more general form of an effect, or a simpler one, stands for it.
-
-    Parameters
-    ----------
-    search
-        Records, candidates and limits.
-    pairs
-        Fitted and scored.
-    """
+    """Return the pairs with those in which a more general form of an effect, or a simpler one, stands for it."""
     found = list(pairs)
     for _ in range(SEARCH.most_swaps):
         best = _best(found)

@@ -31,21 +31,7 @@ def with_a_third(
     forms: OtherForms,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
-    """Return models of three effects, grown from the best pair, fitted and scored.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    singles, pairs
-        Fitted and scored.
-    effects
-        Candidates for the third place.
-    forms
-        Says what other forms of the two would explain.
-    prepare
-        Called with the structures that are about to be looked at, to compile them side by side.
-    """
+    """Return models of three effects, grown from the best pair, fitted and scored."""
     best = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
     alone = min((model.error_over_noise for model in singles), default=np.inf)
     if best is None or not best.error_over_noise * VERDICT.worthwhile < alone:
@@ -65,23 +51,6 @@ def with_relatives(
     """Return the triples with those in which a relative stands for an effect of the best one, and the pairs with their parts.
 
     An effect found with an incomplete model may be only similar to the right one, or more general than needed.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    triples
-        Fitted and scored.
-    pairs
-        Fitted and scored. The parts of the best triples are fitted from there too: so that each effect's share can be told, and
-        because the fit of a pair may have stopped elsewhere where the third effect does nothing.
-    singles
-        Every effect alone, fitted and scored.
-    effects
-        Candidates; those are tried that explain about as much by themselves as the one in whose place they come, and act where it
-        does or are one law with it.
-    prepare
-        Called with the structures that are about to be looked at, to compile them side by side.
     """
     alone = {model.names[0]: model.error_over_noise for model in singles}
 
@@ -117,15 +86,7 @@ def with_relatives(
 
 
 def finished_best(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Return the models, the best two fitted to convergence and those near them to full precision.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    models
-        Fitted and scored.
-    """
+    """Return the models, the best two fitted to convergence and those near them to full precision."""
     ordered = sorted(models, key=lambda model: model.error_over_noise)
     best = [finished(context, model) for model in ordered[: SEARCH.most_finished]]
     return refine(context, [*best, *ordered[SEARCH.most_finished :]])

@@ -47,13 +47,7 @@ class Together:
         self._prepare = prepare
 
     def fitted(self, size: int) -> list[Scored]:
-        """Return models of so many effects that explain most together in the screening, fitted and scored.
-
-        Parameters
-        ----------
-        size
-            Number of effects of each, at least 2.
-        """
+        """Return models of so many effects that explain most together in the screening, fitted and scored."""
         context = self._context
         found: dict[frozenset[str], list[EffectSet]] = {}
         for effect_set in best_sets(self._responses, self._lineup.left, size):
