@@ -21,7 +21,7 @@ from summary import summary_text
 from rigsight.errors import RigsightError
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose
-from rigsight.workflow.campaign.virtual_rig import VirtualRig
+from rigsight.workflow.demo import VirtualRig
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
 
 OUT = HERE.parents[1] / "out/amplitudes"

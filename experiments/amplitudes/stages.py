@@ -27,8 +27,8 @@ from rigsight.simulate import Structure, compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE, read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.campaign.virtual_rig import VirtualRig
 from rigsight.workflow.compare import run_compare
+from rigsight.workflow.demo import VirtualRig
 from rigsight.workflow.identify import run_identify
 from rigsight.workflow.run.results import json_text
 

@@ -34,9 +34,9 @@ from rigsight.identify import (
     linear_start,
     yaw_parameters,
 )
+from rigsight.identify.transfer.conicity import creep_factor
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
-from rigsight.rigs.conicity import creep_factor
 from rigsight.simulate import compose
 
 Array = NDArray[np.float64]

@@ -43,9 +43,9 @@ from rigsight.identify import (
     lateral_parameters,
 )
 from rigsight.identify.hysteresis import SpectralRatio, peak
+from rigsight.identify.transfer.conicity import conicity_slope
 from rigsight.metrics import nrmse
 from rigsight.records import Record
-from rigsight.rigs.conicity import conicity_slope
 
 BOUC_WEN_ALONE = {
     "J_z": 0.44046, "k_c": 632.05, "k_d": 0.29559, "A": 1.0, "a": 0.098914, "beta": 7231.7, "gamma": -6107.1, "n": 1.0,

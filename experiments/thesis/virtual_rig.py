@@ -19,7 +19,7 @@ from rigsight.records import Kind, Record
 from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, simulate
-from rigsight.workflow.campaign.virtual_rig import VirtualRig
+from rigsight.workflow.demo import VirtualRig
 
 AMPLITUDES = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
 """Amplitudes of Figure 5.6 [A]; Table 5.2 has the first four."""

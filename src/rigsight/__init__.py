@@ -9,14 +9,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rigsight.api.comparing import ComparisonResult as ComparisonResult
     from rigsight.api.comparing import compare_models as compare_models
-    from rigsight.api.comparison_result import ComparisonResult as ComparisonResult
     from rigsight.api.diagnoser import Diagnoser as Diagnoser
-    from rigsight.api.diagnosis_result import DiagnosisResult as DiagnosisResult
-    from rigsight.api.discovery_result import DiscoveryResult as DiscoveryResult
+    from rigsight.api.diagnoser import DiagnosisResult as DiagnosisResult
+    from rigsight.api.equation_discoverer import DiscoveryResult as DiscoveryResult
     from rigsight.api.equation_discoverer import EquationDiscoverer as EquationDiscoverer
     from rigsight.api.example import example_campaign as example_campaign
-    from rigsight.api.identification_result import IdentificationResult as IdentificationResult
+    from rigsight.api.linear_identifier import IdentificationResult as IdentificationResult
     from rigsight.api.linear_identifier import LinearIdentifier as LinearIdentifier
     from rigsight.api.reading import read_record as read_record
     from rigsight.api.rig import Rig as Rig
@@ -40,13 +40,13 @@ _HOMES = {
     "CATALOGUE": "rigsight.effects",
     "Campaign": "rigsight.campaign",
     "ColumnMapping": "rigsight.records",
-    "ComparisonResult": "rigsight.api.comparison_result",
+    "ComparisonResult": "rigsight.api.comparing",
     "Diagnoser": "rigsight.api.diagnoser",
-    "DiagnosisResult": "rigsight.api.diagnosis_result",
-    "DiscoveryResult": "rigsight.api.discovery_result",
+    "DiagnosisResult": "rigsight.api.diagnoser",
+    "DiscoveryResult": "rigsight.api.equation_discoverer",
     "Effect": "rigsight.effects",
     "EquationDiscoverer": "rigsight.api.equation_discoverer",
-    "IdentificationResult": "rigsight.api.identification_result",
+    "IdentificationResult": "rigsight.api.linear_identifier",
     "InputError": "rigsight.errors",
     "LinearIdentifier": "rigsight.api.linear_identifier",
     "Model": "rigsight.simulate.model",

@@ -12,7 +12,7 @@ import pytest
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.own.own_simulators import own_simulators
+from rigsight.workflow.own.own_rigs import own_simulators
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -10,8 +10,7 @@ import pytest
 import sympy as sp
 
 from rigsight.discover.motion import Motion
-from rigsight.discover.terms.driven_states import is_filter, states_along
-from rigsight.discover.terms.library import offered_effects
+from rigsight.discover.terms.library import is_filter, offered_effects, states_along
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.effect import State
 from rigsight.effects.symbols import u

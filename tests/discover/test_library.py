@@ -9,7 +9,7 @@ import pytest
 
 from rigsight.discover import RegressionData
 from rigsight.discover.motion import motion_of
-from rigsight.discover.own_regression import own_regression, rows_of
+from rigsight.discover.regression import own_regression, rows_of
 from rigsight.discover.terms.library import candidates
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales

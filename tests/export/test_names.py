@@ -23,7 +23,7 @@ from rigsight.export.python_function import WORDS
 from rigsight.libraries.compiler import c_compilers
 from rigsight.records import Record
 from rigsight.rigs import Rig, read_rig_file
-from rigsight.rigs.reading.functions import FUNCTIONS
+from rigsight.rigs.reading.expressions import FUNCTIONS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 

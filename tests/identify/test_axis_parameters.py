@@ -8,7 +8,7 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify import fit_frequency_response
-from rigsight.identify.transfer.axis_parameters import axis_parameters
+from rigsight.identify.transfer.running_gear_parameters import axis_parameters
 
 OMEGA = np.geomspace(0.5, 100.0, 300)
 GAIN, M, D, K = 3.0, 2.0, 5.0, 800.0

@@ -9,9 +9,9 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.excitation import log_sweep, step
 from rigsight.identify import JointFit, estimate_conicity, fit_jointly
+from rigsight.identify.transfer.conicity import creep_factor
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
-from rigsight.rigs.conicity import creep_factor
 from rigsight.simulate import compose, simulate
 
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 
-from rigsight.identify.start.parameter_products import MixedError, parameter_products
+from rigsight.identify.start.weak_equations import MixedError, parameter_products
 
 M, C, L, Q, W = sp.symbols("m c l q w", real=True)
 UNKNOWN, SIGNALS = frozenset({M, C}), frozenset({Q, W})

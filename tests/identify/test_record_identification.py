@@ -7,7 +7,7 @@ import pytest
 
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep, log_sweep, step
-from rigsight.identify.measured_amplitude import measured_amplitude
+from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.record_identification import EstimationOptions, identify_record
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR

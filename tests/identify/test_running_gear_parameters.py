@@ -16,9 +16,9 @@ from rigsight.identify import (
     offsets,
     yaw_parameters,
 )
+from rigsight.identify.transfer.conicity import conicity_slope, creep_factor
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
-from rigsight.rigs.conicity import conicity_slope, creep_factor
 from rigsight.simulate import compose, simulate
 
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
+from rigsight.identify.fit.covariance import symmetric_eigen
 
 
 @pytest.mark.parametrize("gives_up", [False, True])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigsight.excitation import linear_sweep
-from rigsight.records.excitation_kind import guess_amplitude, guess_kind
+from rigsight.workflow.campaign.record_proposal import guess_amplitude, guess_kind
 
 T = 1e-3 * np.arange(8000)
 PERIOD = 1e-3 * np.arange(2000)

@@ -8,9 +8,9 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep
 from rigsight.records import Record
-from rigsight.records.unit_mismatch import unit_mismatch
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
+from rigsight.workflow.campaign.record_notes import unit_mismatch
 
 DT = 4e-3
 VALUES = {"gain": 1.0, "m": 1.0, "d": 1.5, "k": 400.0, "x_off": 0.0, "force_off": 0.0, "T_c": 0.6}

@@ -7,7 +7,7 @@ import sympy as sp
 
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS, ROLLING, RUNNING_GEAR, evaluated, relative_slopes
-from rigsight.rigs.reading.expression_values import to_sympy
+from rigsight.rigs.reading.declaration import to_sympy
 from rigsight.rigs.reading.expressions import parsed
 
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 
-from rigsight.rigs.reading.expression_values import to_sympy
+from rigsight.rigs.reading.declaration import to_sympy
 from rigsight.rigs.reading.expressions import ExpressionError, parsed
 
 NAMES = {name: sp.Symbol(name, real=True) for name in ("a", "b", "c", "d", "d(phi)")}

@@ -19,7 +19,7 @@ from rigsight.identify.start.weak_equations import WeakEquations
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.rigs.evaluation import array_function
-from rigsight.rigs.reading.functions import FUNCTIONS
+from rigsight.rigs.reading.expressions import FUNCTIONS
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.drift import can_drift

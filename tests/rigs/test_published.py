@@ -8,8 +8,8 @@ import pytest
 
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
+from rigsight.identify.transfer.conicity import conicity_slope, creep_factor
 from rigsight.rigs import RIGS
-from rigsight.rigs.conicity import conicity_slope, creep_factor
 from rigsight.rigs.published import parse_published_set, published_sets
 from rigsight.simulate import compose, parameter_vector
 

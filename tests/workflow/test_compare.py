@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 from rigsight.cli import app
 from rigsight.errors import InputError
 from rigsight.excitation import log_sweep, step
-from rigsight.workflow.campaign.virtual_rig import VirtualRig
 from rigsight.workflow.compare import run_compare
+from rigsight.workflow.demo import VirtualRig
 
 GEAR = """\
 title = "rear <axle>"

@@ -14,8 +14,8 @@ import pytest
 from rigsight.diagnose import Diagnosis
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
+from rigsight.identify.transfer.conicity import creep_factor
 from rigsight.rigs import RUNNING_GEAR
-from rigsight.rigs.conicity import creep_factor
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.compare import run_compare
 from rigsight.workflow.diagnose import run_diagnose

@@ -10,9 +10,9 @@ import numpy as np
 
 from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep, step
+from rigsight.identify.transfer.conicity import creep_factor
 from rigsight.records import Kind, Record, Role
 from rigsight.rigs import RUNNING_GEAR, Rig
-from rigsight.rigs.conicity import creep_factor
 from rigsight.simulate import compose, simulate
 
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}

@@ -2,21 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Literal, Self, get_args
 
-from rigsight.api.diagnosis_result import DiagnosisResult
+from rigsight.api.choice import check_unused, named
 from rigsight.api.estimator import CampaignEstimator, campaign_of
+from rigsight.api.tables import data_frame
 from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis
+from rigsight.diagnose.location.trace import STAGES
 from rigsight.effects import CATALOGUE, Effect
+from rigsight.errors import check_option
 from rigsight.records import Record
+from rigsight.report.notebook import diagnosis_html
+from rigsight.report.record_views import record_drawing
+from rigsight.report.sections import budget_drawing, ranking_drawing
+from rigsight.report.trust import TRUST_COLUMNS, trust_drawing, trust_rows
+from rigsight.report.wording import named_candidate
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
 from rigsight.workflow.campaign.model_file import model_of
-from rigsight.workflow.diagnose import diagnose_campaign
+from rigsight.workflow.diagnose import diagnose_campaign, write_diagnosis
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress_display import listening
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rigsight.plot import Figure
+
+
+Picture = Literal["gap", "candidates", "record", "trust"]
+Table = Literal["candidates", "gap", "parameters", "trust"]
 
 
 class Diagnoser(CampaignEstimator):
@@ -112,3 +131,151 @@ class Diagnoser(CampaignEstimator):
         self.diagnosis_ = DiagnosisResult.of(found, made_by, self.seed, known)
         self.model_ = model_of(found.model, known)
         return self
+
+
+@dataclass(frozen=True)
+class DiagnosisResult(Diagnosis):
+    """The result of a diagnosis, as it is in ``diagnosis.json``, with plots, tables and files.
+
+    Attributes
+    ----------
+    made_by
+        The command or call that made it; quoted in the report.
+    seed
+        Seed of the diagnosis, None where it is not known.
+    own_effects
+        Effects beside those of the catalogue that it may name; the report shows their equations.
+    """
+
+    made_by: str = "rigsight"
+    seed: int | None = None
+    own_effects: tuple[Effect, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        found: Diagnosis,
+        made_by: str = "rigsight",
+        seed: int | None = None,
+        own_effects: Iterable[Effect] = (),
+    ) -> Self:
+        """Return a diagnosis of any origin, for instance of `run_diagnose`, with plots, tables and files.
+
+        Parameters
+        ----------
+        found
+            The diagnosis.
+        made_by, seed, own_effects
+            As the attributes.
+        """
+        return cls(**vars(found), made_by=made_by, seed=seed, own_effects=tuple(own_effects))
+
+    def __repr__(self) -> str:
+        return f"DiagnosisResult({self.title!r}, verdict={self.verdict!r}, effects={self.effects!r})"
+
+    def _repr_html_(self) -> str:
+        return diagnosis_html(self)
+
+    def plot(self, picture: Picture = "gap", record: str | None = None, output: str | None = None) -> Figure:
+        """Draw the diagnosis.
+
+        Parameters
+        ----------
+        picture
+            ``"gap"``: how the gap shrinks, step by step. ``"candidates"``: the error of each. ``"record"``: measured and
+            simulated output of one record, with the errors below. ``"trust"``: parameters estimated from single records.
+        record
+            Name of the record, for ``"record"``; by default the first that was scored.
+        output
+            Name of the output, for ``"record"``; by default the first of the rig.
+
+        Returns
+        -------
+        A new matplotlib figure.
+
+        Raises
+        ------
+        InputError
+            If there is no such picture, record or output, or no parameter was estimated by record.
+        """
+        check_option("The picture", picture, get_args(Picture))
+        check_unused("record", picture, record=record, output=output)
+        if picture == "gap":
+            return budget_drawing(self)
+        if picture == "candidates":
+            return ranking_drawing(self)
+        if picture == "trust":
+            return trust_drawing(self)
+        trace = named("record", record, {trace.record: trace for trace in self.traces})
+        name = named("output", output, {name: name for name in trace.measured})
+        return record_drawing(self, trace, name)
+
+    def to_dataframe(self, table: Table = "candidates") -> pd.DataFrame:
+        """Return a part of the diagnosis as a table.
+
+        Parameters
+        ----------
+        table
+            ``"candidates"``: a row per set of effects that was tried, best first; errors are NRMSE on the validation records.
+            ``"gap"``: a row per output with the NRMSE of each stage. ``"parameters"``: a row per fitted parameter of the
+            diagnosed simulation, with its standard error and unit. ``"trust"``: a row per parameter and group (a record, an
+            amplitude, windows of a length) with its value there, and how the parameter differs between groups.
+
+        Raises
+        ------
+        InputError
+            If there is no such table, or pandas is not installed.
+        """
+        check_option("The table", table, get_args(Table))
+        if table == "gap":
+            columns = (*STAGES, "noise_floor", "closed")
+            return data_frame(
+                (
+                    {"output": output, **{column: getattr(gap, column) for column in columns}}
+                    for output, gap in self.gap.items()
+                ),
+                ("output", *columns),
+            )
+        if table == "trust":
+            return data_frame(trust_rows(self), tuple(TRUST_COLUMNS))
+        if table == "parameters":
+            best = named_candidate(self)
+            return data_frame(
+                (
+                    {"parameter": name, "value": number.value, "std": number.std, "unit": number.unit}
+                    for name, number in (best.parameters if best is not None else {}).items()
+                ),
+                ("parameter", "value", "std", "unit"),
+            )
+        return data_frame(
+            (
+                {
+                    "effects": ", ".join(candidate.effects),
+                    "probability": candidate.probability,
+                    "error_over_noise": candidate.error_over_noise,
+                    **{f"nrmse_{output}": error for output, error in candidate.validation_nrmse.items()},
+                    "converged": candidate.success,
+                }
+                for candidate in self.candidates
+            ),
+            ("effects", "probability", "error_over_noise"),
+        )
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write ``diagnosis.json``, ``model.json`` and ``report.html`` into a folder, all or none.
+
+        Parameters
+        ----------
+        folder
+            Made if it does not exist; files of these names are replaced.
+
+        Returns
+        -------
+        The files written.
+
+        Raises
+        ------
+        InputError
+            If they cannot be written.
+        """
+        return write_diagnosis(self, Path(folder), self.made_by, self.seed, self.own_effects)

@@ -60,8 +60,7 @@ def compare(
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.compare import run_compare
         from rigsight.workflow.own.own_effects import own_effects
-        from rigsight.workflow.own.own_rigs import own_rigs
-        from rigsight.workflow.own.own_simulators import own_simulators
+        from rigsight.workflow.own.own_rigs import own_rigs, own_simulators
 
         own_simulators(simulator or [])
         comparison = run_compare(

@@ -53,8 +53,7 @@ def diagnose(
     with report_errors(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.diagnose import run_diagnose
         from rigsight.workflow.own.own_effects import named, own_effects
-        from rigsight.workflow.own.own_rigs import own_rigs
-        from rigsight.workflow.own.own_simulators import own_simulators
+        from rigsight.workflow.own.own_rigs import own_rigs, own_simulators
 
         own_simulators(simulator or [])
         own = own_effects(effects or [], listener=listener)

@@ -44,8 +44,7 @@ def discover(
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.discover import run_discover
-        from rigsight.workflow.own.own_rigs import own_rigs
-        from rigsight.workflow.own.own_simulators import own_simulators
+        from rigsight.workflow.own.own_rigs import own_rigs, own_simulators
 
         own_simulators(simulator or [])
         found = run_discover(

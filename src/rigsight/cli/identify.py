@@ -74,8 +74,7 @@ def identify(
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.identify import run_identify
         from rigsight.workflow.own.own_effects import named, own_effects
-        from rigsight.workflow.own.own_rigs import own_rigs
-        from rigsight.workflow.own.own_simulators import own_simulators
+        from rigsight.workflow.own.own_rigs import own_rigs, own_simulators
 
         own_simulators(simulator or [])
         # Effects of installed packages are checked only where some may be named.

@@ -92,7 +92,7 @@ def init(
         if folder is None:
             raise InputError("Name the FOLDER of the measured files, or the model of a robot with --mjcf.")
         from rigsight.workflow.init import run_init
-        from rigsight.workflow.own.own_simulators import own_simulators
+        from rigsight.workflow.own.own_rigs import own_simulators
 
         own_simulators(simulator or [])
         draft = run_init(folder, model=model, rig_files=rigs or [])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,12 @@ import typer
 from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Simulators
 from rigsight.cli.terminal import show_as_json
+from rigsight.errors import check_option
+from rigsight.plot import rig_picture, style, svg_text
+from rigsight.rigs import Rig
+from rigsight.workflow.run.results import check_target, write_together
+
+_DPI = 200
 
 
 def list_rigs(
@@ -33,15 +40,12 @@ def list_rigs(
     with report_errors(debug):
         from rigsight.errors import InputError, check_option
         from rigsight.rigs import rig_file_text
-        from rigsight.workflow.own.own_rigs import known_rigs, own_rigs
-        from rigsight.workflow.own.own_simulators import own_simulators
+        from rigsight.workflow.own.own_rigs import known_rigs, own_rigs, own_simulators
 
         own_simulators(simulator or [])
         files = own_rigs(rigs or [])
         known = known_rigs(files.values())
         if picture is not None:
-            from rigsight.workflow.rigs import write_rig_picture
-
             if name is None:
                 raise InputError(
                     "--picture needs the name of the rig to draw: rigsight rigs NAME --picture FILE.png."
@@ -75,3 +79,19 @@ def list_rigs(
             typer.echo(f"{rig.name:{width}}{rig.summary}")
         if files:
             typer.echo(f"\nYour own, checked: {', '.join(rig.name for rig in files.values())}")
+
+
+def write_rig_picture(rig: Rig, file: Path) -> Path:
+    """Draw a rig into a PNG or SVG file."""
+    ending = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
+    check_target(file)
+    figure = rig_picture(rig)
+    content: str | bytes
+    if ending == ".svg":
+        content = svg_text(figure, rig.name)
+    else:
+        stream = io.BytesIO()
+        with style():
+            figure.savefig(stream, format="png", dpi=_DPI)
+        content = stream.getvalue()
+    return write_together(file.parent, {file.name: content})[0]

@@ -91,8 +91,7 @@ def simulate(
     file = out or Path(f"{record.stem}_simulated.csv")
     with report_errors(debug), listening(quiet):
         from rigsight.workflow.own.own_effects import own_effects
-        from rigsight.workflow.own.own_rigs import own_rigs
-        from rigsight.workflow.own.own_simulators import own_simulators
+        from rigsight.workflow.own.own_rigs import own_rigs, own_simulators
         from rigsight.workflow.simulate import run_simulate
 
         own_simulators(simulator or [])

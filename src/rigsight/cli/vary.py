@@ -80,8 +80,7 @@ def vary(
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.own.own_effects import own_effects
-        from rigsight.workflow.own.own_rigs import own_rigs
-        from rigsight.workflow.own.own_simulators import own_simulators
+        from rigsight.workflow.own.own_rigs import own_rigs, own_simulators
         from rigsight.workflow.vary import run_vary, table_text
 
         own_simulators(simulator or [])

@@ -33,11 +33,11 @@ from rigsight.diagnose.result import (
     probability_not_tried,
 )
 from rigsight.diagnose.trust.trust import trust
-from rigsight.diagnose.uncertainty.of_verdict import with_own_errors
+from rigsight.diagnose.uncertainty.bootstrap import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
+from rigsight.diagnose.verdict.main_cause import force_of_one_motion, forces_at_joints, traced_to
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import remainder_of
-from rigsight.diagnose.verdict.unknown_cause import force_of_one_motion, forces_at_joints, traced_to
 from rigsight.diagnose.verdict.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError

@@ -12,7 +12,7 @@ from rigsight.discover.joints.joint_motion import JointMotion as JointMotion
 from rigsight.discover.joints.joint_motion import joint_motions as joint_motions
 from rigsight.discover.missing_force import MissingForce as MissingForce
 from rigsight.discover.missing_force import missing_force as missing_force
-from rigsight.discover.regression_data import RegressionData as RegressionData
+from rigsight.discover.regression import RegressionData as RegressionData
 from rigsight.discover.result import Discovery as Discovery
 from rigsight.discover.terms.monomials import MONOMIALS as MONOMIALS
 from rigsight.discover.terms.monomials import known_terms as known_terms

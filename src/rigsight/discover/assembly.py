@@ -10,7 +10,7 @@ import numpy as np
 
 from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.doubts import doubts, warnings_of
-from rigsight.discover.regression_data import RegressionData
+from rigsight.discover.regression import RegressionData
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
 from rigsight.discover.terms.equations import equations, held_numbers

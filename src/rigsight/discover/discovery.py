@@ -15,9 +15,15 @@ from rigsight.discover.ensembles import inclusion, regressed_force
 from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_discovery import discover_at_joints
 from rigsight.discover.motion import Motion, motion_of
-from rigsight.discover.own_regression import own_regression, own_terms, rows_of
-from rigsight.discover.regression import STRONG, Projected, alike
-from rigsight.discover.regression_data import RegressionData
+from rigsight.discover.regression import (
+    STRONG,
+    Projected,
+    RegressionData,
+    alike,
+    own_regression,
+    own_terms,
+    rows_of,
+)
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import Selection, criterion, select
 from rigsight.discover.terms.hysteresis import is_loop

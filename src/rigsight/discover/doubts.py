@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigsight.discover.bench import Trial
-from rigsight.discover.regression import STRONG
-from rigsight.discover.regression_data import RegressionData
+from rigsight.discover.regression import STRONG, RegressionData
 from rigsight.discover.result import Coefficient, Term
 from rigsight.discover.selection import Selection, criterion
 from rigsight.discover.terms.force_law import ForceEquation

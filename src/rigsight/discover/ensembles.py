@@ -10,9 +10,7 @@ import sympy as sp
 
 from rigsight.discover.bench import Bench
 from rigsight.discover.motion import Motion
-from rigsight.discover.own_regression import own_regression, own_terms
-from rigsight.discover.regression import inclusion_probabilities
-from rigsight.discover.regression_data import RegressionData
+from rigsight.discover.regression import RegressionData, inclusion_probabilities, own_regression, own_terms
 from rigsight.discover.selection import Selection, proposals
 from rigsight.discover.terms.force_law import ForceEquation, ForceLaw, force_equation
 from rigsight.discover.terms.hysteresis import is_loop

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.discover.regression_data import RegressionData
+from rigsight.discover.regression import RegressionData
 from rigsight.errors import InputError
 from rigsight.records.record import Record
 

@@ -14,8 +14,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.discover.motion import Motion, motion_of
-from rigsight.discover.own_regression import own_regression, rows_of
-from rigsight.discover.regression import Projected, alike, inclusion_probabilities
+from rigsight.discover.regression import Projected, alike, inclusion_probabilities, own_regression, rows_of
 from rigsight.discover.terms.library import candidates, plain_terms
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError

@@ -17,7 +17,7 @@ from rigsight.export.python_function import (
     unpacked_parameters,
     unpacked_states,
 )
-from rigsight.simulate.printing.python import PYTHON
+from rigsight.simulate.printing.language import PYTHON
 
 _KINKS = (
     "Its equations have kinks, which a variable-step solver does not detect: choose max_step smaller than the time between "

@@ -16,7 +16,7 @@ from rigsight.export.python_function import min_steps
 from rigsight.export.reserved_words import words
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.equilibrium import BALANCED
-from rigsight.simulate.printing.matlab import MATLAB
+from rigsight.simulate.printing.language import MATLAB
 
 WORDS = words(
     """break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd

@@ -10,8 +10,7 @@ from rigsight.export.equations import Exported, Quantity
 from rigsight.export.reserved_words import words
 from rigsight.simulate.equations.straight_line import StraightLine, straight_line
 from rigsight.simulate.equations.structure import INPUT
-from rigsight.simulate.printing.language import part_name
-from rigsight.simulate.printing.modelica import MODELICA
+from rigsight.simulate.printing.language import MODELICA, part_name
 
 WORDS = words(
     """algorithm and annotation block break class connect connector constant constrainedby der discrete each else elseif

@@ -13,12 +13,11 @@ from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.internal_step import is_linear
-from rigsight.export.local_names import local_names
 from rigsight.export.precomputed import constant_names, equations_of
 from rigsight.export.reserved_words import words
 from rigsight.simulate.equations.structure import input_symbols
 from rigsight.simulate.equilibrium import BALANCED
-from rigsight.simulate.printing.python import PYTHON
+from rigsight.simulate.printing.language import PYTHON
 
 WORDS = frozenset(keyword.kwlist)
 """Of the language."""
@@ -310,3 +309,18 @@ def _balance(exported: Exported, rest: Balance) -> str:
             else "        x = _balanced(numbers, given, x)",
         },
     )
+
+
+def local_names(exported: Exported, own: Set[str]) -> dict[str, str]:
+    """Return what each parameter and state is called: as in the export, or one like it where the function needs that name.
+
+    Others see the names of the export, so that a name used inside costs nobody his own.
+    """
+    names = [quantity.name for quantity in (*exported.parameters, *exported.states)]
+    taken, found = {*names, *own}, {}
+    for name in names:
+        found[name] = name
+        while found[name] in own or (found[name] != name and found[name] in taken):
+            found[name] += "_"
+        taken.add(found[name])
+    return found

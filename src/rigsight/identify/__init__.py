@@ -4,7 +4,7 @@ from rigsight.identify.fit.coordinates import Coordinates as Coordinates
 from rigsight.identify.fit.covariance import SMOOTHED as SMOOTHED
 from rigsight.identify.fit.covariance import sandwich_covariance as sandwich_covariance
 from rigsight.identify.fit.covariance import spectral_product as spectral_product
-from rigsight.identify.fit.fit_memory import FitMemory as FitMemory
+from rigsight.identify.fit.fit_result import FitMemory as FitMemory
 from rigsight.identify.fit.fit_result import FitResult as FitResult
 from rigsight.identify.fit.grey_box import DEFAULT_ACCURACY as DEFAULT_ACCURACY
 from rigsight.identify.fit.grey_box import GreyBoxFit as GreyBoxFit

@@ -9,6 +9,9 @@ from scipy.stats import chi2
 
 from rigsight.identify.identification import RecordIdentification
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
+from rigsight.records.plausibility import is_constant
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
 
 _CHANCE = 1e-3
 """Probability of an equal or larger difference by chance, over all parameters, below which a parameter counts as changing."""
@@ -181,3 +184,22 @@ def _chance(means: Sequence[tuple[float, float]]) -> float:
     values, errors = np.array(means).T
     middle = _mean(means)[0]
     return float(chi2.sf(np.sum(((values - middle) / errors) ** 2), values.size - 1))
+
+
+def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
+    """Return the amplitude of a record in the unit of a signal, and that signal.
+
+    This is the height of a step, or half the range of another input (the first that moves of several); for a free motion, half
+    the range of the first recorded output.
+    """
+    inputs = [signal.name for signal in rig.inputs]
+    outputs = [signal.name for signal in rig.outputs if signal.name in record]
+    moving = [name for name in inputs if not is_constant(record[name])]
+    if record.kind == "step" and not moving:
+        # The record begins with the step.
+        name = max(inputs, key=lambda own: abs(float(record[own][0])))
+        return abs(float(record[name][0])), name
+    name = (moving or outputs or inputs)[0]
+    # Not the deviation from mean or median, which are not zero for a sweep that begins slowly.
+    spanned = float(np.ptp(record[name]))
+    return (spanned if moving and record.kind == "step" else 0.5 * spanned), name

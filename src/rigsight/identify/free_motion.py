@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigsight.identify.combination_text import listed
 from rigsight.identify.rig_equations import equations_of
+from rigsight.identify.undetermined import listed
 from rigsight.parameters import Parameter
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record

@@ -11,7 +11,7 @@ e189, for eigenvalues in relative units.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations
@@ -19,15 +19,28 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.identify.combination_text import listed, percent, product_text, small_fraction, sum_text
-from rigsight.identify.information import Information
+from rigsight.errors import SimulationError
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.identify.information import Information, information
 from rigsight.identify.undetermined import (
     POORLY_KNOWN,
     conditional_errors,
+    listed,
     marginal_errors,
+    percent,
+    product_text,
+    small_fraction,
     sparsest,
+    sum_text,
     undetermined,
 )
+from rigsight.records.record import Record
+from rigsight.simulate import Structure, record_values, simulate
+
+_NOISE = 0.01
+"""Assumed noise of an unrecorded sensor, relative to the RMS of its reading: that of a mediocre sensor."""
+
 
 Floats = NDArray[np.float64]
 
@@ -309,3 +322,36 @@ class _Search:
             if number == 0:
                 alone += step
         return moved, alone
+
+
+def helpful_sensors(
+    structure: Structure,
+    records: Sequence[Record],
+    scales: Mapping[str, float],
+    noise: Mapping[str, float],
+    result: FitResult,
+) -> tuple[str, ...]:
+    """Return a sentence for each unrecorded sensor with which fewer directions of the parameters would be undetermined."""
+    lacking = [s.name for s in structure.rig.outputs if not any(s.name in record for record in records)]
+    before = free_directions(information(GreyBoxFit(structure, records, scales, noise), result))
+    if not lacking or not before:
+        return ()
+    try:
+        shown = [
+            simulate(structure, record_values(structure, result.values, record), record, state)
+            for record, state in zip(records, result.rig_states, strict=True)
+        ]
+    except SimulationError:
+        return ()
+    told = []
+    for name in lacking:
+        with_it = [record.with_signals(**{name: s[name]}) for record, s in zip(records, shown, strict=True)]
+        size = float(np.std(np.concatenate([s[name] for s in shown])))
+        if size == 0.0:
+            continue
+        fit = GreyBoxFit(structure, with_it, scales, {**noise, name: _NOISE * size})
+        left = free_directions(information(fit, result))
+        if left < before:
+            much = "all parameters" if left == 0 else "more of them"
+            told.append(f"If '{name}' were also recorded, these inputs would determine {much}.")
+    return tuple(told)

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
+from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.identification import PathIdentification, RecordIdentification
-from rigsight.identify.measured_amplitude import measured_amplitude
-from rigsight.identify.transfer.axis_parameters import axis_parameters
 from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
 from rigsight.identify.transfer.driven_offsets import driven_offsets
 from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
 from rigsight.identify.transfer.relative_fit import fit_with_relative_error
 from rigsight.identify.transfer.running_gear_parameters import (
     PhysicalEstimates,
+    axis_parameters,
     lateral_parameters,
     static_lateral,
     yaw_parameters,

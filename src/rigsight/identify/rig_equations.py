@@ -16,7 +16,7 @@ from rigsight.effects.symbols import derivative
 from rigsight.records.record import Record
 from rigsight.rigs import Joint, Rig, applied_symbol
 from rigsight.simulate import compose, parameter_vector, record_input, record_values
-from rigsight.simulate.equations.chain_rule import slopes_of
+from rigsight.simulate.equations.derivatives import slopes_of
 from rigsight.simulate.equations.signal_path import bound_to
 from rigsight.simulate.equations.straight_line import StraightLine, of_parts, straight_line
 from rigsight.simulate.equations.structure import TIME, input_symbols

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rigsight.identify.identification import HysteresisIdentification, Identification
 from rigsight.identify.linear_view import LinearView, Mode
 from rigsight.report.drawing.figures import PageFigure, page_figure
-from rigsight.report.hysteresis import derived_rows, error_rows
+from rigsight.report.identification import derived_rows, error_rows
 from rigsight.report.quantities import ERRORS_HOLD, UNDETERMINED, Written, gap_percent, written
 from rigsight.report.render import environment
 

@@ -11,9 +11,8 @@ from rigsight.diagnose.location.gap_parts import AmplitudePart, GapPart, StatePa
 from rigsight.diagnose.result import Diagnosis
 from rigsight.discover import not_contradicted
 from rigsight.records.stamps import written_span
-from rigsight.report.declared import rig_of
 from rigsight.report.drawing.figures import PageFigure, page_figure
-from rigsight.report.quantities import gap_percent
+from rigsight.report.quantities import gap_percent, rig_of
 from rigsight.report.sections import output_label
 from rigsight.report.wording import (
     TIMES,

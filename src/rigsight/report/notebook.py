@@ -11,8 +11,16 @@ from rigsight.discover import Discovery
 from rigsight.identify.identification import Identification
 from rigsight.report.comparison import comparison_view
 from rigsight.report.discovery import discovery_rows
-from rigsight.report.hysteresis import ERROR_HEADS, HEADING, error_rows, hysteresis_rows
-from rigsight.report.identification import amplitude_row, estimate_cell, joint_rows, unit_in_brackets
+from rigsight.report.identification import (
+    ERROR_HEADS,
+    HEADING,
+    amplitude_row,
+    error_rows,
+    estimate_cell,
+    hysteresis_rows,
+    joint_rows,
+    unit_in_brackets,
+)
 from rigsight.report.render import environment
 from rigsight.report.terminal import diagnosis_rows
 from rigsight.report.trust import trust_line

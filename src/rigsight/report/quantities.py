@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rigsight.compare import Column
 from rigsight.compare.score import Quantity
-from rigsight.diagnose.result import Estimate
+from rigsight.diagnose.result import Diagnosis, Estimate
+from rigsight.effects import AT, Effect, kind_of, placed
+from rigsight.rigs import Rig, declared_rig
 
 UNDETERMINED = "not determined by these records"
 ERRORS_HOLD = "Standard errors are of the noise alone: they hold if the equations of the rig do."
@@ -90,3 +93,15 @@ def error_text(value: float | None, quantity: Quantity) -> str:
     if value is None:
         return "-"
     return gap_percent(value) if quantity == "free_run_nrmse" else f"{value:.3g}"
+
+
+def rig_of(diagnosis: Diagnosis) -> Rig | None:
+    """Return the rig; None for a result that only names one that is not built in."""
+    return declared_rig(diagnosis.rig, diagnosis.model.get("declaration", {}))
+
+
+def effect_of(name: str, known: Mapping[str, Effect]) -> Effect | None:
+    """Return the effect of this name at its place, None where it is not known."""
+    effect = known.get(kind_of(name))
+    place = name.partition(AT)[2]
+    return placed(effect, place) if effect is not None and place else effect

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.resources import files
 
@@ -13,13 +14,12 @@ from markupsafe import Markup, escape
 
 from rigsight.diagnose.location.trace import STAGES
 from rigsight.diagnose.result import Diagnosis
-from rigsight.effects import Effect
+from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import location, sections
 from rigsight.report.drawing.loop_figures import loop_figures
 from rigsight.report.drawing.response_charts import amplitude_figures
 from rigsight.report.drawing.rig_figure import rig_figure
-from rigsight.report.equations import equation_groups, known_effects
-from rigsight.report.quantities import Written
+from rigsight.report.quantities import Written, effect_of, rig_of
 from rigsight.report.record_views import record_views
 from rigsight.report.responses import record_responses
 from rigsight.report.trust import trust_view
@@ -27,6 +27,7 @@ from rigsight.report.wording import (
     advice_sentences,
     ambiguity_sentence,
     basis_sentence,
+    effect_label,
     effects_label,
     error_over_noise,
     fault_sentences,
@@ -40,6 +41,10 @@ from rigsight.report.wording import (
     verdict_sentence,
     what_is_probable,
 )
+from rigsight.rigs import Rig
+from rigsight.simulate import compose
+from rigsight.simulate.printing.mathml import mathml_equation
+from rigsight.simulate.printing.shown import shown_equations
 
 _SCRIPT = files("rigsight.report") / "templates" / "chart.js"
 
@@ -161,3 +166,40 @@ def _number(number: Written) -> Markup:
     brackets = Markup("({})") if number.std else Markup("{}")
     power = str(number.exponent).replace("-", "\u2212")
     return brackets.format(text) + Markup(" · 10<sup>{}</sup>").format(power)
+
+
+@dataclass(frozen=True)
+class EquationGroup:
+    """Equations that belong together: whose they are, and each as MathML."""
+
+    title: str
+    equations: list[Markup]
+
+
+def known_effects(own: Iterable[Effect] = ()) -> dict[str, Effect]:
+    """Return the effects of the catalogue and a user's own by name."""
+    return {effect.name: effect for effect in (*CATALOGUE, *own)}
+
+
+def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[EquationGroup]:
+    """Return the equations of the rig, then those of each effect of the diagnosed simulation, in the order of the signal path."""
+    rig = rig_of(diagnosis)
+    # What the given simulation had already stands in the model beside what was added.
+    names = dict.fromkeys([*diagnosis.model.get("effects", ()), *diagnosis.effects])
+    effects = [effect_of(name, known) for name in names]
+    named = [effect for effect in effects if effect is not None]
+    if rig is None or len(named) < len(effects):
+        return []
+    return equations_of(rig, named)
+
+
+def equations_of(rig: Rig, effects: Sequence[Effect]) -> list[EquationGroup]:
+    """Return the equations of a rig, then those of each effect on it, in the order of the signal path."""
+    shown = shown_equations(compose(rig, effects), effect_label)
+    return [
+        EquationGroup(
+            sentence_case(rig.name.replace("_", " ") if owner is None else effect_label(owner)),
+            [Markup(mathml_equation(equation, shown.names)) for equation in equations],
+        )
+        for owner, equations in shown.of_owners.items()
+    ]

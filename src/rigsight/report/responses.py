@@ -24,7 +24,7 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method
 from rigsight.records import Record
 from rigsight.records.record import Hold, Kind
-from rigsight.report.declared import rig_of
+from rigsight.report.quantities import rig_of
 from rigsight.report.wording import stage_names
 
 _METHOD: Method = "local_rational"

@@ -13,9 +13,16 @@ from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
-from rigsight.report.declared import effect_of, rig_of
 from rigsight.report.drawing.figures import PageFigure, page_figure
-from rigsight.report.quantities import UNDETERMINED, Written, gap_percent, written, written_limits
+from rigsight.report.quantities import (
+    UNDETERMINED,
+    Written,
+    effect_of,
+    gap_percent,
+    rig_of,
+    written,
+    written_limits,
+)
 from rigsight.report.wording import (
     TIMES,
     effect_label,

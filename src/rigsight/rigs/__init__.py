@@ -19,6 +19,7 @@ from rigsight.rigs.parts import Coordinate as Coordinate
 from rigsight.rigs.parts import Drive as Drive
 from rigsight.rigs.parts import Joint as Joint
 from rigsight.rigs.parts import Sensor as Sensor
+from rigsight.rigs.parts import Signal as Signal
 from rigsight.rigs.parts import acceleration as acceleration
 from rigsight.rigs.parts import applied_symbol as applied_symbol
 from rigsight.rigs.parts import force_symbol as force_symbol
@@ -27,7 +28,6 @@ from rigsight.rigs.reading.rig_file import read_rig_file as read_rig_file
 from rigsight.rigs.reading.rig_file import rig_of_tables as rig_of_tables
 from rigsight.rigs.rig import Rig as Rig
 from rigsight.rigs.rig import joint_of as joint_of
-from rigsight.rigs.signal import Signal as Signal
 
 __all__ = [
     "AXIS",

@@ -153,3 +153,12 @@ def reading_symbol(name: str) -> sp.Symbol:
 def force_symbol(name: str) -> sp.Symbol:
     """Return the symbol of all that a joint resists with, where a sensor reads it."""
     return sp.Symbol(f"force({name})", real=True)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A recorded quantity: its name in equations and files, its unit, and what it is."""
+
+    name: str
+    unit: str
+    description: str

@@ -16,8 +16,7 @@ from rigsight.parameters import Parameter
 from rigsight.rigs.evaluation import evaluated
 from rigsight.rigs.mechanism import Mechanism
 from rigsight.rigs.one_motion import Follower, Motion, follower_of
-from rigsight.rigs.parts import Drive, Joint, RateState, Sensor
-from rigsight.rigs.signal import Signal
+from rigsight.rigs.parts import Drive, Joint, RateState, Sensor, Signal
 from rigsight.units import unit_text
 
 

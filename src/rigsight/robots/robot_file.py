@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rigsight.errors import InputError
 from rigsight.robots.drafting.draft import RigDraft, draft_rig
-from rigsight.robots.reading.loading import load_spec
+from rigsight.robots.reading.tree import load_spec
 
 if TYPE_CHECKING:
     import mujoco

@@ -23,8 +23,8 @@ from rigsight.simulate.simulation import record_input as record_input
 from rigsight.simulate.simulation import record_values as record_values
 from rigsight.simulate.simulation import simulate as simulate
 from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
-from rigsight.simulate.state_limits import state_limits as state_limits
 from rigsight.simulate.substeps import Substeps as Substeps
+from rigsight.simulate.substeps import state_limits as state_limits
 
 __all__ = [
     "FittedRecord",

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
 
 from rigsight.effects import Effect
 from rigsight.simulate.equations.composition import compose
@@ -79,3 +84,13 @@ class Model:
             },
             "units": units,
         }
+
+
+def at_parameters(structure: Structure, expression: sp.Expr, p: NDArray[np.float64]) -> Any:
+    """Return the value of an expression."""
+    return _function(structure.parameter_symbols, expression)(*p)
+
+
+@lru_cache(maxsize=1024)
+def _function(symbols: tuple[sp.Symbol, ...], expression: sp.Expr) -> Any:
+    return sp.lambdify(symbols, expression, "numpy")

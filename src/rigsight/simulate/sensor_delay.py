@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.simulate.equations.structure import Structure
+from rigsight.simulate.equations.structure import Structure, ahead_name
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.parameter_expression import at_parameters
+from rigsight.simulate.model import at_parameters
+
+Floats = NDArray[np.float64]
 
 
 def as_measured(
@@ -60,3 +62,18 @@ def _delayed(value: NDArray[np.float64], rise: NDArray[np.float64], delay: float
         delayed[:begin] = value[0] + rise[0] * (np.arange(begin) - delay)
         delayed[end:] = value[-1] + rise[-1] * (np.arange(end, n_samples) - delay - (n_samples - 1))
     return delayed
+
+
+def read_ahead(structure: Structure, held: HeldInput, p: Floats) -> tuple[HeldInput, Floats]:
+    """Return input and parameters, with the measured motion of delayed sensors advanced by the delays of the first set."""
+    delays = structure.observed_delays
+    if not delays:
+        return held, p
+    own = p.copy()
+    for sensor, delay in delays.items():
+        by = float(at_parameters(structure, delay, p if p.ndim == 1 else p[:, 0]))
+        if not np.isfinite(by):
+            continue
+        own[structure.names.index(ahead_name(sensor))] = by
+        held = held.read_ahead(len(structure.rig.inputs) + structure.observed.index(sensor), by)
+    return held, own

@@ -13,8 +13,7 @@ from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.read_ahead import read_ahead
-from rigsight.simulate.sensor_delay import as_measured
+from rigsight.simulate.sensor_delay import as_measured, read_ahead
 from rigsight.simulate.simulation import (
     DEFAULT_ACCURACY,
     LOCAL_PER_GLOBAL,

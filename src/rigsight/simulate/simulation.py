@@ -21,9 +21,8 @@ from rigsight.simulate.input_hold import (
     together,
 )
 from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
-from rigsight.simulate.read_ahead import read_ahead
 from rigsight.simulate.rest import rest_state
-from rigsight.simulate.sensor_delay import as_measured
+from rigsight.simulate.sensor_delay import as_measured, read_ahead
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.simulate.equations.structure import Structure
+from rigsight.simulate.model import at_parameters
+
 _NEEDED_BY = 0.99
 """Share of the pieces that need at most the full number of steps; the others need more only because events divide them."""
 
@@ -52,3 +55,24 @@ def relative_needs(taken: NDArray[np.intc]) -> NDArray[np.float64]:
     """Return the steps that pieces need, relative to a number that is sufficient for all but a few of them."""
     place = int(_NEEDED_BY * (taken.size - 1))
     return np.asarray(taken / max(float(np.partition(taken, place)[place]), 1.0))
+
+
+def state_limits(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the half-width of the range that each state cannot leave, infinite for a free state.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    p
+        Parameter values in the order of the structure, shape (n_parameters, n_sets).
+
+    Returns
+    -------
+    Shape (n_states, n_sets).
+    """
+    limits = np.full((len(structure.equations), p.shape[1]), np.inf)
+    for i, equation in enumerate(structure.equations):
+        if equation.limit is not None:
+            limits[i] = at_parameters(structure, equation.limit, p)
+    return limits

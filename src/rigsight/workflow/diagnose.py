@@ -18,6 +18,7 @@ from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.effect_names import effects_on
 from rigsight.workflow.run.fit_journal import FitJournal
+from rigsight.workflow.run.json_file import versions
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
 from rigsight.workflow.run.progress import Listener, Stage, Step, silent, tell
 from rigsight.workflow.run.results import (
@@ -27,7 +28,6 @@ from rigsight.workflow.run.results import (
     json_text,
     write_together,
 )
-from rigsight.workflow.run.versions import versions
 
 DIAGNOSING = "Diagnosing"
 # Noise floor, re-identified equations and the given simulation, before the candidates.

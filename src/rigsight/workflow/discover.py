@@ -15,7 +15,7 @@ from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
-from rigsight.discover.regression_data import has_stiffness
+from rigsight.discover.regression import has_stiffness
 from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.plot import svg_text

@@ -12,7 +12,7 @@ import pytest
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
-from rigsight.diagnose.verdict.unknown_cause import force_of_one_motion, traced_to
+from rigsight.diagnose.verdict.main_cause import force_of_one_motion, traced_to
 from rigsight.discover import JointForce, JointLaw
 from rigsight.effects import effect_named, placed
 from rigsight.identify import GreyBoxFit, characteristic_scales

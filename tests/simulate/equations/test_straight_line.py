@@ -6,7 +6,7 @@ import numpy as np
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
-from rigsight.simulate.equations.chain_rule import slopes_of
+from rigsight.simulate.equations.derivatives import slopes_of
 from rigsight.simulate.equations.straight_line import needed_steps, straight_line
 
 X, Y, P = sp.symbols("x y p", real=True)

@@ -18,7 +18,7 @@ import sympy as sp
 from rigsight.simulate import Structure
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import TIME, input_symbols
-from rigsight.simulate.printing.python import PYTHON
+from rigsight.simulate.printing.language import PYTHON
 
 
 @dataclass(frozen=True)

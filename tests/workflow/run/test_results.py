@@ -20,9 +20,10 @@ from rigsight.workflow.run.results import (
     check_target,
     check_writable,
     json_text,
+    temporary_path,
+    write_locked,
     write_together,
 )
-from rigsight.workflow.run.unfinished_files import temporary_path, write_locked
 from rigsight.workflow.vary import run_vary
 
 CONTENTS = {"a.json": "{}\n", "b.html": "<p>ä</p>\n"}

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.constant_force import known_constant_forces
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.fitting.windows import cut, shown_by
 from rigsight.diagnose.policy import HORIZON
@@ -18,7 +17,7 @@ from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, joint_of
 from rigsight.simulate import Structure, compose, special_values
 
 _ROUGH_ACCURACY = 1e-3
@@ -309,3 +308,20 @@ def _strongest(
         start = int(np.argmax(energy[share:] - energy[:-share]))
         stretches.append(record.slice(start, start + share))
     return tuple(stretches)
+
+
+def known_constant_forces(
+    rig: Rig, effect: Effect, given: Mapping[str, float], has_stiffness: bool
+) -> dict[str, float] | None:
+    """Return the values at which the constant forces are held while an effect is fitted."""
+    if not effect.holds_constant_force:
+        return {}
+    joint = joint_of(rig, effect)
+    names = rig.constant_forces_at(joint)
+    resting = {symbol.name for symbol in joint.rest.free_symbols}
+    defaults = {p.name: p.default for p in rig.parameters if p.name not in resting and p.default is not None}
+    known = {**defaults, **given}
+    needed = [name for name in names if has_stiffness or name not in resting]
+    if any(name not in known for name in needed):
+        return None
+    return {name: known[name] for name in names if name in known}

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.estimates import Estimates, beyond, estimates, mean, told_by_most
-from rigsight.diagnose.trust.orders import Order
-from rigsight.diagnose.trust.patterns import Pattern
+from rigsight.diagnose.trust.patterns import Order, Pattern
 from rigsight.diagnose.trust.pieces import Piece, Pieces
 from rigsight.diagnose.trust.spectra import NoiseSpectra
 from rigsight.identify.undetermined import POORLY_KNOWN

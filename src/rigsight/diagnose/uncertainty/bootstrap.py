@@ -15,18 +15,22 @@ parametric bootstrap and the number of draws. A. C. Davison and D. V. Hinkley, *
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import BOOTSTRAP
-from rigsight.diagnose.result import StdMethod
+from rigsight.diagnose.result import Candidate, Diagnosis, StdMethod
 from rigsight.diagnose.uncertainty.replicates import Replicates
 from rigsight.diagnose.uncertainty.sources import FEWEST, SLOWER, Sources, likeliest_sources
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, OneStep
+
+_STREAM = 1
+"""Beside the seed: other draws of a diagnosis stay what they are without these."""
+
 
 Floats = NDArray[np.float64]
 _Shown = list[tuple[Floats, Floats]]
@@ -190,3 +194,18 @@ def _mean_square(left: Sequence[Floats]) -> float:
         total += float(np.sum(own**2))
         count += int(np.count_nonzero(seen)) * own.size // own.shape[1]
     return total / max(count, 1)
+
+
+def with_own_errors(diagnosis: Diagnosis, context: FitContext, model: Scored, seed: int) -> Diagnosis:
+    """Return a diagnosis whose named candidate has standard errors of the bootstrap."""
+    found = uncertainty_of(context, model.fit, np.random.default_rng([seed, _STREAM]))
+
+    def own(candidate: Candidate) -> Candidate:
+        if candidate.effects != model.names:
+            return candidate
+        estimates = {
+            name: replace(estimate, std=found.std[name]) for name, estimate in candidate.parameters.items()
+        }
+        return replace(candidate, parameters=estimates, std_method=found.method)
+
+    return replace(diagnosis, candidates=tuple(map(own, diagnosis.candidates)))

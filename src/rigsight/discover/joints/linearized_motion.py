@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rigsight.records.record import Record
 from rigsight.simulate import Structure, parameter_vector, record_input
-from rigsight.simulate.equations.chain_rule import slopes_of
+from rigsight.simulate.equations.derivatives import slopes_of
 from rigsight.simulate.equations.elimination import Elimination
 from rigsight.simulate.equations.linear_forms import slope
 from rigsight.simulate.equations.straight_line import straight_line

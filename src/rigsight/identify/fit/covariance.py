@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import norm, t
-
-from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
 
 _DEPENDENT = 1e-14
 """Share of the largest eigenvalue below which the effect of a direction of the coordinates is rounding error."""
@@ -192,3 +191,16 @@ def smoothed_spectrum(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128
     before, after = spectrum[half:0:-1].conj(), spectrum[-2 : -2 - half : -1].conj()
     around = np.concatenate([before, spectrum, after])
     return np.asarray(np.convolve(around, np.full(2 * half + 1, 1.0 / (2 * half + 1)), "valid"))
+
+
+def symmetric_eigen(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return eigenvalues in ascending order, shape (n,), and eigenvectors as columns, shape (n, n).
+
+    Divide and conquer is faster but has failed on a well-conditioned matrix of 90 rows; relatively robust representations are
+    used then.
+    """
+    try:
+        values, vectors = np.linalg.eigh(matrix)
+    except np.linalg.LinAlgError:
+        values, vectors = scipy.linalg.eigh(matrix, driver="evr")
+    return values, vectors

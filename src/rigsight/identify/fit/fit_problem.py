@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.coordinates import FINE_STEP, STEP, Coordinates
+from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.fit_data import FitData, weighted
-from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
 from rigsight.simulate import (
     FittedRecord,
     Substeps,

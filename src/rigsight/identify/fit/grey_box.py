@@ -21,12 +21,11 @@ from rigsight.errors import SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.fit.fit_data import FitData, record_data
-from rigsight.identify.fit.fit_memory import FitMemory, fit_key, record_digest
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_result import FitMemory, FitResult, fit_key, record_digest
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.fit.search import FINE_TOLERANCE, off_kinks, searched
-from rigsight.identify.fit.search_start import SearchStart
+from rigsight.identify.fit.settled_states import SearchStart
 from rigsight.identify.fit.variable_projection import VariableProjection
 from rigsight.records.record import Record
 from rigsight.simulate import (

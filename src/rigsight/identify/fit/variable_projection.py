@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.fit.coordinates import STEP, Coordinates
+from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.fit_data import FitData, weighted
 from rigsight.identify.fit.fit_problem import Evaluation, Problem
-from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
 from rigsight.simulate import simulate_sets
 
 _DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)

@@ -16,8 +16,8 @@ from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Effect, SumAndDifference
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.fit_result import FitResult
-from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
 from rigsight.records.record import Record
 from rigsight.rigs import ELEMENT
 from rigsight.simulate import Structure, compose, simulate_sets

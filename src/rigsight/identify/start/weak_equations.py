@@ -15,7 +15,7 @@ in variables.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,10 +30,13 @@ from rigsight.identify.start.measured_states import (
     sensor_factors,
     supposed_states,
 )
-from rigsight.identify.start.parameter_products import MixedError, parameter_products
 from rigsight.identify.start.projection import Projection, projected
 from rigsight.records.record import Record
 from rigsight.simulate.equations.structure import input_symbols
+
+_MOST_FACTORS = 6
+"""Largest power that is expanded; energies contain squares, and potentials somewhat higher powers."""
+
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -333,3 +336,48 @@ def _in_products(
                 for product, factor in products.items():
                     terms.setdefault((index, is_momentum, product), []).append(factor)
     return [_Term(*key, sp.Add(*factors)) for key, factors in terms.items() if sp.Add(*factors) != 0], mixed
+
+
+class MixedError(ValueError):
+    """Unknown parameters and signals cannot be separated."""
+
+
+def parameter_products(
+    expression: sp.Expr, unknown: frozenset[sp.Symbol], signals: frozenset[sp.Symbol]
+) -> dict[sp.Expr, sp.Expr]:
+    """Return the products of unknown parameters in an expression, each with its factor."""
+    found: dict[sp.Expr, dict[sp.Expr, sp.Expr]] = {}
+
+    def products(own: sp.Expr) -> dict[sp.Expr, sp.Expr]:
+        if own not in found:
+            found[own] = split_distinguishable(own)
+        return found[own]
+
+    def split_distinguishable(own: sp.Expr) -> dict[sp.Expr, sp.Expr]:
+        if not own.free_symbols & unknown:
+            return {sp.S.One: own}
+        if own.is_Add:
+            return _summed(pair for part in own.args for pair in products(part).items())
+        if own.is_Mul:
+            return _multiplied(map(products, own.args))
+        if own.is_Pow and own.exp.is_Integer and 1 < own.exp <= _MOST_FACTORS:
+            return _multiplied([products(own.base)] * int(own.exp))
+        if own.free_symbols & signals:
+            raise MixedError(str(own))
+        return {own: sp.S.One}
+
+    return products(expression)
+
+
+def _summed(pairs: Iterable[tuple[sp.Expr, sp.Expr]]) -> dict[sp.Expr, sp.Expr]:
+    parts: dict[sp.Expr, list[sp.Expr]] = {}
+    for product, factor in pairs:
+        parts.setdefault(product, []).append(factor)
+    return {product: sp.Add(*factors) for product, factors in parts.items()}
+
+
+def _multiplied(factors: Iterable[dict[sp.Expr, sp.Expr]]) -> dict[sp.Expr, sp.Expr]:
+    whole: dict[sp.Expr, sp.Expr] = {sp.S.One: sp.S.One}
+    for factor in factors:
+        whole = _summed((a * b, x * y) for a, x in whole.items() for b, y in factor.items())
+    return whole

@@ -12,13 +12,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import sympy as sp
 from scipy.optimize import brentq
 from scipy.stats import norm
 
+from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 from rigsight.identify.transfer.running_gear_parameters import LEVEL
 from rigsight.rigs import ROLLING, evaluated
-from rigsight.rigs.conicity import conicity_slope, creep_factor
+from rigsight.rigs.built_in import RUNNING_GEAR
+
+(_CREEP_FACTOR,) = (a.value for a in RUNNING_GEAR.alternatives if a.parameter.name == "delta_0")
+_SLOPE = derivative(_CREEP_FACTOR, sp.Symbol("delta_0", real=True))
+
 
 PLAUSIBLE = 0.3
 """Largest plausible conicity of profiled wheels [rad]; an interval that covers the whole range determines nothing. A choice, far
@@ -184,3 +190,13 @@ def _unbounded(c_y: float, largest: float, r_0: float, b: float) -> float | None
     if c_y <= creep_factor(largest, r_0, b):
         return largest
     return float(brentq(lambda delta: creep_factor(delta, r_0, b) - c_y, top, largest))
+
+
+def creep_factor(delta_0: float, r_0: float, b: float) -> float:
+    """Return c_y of (2.12) for the equivalent conicity `delta_0` [rad], wheel radius and track width [m]."""
+    return evaluated(_CREEP_FACTOR, {"delta_0": delta_0, "r_0": r_0, "b": b})
+
+
+def conicity_slope(delta_0: float, r_0: float, b: float) -> float:
+    """Return dc_y / d delta_0 [1/rad] of (2.12)."""
+    return evaluated(_SLOPE, {"delta_0": delta_0, "r_0": r_0, "b": b})

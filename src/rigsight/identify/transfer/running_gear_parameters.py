@@ -20,7 +20,7 @@ from rigsight.identify.fit.covariance import LEVEL as LEVEL
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Record
-from rigsight.rigs import ROLLING, RUNNING_GEAR, Rig, evaluated, relative_slopes
+from rigsight.rigs import AXIS, ROLLING, RUNNING_GEAR, Rig, evaluated, relative_slopes
 
 _POSITIVE = frozenset({"J_z", "k_c", "k_d", "l_0", "c_y"})
 _RESTS = 1e-3
@@ -275,3 +275,10 @@ def _mean(samples: NDArray[np.float64]) -> tuple[float, float]:
     mean = float(np.mean(samples))
     variance = colored_covariance([(samples - mean, np.ones((samples.size, 1)))], 1)
     return mean, float(np.sqrt(variance[0, 0]))
+
+
+def axis_parameters(fit: TransferFit, gain: float) -> PhysicalEstimates:
+    """Return m, d and k of a PT2 from input to displacement, ``m x'' + d x' + k x = gain u``."""
+    check_fit(fit, "pt2", "axis", "x / u")
+    method = f"gain, break frequency and damping of the {fit.method}"
+    return motion_parameters(AXIS, fit, {AXIS.motion.drive_gain.name: gain}, None, method)

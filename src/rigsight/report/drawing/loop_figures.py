@@ -9,9 +9,8 @@ from rigsight import plot
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.records.stamps import written_span
-from rigsight.report.declared import rig_of
 from rigsight.report.drawing.figures import PageFigure, page_figure
-from rigsight.report.quantities import gap_percent
+from rigsight.report.quantities import gap_percent, rig_of
 from rigsight.report.wording import listed, sentence_case, stage_names
 from rigsight.simulate.prescribed_motion import smooth_motion
 

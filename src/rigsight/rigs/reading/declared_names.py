@@ -6,8 +6,7 @@ from collections.abc import Iterable
 
 from rigsight.errors import nearest, shown
 from rigsight.rigs.reading.declaration import NAMED, Declaration, Path
-from rigsight.rigs.reading.expressions import RATE, force_name, is_identifier, rate_name
-from rigsight.rigs.reading.functions import FUNCTIONS
+from rigsight.rigs.reading.expressions import FUNCTIONS, RATE, force_name, is_identifier, rate_name
 
 _LONGEST_NAME = 60
 _NEEDED = {

@@ -8,15 +8,16 @@ import sympy as sp
 
 from rigsight.parameters import Parameter
 from rigsight.rigs.mechanism import Mechanism
-from rigsight.rigs.parts import Coordinate, Drive, Joint, RateState, Sensor
+from rigsight.rigs.parts import Coordinate, Drive, Joint, RateState, Sensor, Signal
 from rigsight.rigs.reading.declaration import DRIVE_PARTS, JOINT_PARTS, Declaration, Path
 from rigsight.rigs.reading.expressions import rate_name
 from rigsight.rigs.reading.rig_tables import ConstantTable, ParameterTable
-from rigsight.rigs.reading.roles import sized_by
 from rigsight.rigs.reading.simulator import simulated_bodies
 from rigsight.rigs.rig import Alternative, Rig
-from rigsight.rigs.signal import Signal
 from rigsight.units import size_of
+
+_OF_A_JOINT = {"stiffness": "force x^-1", "damping": "force time x^-1", "rest": "x", "force": "force"}
+
 
 _LARGEST, _LEAST = 1e18, 1e-15
 """Ends of what a number may be where none are declared, and the least one whose logarithm is searched."""
@@ -149,3 +150,19 @@ def _parameter(
         default=own.default,
         logarithmic=log,
     )
+
+
+def sized_by(name: str, unit: str, mechanism: Mechanism) -> str:
+    """Return the dimension (`rigsight.units`) of a parameter on a rig with one joint; ``""`` where nothing sets its size."""
+    if len(mechanism.joints) == 1 and len(mechanism.coordinates) == 1:
+        joint = mechanism.joints[0]
+        for part, dimension in _OF_A_JOINT.items():
+            if _is(getattr(joint, part), name):
+                return dimension
+        if mechanism.free and _is(mechanism.mass_matrix[0, 0], name):
+            return "force time^2 x^-1"
+    return "length" if any(unit == state.unit for state in mechanism.states) else ""
+
+
+def _is(expression: sp.Expr, name: str) -> bool:
+    return expression in (sp.Symbol(name, real=True), -sp.Symbol(name, real=True))

@@ -15,8 +15,14 @@ from typing import Any
 
 from lark import Token, Tree
 
-from rigsight.rigs.reading.expressions import READS, Expression, ExpressionError, constant, place_of
-from rigsight.rigs.reading.functions import FUNCTIONS
+from rigsight.rigs.reading.expressions import (
+    FUNCTIONS,
+    READS,
+    Expression,
+    ExpressionError,
+    constant,
+    place_of,
+)
 from rigsight.units import INPUT_UNIT
 
 Dimension = Any

@@ -12,11 +12,48 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import sympy as sp
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken
 
+from rigsight.effects.symbols import positive_part
 from rigsight.errors import nearest
-from rigsight.rigs.reading.functions import FUNCTIONS
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function that expressions may call."""
+
+    arguments: tuple[str, ...]  # how many it takes, for messages: their names
+    build: Callable[..., sp.Expr]  # the expression it stands for
+    # ``"pure"`` takes and gives plain numbers, ``"same"`` takes one unit and gives it, ``"sign"`` takes any
+    # unit and gives a plain number, ``"root"`` gives the root of its unit.
+    kind: str
+
+
+def _larger(a: sp.Expr, b: sp.Expr) -> sp.Expr:
+    return b + positive_part(a - b)
+
+
+def _smaller(a: sp.Expr, b: sp.Expr) -> sp.Expr:
+    return a - positive_part(a - b)
+
+
+FUNCTIONS: Mapping[str, Function] = {
+    **{
+        name: Function(("x",), getattr(sp, name), "pure")
+        for name in ("sin", "cos", "tan", "atan", "exp", "log", "tanh")
+    },
+    "atan2": Function(("y", "x"), sp.atan2, "ratio"),
+    "sqrt": Function(("x",), sp.sqrt, "root"),
+    # sympy takes the magnitude of an exponential of a power for exp(re(...)), as if it could be complex.
+    "abs": Function(("x",), lambda x: sp.Abs(x).replace(sp.re, lambda real: real), "same"),
+    "sign": Function(("x",), sp.sign, "sign"),
+    "max": Function(("x", "y"), _larger, "same"),
+    "min": Function(("x", "y"), _smaller, "same"),
+    "clip": Function(("x", "low", "high"), lambda x, low, high: _smaller(_larger(x, low), high), "same"),
+}
+
 
 _GRAMMAR = r"""
 ?sum: product | product (plus | minus)+

@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
 from rigsight.records.formats.ordinary_file import file_size
+from rigsight.rigs.parts import READING
 from rigsight.rigs.reading.declaration import Declaration
 from rigsight.rigs.reading.declared_names import check_all_used, check_declared_names, check_names_read
 from rigsight.rigs.reading.declared_rig import rig_of
 from rigsight.rigs.reading.declared_units import check_units_add_up
-from rigsight.rigs.reading.signal_order import signal_order
 from rigsight.rigs.reading.simulator import check_simulator, with_whole_path
 from rigsight.rigs.reading.sound_mechanism import check_mechanism
 from rigsight.rigs.reading.toml_places import Path as KeyPath
@@ -112,3 +113,28 @@ def _checked(declaration: Declaration, check_units: bool) -> Rig:
     rig = rig_of(declaration, order)
     check_mechanism(declaration, rig.mechanism)
     return rig
+
+
+def signal_order(declaration: Declaration) -> list[KeyPath]:
+    """Return the paths of signals, drives and sensors so that each reads only those in front of it."""
+    table = declaration.table
+    own: dict[str, KeyPath] = {
+        **{name: ("signals", name) for name in table.signals},
+        **{name: ("drives", name, "signal") for name in table.drives},
+        **{f"{READING}{name}": ("sensors", name, "reads") for name in table.sensors},
+    }
+    graph: dict[str, set[str]] = {}
+    for node, path in own.items():
+        read = {
+            f"{READING}{name}" if declaration.reads_sensor(path, name) else name
+            for name in declaration.expressions[path].reads
+        }
+        graph[node] = {name for name in read if name in own}
+    try:
+        return [own[node] for node in TopologicalSorter(graph).static_order()]
+    except CycleError as error:
+        loop = [name.removeprefix(READING) for name in reversed(error.args[1])]
+        declaration.refuse(
+            own[error.args[1][0]],
+            f"an algebraic loop (no state in it): {' -> '.join(loop)}; each needs the value of the next",
+        )

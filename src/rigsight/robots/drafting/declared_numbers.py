@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 
-from rigsight.robots.drafting.naming import Names
+from rigsight.rigs.reading.expressions import FUNCTIONS
+
+_LONGEST = 40
+"""Characters of a part's name; what is made of it has more."""
 
 
 @dataclass(frozen=True)
@@ -73,3 +77,21 @@ class DeclaredNumbers:
         self.parameters[name] = table if lower is None else {**table, "lower": lower}
         self.fields[name] = fields
         return name
+
+
+class Names:
+    """Gives names that no other part has."""
+
+    def __init__(self) -> None:
+        self._taken = {*FUNCTIONS, "t", "d", "force"}
+
+    def free(self, wished: str, otherwise: str = "part") -> str:
+        """Return the requested name if it is valid and free, or a similar one."""
+        name = re.sub(r"\W+", "_", wished, flags=re.ASCII).strip("_")[:_LONGEST] or otherwise
+        name = name if not name[0].isdigit() else f"{otherwise}_{name}"
+        found, count = name, 1
+        while found in self._taken:
+            count += 1
+            found = f"{name}_{count}"
+        self._taken.add(found)
+        return found

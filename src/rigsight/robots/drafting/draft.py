@@ -11,18 +11,21 @@ import sympy as sp
 
 from rigsight.errors import InputError
 from rigsight.rigs import Rig, rig_of_tables
-from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field, Names
 from rigsight.robots.drafting.drive_tables import drive_of, plain_drive
 from rigsight.robots.drafting.energies import Energies, energies_of
 from rigsight.robots.drafting.gears import gear_table, split_joints
 from rigsight.robots.drafting.joint_tables import armature, joint_table, way_unit
-from rigsight.robots.drafting.naming import Names
-from rigsight.robots.drafting.simulator_table import simulator_table
 from rigsight.robots.reading.actuators import actuators_of
 from rigsight.robots.reading.left_out import left_out_of
 from rigsight.robots.reading.sensors import TreeSensor, sensors_of
 from rigsight.robots.reading.tree import TreeJoint, bodies_of, gravity_of
 from rigsight.simulators import has_constraints
+
+if TYPE_CHECKING:
+    import mujoco
+import os
+from pathlib import Path
 
 if TYPE_CHECKING:
     import mujoco
@@ -214,3 +217,56 @@ def _sensor_tables(
 def _sum(*terms: sp.Expr) -> str:
     """Return a sum as an expression of a rig file."""
     return str(sp.Add(*terms)).replace("**", "^")
+
+
+def rig_text(draft: RigDraft, source: str, folder: Path) -> str:
+    """Return the text of a rig file."""
+    try:
+        import tomli_w
+    except ImportError:
+        raise InputError(
+            "Writing a rig file needs tomli-w, which is not installed: pip install 'rigsight[mujoco]'."
+        ) from None
+    lines = [f"Written by rigsight init from {source}.", *draft.notes]
+    if draft.left_out:
+        lines += ["Not taken over:", *(f"- {what}" for what in draft.left_out)]
+    head = "\n".join(f"# {line}" for line in "\n".join(lines).split("\n"))
+    tables = dict(draft.tables)
+    if draft.is_as_it_is:
+        beside = Path(os.path.relpath(tables["simulator"]["file"], folder.resolve())).as_posix()
+        tables["simulator"] = {**tables["simulator"], "file": beside}
+    return f"{_printable(head)}\n\n{tomli_w.dumps(tables)}"
+
+
+def _printable(text: str) -> str:
+    """Return text without the signs that TOML forbids in comments."""
+    return "".join(sign if sign in "\n\t" or sign.isprintable() else " " for sign in text)
+
+
+def simulator_table(
+    model: mujoco.MjModel,
+    file: str,
+    joints: Sequence[tuple[TreeJoint, str]],
+    fields: Mapping[str, tuple[Field, ...]],
+) -> dict[str, Any]:
+    """Return the table."""
+    for joint, _ in joints:
+        if not joint.name:
+            raise InputError(
+                f"joint number {joint.index} has no name, which is needed to access it in MuJoCo; give it one"
+            )
+    names = {joint.index: joint.name for joint, _ in joints}
+    parameters = {
+        name: f"dof_armature {names[own[0].index]}"
+        for name, own in fields.items()
+        if own[0].attribute == "armature" and has_constraints(model)
+    }
+    rotors = any(own[0].attribute == "armature" for own in fields.values())
+    coordinates = {q: joint.name for joint, q in joints if joint.name != q}
+    return {
+        "kind": "mujoco",
+        "file": file,
+        **({"without_armature": True} if rotors and not parameters else {}),
+        **({"coordinates": coordinates} if coordinates else {}),
+        **({"parameters": parameters} if parameters else {}),
+    }

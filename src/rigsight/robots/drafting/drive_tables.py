@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field, Names
 from rigsight.robots.drafting.joint_tables import force_unit, way_unit
-from rigsight.robots.drafting.naming import Names
 from rigsight.robots.reading.actuators import TreeActuator
 from rigsight.robots.reading.tree import TreeJoint
 

@@ -3,19 +3,108 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import InputError
 from rigsight.robots.drafting.declared_numbers import Field
 from rigsight.robots.drafting.draft import Gear, RigDraft
 from rigsight.robots.robot_file import RobotFile, read_robot
-from rigsight.robots.writing.effect_fields import EFFECT_FIELDS
-from rigsight.robots.writing.second_joint import add_second_joint
 from rigsight.simulate.model import Model
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+_IMPEDANCE = 0.01
+"""Of the limit of a joint: with MuJoCo's own, 0.9 to 0.95, what moves would seem ten to twenty times as heavy at the limit."""
+
+
+_SLACK = 2
+"""Samples of a control's history beyond its delay: one for the step in hand, one for rounding."""
+
+Write = Callable[[Any, Mapping[str, float], Any], str | None]
+"""Writes an effect's own values into an element, given the model's options, and says why not where it cannot."""
+_LINEAR = 1
+"""How a history is read between two steps: a delay need be no whole number of them."""
+
+
+@dataclass(frozen=True)
+class EffectField:
+    """Where an effect is written."""
+
+    element: str  # ``"joint"``, ``"actuator"`` or ``"sensor"``
+    attribute: str  # for people
+    write: Write  # does it
+
+
+def _added(attribute: str, own: str, entry: int | None = None) -> Write:
+    def write(element: Any, values: Mapping[str, float], _: Any) -> None:
+        if entry is None:
+            setattr(element, attribute, float(getattr(element, attribute)) + values[own])
+        else:
+            getattr(element, attribute)[entry] += values[own]
+
+    return write
+
+
+def _late(own: str) -> Write:
+    def write(element: Any, values: Mapping[str, float], options: Any) -> str | None:
+        import mujoco
+
+        late = values[own]
+        if (
+            own == "T_d"
+            and options.integrator == int(mujoco.mjtIntegrator.mjINT_RK4)
+            and element.delay <= 0.0
+        ):
+            # The Runge-Kutta method reads on within a step, where a controller holds its command: half a step early on average.
+            late += 0.5 * options.timestep
+        element.delay = max(float(element.delay), 0.0) + late
+        element.nsample = max(element.nsample, int(element.delay / options.timestep) + _SLACK)
+        element.interp = _LINEAR
+        return None
+
+    return write
+
+
+def _limited(element: Any, values: Mapping[str, float], _: Any) -> str | None:
+    size = values["u_max"]
+    low, high = (-size, size)
+    if element.ctrlrange[0] < element.ctrlrange[1]:
+        low, high = max(low, float(element.ctrlrange[0])), min(high, float(element.ctrlrange[1]))
+    element.ctrlrange[:] = (low, high)
+    element.ctrllimited = True
+    return None
+
+
+def _filtered(element: Any, values: Mapping[str, float], _: Any) -> str | None:
+    import mujoco
+
+    if element.dyntype != mujoco.mjtDyn.mjDYN_NONE:
+        return "the actuator has a filter already"
+    element.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
+    element.dynprm[0] = values["T_a"]
+    return None
+
+
+EFFECT_FIELDS: Mapping[str, EffectField] = {
+    "coulomb_friction": EffectField("joint", "frictionloss", _added("frictionloss", "T_c")),
+    "quadratic_damping": EffectField("joint", "damping, second number", _added("damping", "c_2", 1)),
+    "asymmetric_stiffness": EffectField("joint", "stiffness, second number", _added("stiffness", "k_2", 1)),
+    "cubic_stiffness": EffectField("joint", "stiffness, third number", _added("stiffness", "k_3", 2)),
+    "input_delay": EffectField("actuator", "delay", _late("T_d")),
+    "input_saturation": EffectField("actuator", "ctrlrange", _limited),
+    "actuator_lag": EffectField("actuator", "dyntype filterexact", _filtered),
+    "sensor_delay": EffectField("sensor", "delay", _late("T_s")),
+}
+"""By the name of the effect, as of MuJoCo 4.0."""
+
 
 _SAME = 1e-12
 """Relative difference below which a number is the one that the file has."""
@@ -186,3 +275,48 @@ class _Writer:
         # An XML comment must not contain two hyphens in a row.
         comment = "\n".join(lines).replace("--", "- -")
         return WrittenBack(f"<!-- {comment} -->\n{text}", tuple(self._written), tuple(self._without_field))
+
+
+def with_gears(spec: mujoco.MjSpec, draft: RigDraft) -> mujoco.MjModel:
+    """Return the compiled model with the second joint of each gear, as a spring."""
+    joints = {joint.id: joint for joint in spec.joints}
+    for place, gear in draft.gears.items():
+        add_second_joint(
+            spec,
+            joints[gear.joint],
+            draft.values[f"{place}_stiffness"],
+            draft.values[f"{place}_damping"],
+            0.0,
+        )
+    return spec.compile()
+
+
+def add_second_joint(spec: mujoco.MjSpec, first: Any, stiffness: float, damping: float, play: float) -> str:
+    """Add what lies between a rotor and its body to a MuJoCo model, and return the name of the joint.
+
+    Without play it is a spring. With play the spring acts beyond a range, as the limit of the joint, whose stiffness MuJoCo
+    counts by the inertia that it moves.
+    """
+    import mujoco
+
+    name = f"{first.name}_play"
+    second = first.parent.add_joint(name=name, type=first.type, axis=list(first.axis), pos=list(first.pos))
+    if play <= 0.0:
+        second.stiffness[0], second.damping[0] = stiffness, damping
+        return name
+    in_degrees = bool(spec.compiler.degree) and first.type == mujoco.mjtJoint.mjJNT_HINGE
+    half = math.degrees(play) if in_degrees else play
+    second.range[:] = (-half, half)
+    second.limited = 1
+    compiled = spec.compile()
+    data = mujoco.MjData(compiled)
+    mujoco.mj_forward(compiled, data)
+    mass = np.zeros((compiled.nv, compiled.nv))
+    mujoco.mj_fullM(compiled, data, mass)
+    dof = int(compiled.jnt_dofadr[compiled.joint(name).id])
+    moved = 1.0 / float(np.linalg.inv(mass)[dof, dof])
+    # An acceleration is (1 - d) times what it is without the limit, less what the limit pulls: a spring for a small impedance d.
+    free = 1.0 - _IMPEDANCE
+    second.solimp_limit[:2] = (_IMPEDANCE, _IMPEDANCE)
+    second.solref_limit[:] = (-stiffness * free / moved, -damping * free / moved)
+    return name

@@ -8,6 +8,9 @@ from functools import lru_cache
 from typing import Any
 
 import sympy as sp
+from sympy.printing.c import C99CodePrinter
+from sympy.printing.octave import OctaveCodePrinter
+from sympy.printing.pycode import PythonCodePrinter
 
 from rigsight.simulate.equations.straight_line import StraightLine, needed_steps, straight_line
 
@@ -88,3 +91,73 @@ def _symbols(names: Mapping[sp.Symbol, str]) -> dict[sp.Symbol, sp.Symbol]:
 
 def _plain(expression: sp.Expr) -> sp.Expr:
     return expression.evalf() if expression.is_number else expression
+
+
+class MatlabPrinter(OctaveCodePrinter):  # type: ignore[misc]
+    """MATLAB for scalars, so that operators need no dot."""
+
+    def _print_Mul(self, expr: sp.Mul) -> str:  # noqa: N802
+        return str(super()._print_Mul(expr)).replace(".*", "*").replace("./", "/")
+
+    def _print_Pow(self, expr: sp.Pow) -> str:  # noqa: N802
+        return str(super()._print_Pow(expr)).replace(".^", "^").replace("./", "/")
+
+    def _print_absolute(self, expr: sp.Function) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_positive_part(self, expr: sp.Function) -> str:
+        return f"max({self._print(expr.args[0])}, 0)"
+
+
+MATLAB = Language(MatlabPrinter(), "{} = {};", "{} = {};")
+
+
+class ModelicaPrinter(C99CodePrinter):  # type: ignore[misc]
+    """Modelica: ``^`` for powers; ``abs``, ``sign`` and ``max`` are built in and generate their own events."""
+
+    def _print_Pow(self, expr: sp.Pow) -> str:  # noqa: N802
+        if expr.exp == -1:
+            return f"1.0/{self.parenthesize(expr.base, 1000)}"
+        if expr.exp == sp.Rational(1, 2):
+            return f"sqrt({self._print(expr.base)})"
+        return f"{self.parenthesize(expr.base, 1000)}^{self.parenthesize(expr.exp, 1000)}"
+
+    def _print_Abs(self, expr: sp.Abs) -> str:  # noqa: N802
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_sign(self, expr: sp.sign) -> str:
+        return f"sign({self._print(expr.args[0])})"
+
+    def _print_positive_part(self, expr: sp.Function) -> str:
+        return f"max({self._print(expr.args[0])}, 0.0)"
+
+
+MODELICA = Language(ModelicaPrinter(), "{} = {};", "{} = {};")
+
+
+class PythonPrinter(PowersAsProducts, PythonCodePrinter):  # type: ignore[misc]
+    """Python; ``sign_of`` is a function in the generated file."""
+
+    def __init__(self) -> None:
+        super().__init__({"fully_qualified_modules": True, "strict": False})
+
+    def _print_Abs(self, expr: sp.Abs) -> str:  # noqa: N802
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_absolute(self, expr: sp.Function) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_positive_part(self, expr: sp.Function) -> str:
+        return f"max({self._print(expr.args[0])}, 0.0)"
+
+    def _print_sign(self, expr: sp.sign) -> str:
+        return f"sign_of({self._print(expr.args[0])})"
+
+    def _print_Rational(self, expr: sp.Rational) -> str:  # noqa: N802
+        return repr(float(expr))
+
+    def _print_Half(self, expr: sp.Expr) -> str:  # noqa: ARG002, N802
+        return "0.5"
+
+
+PYTHON = Language(PythonPrinter(), "{} = {}", "{} = {}")

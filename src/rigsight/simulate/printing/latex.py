@@ -10,8 +10,7 @@ from sympy.printing.latex import LatexPrinter as SympyLatexPrinter
 from sympy.printing.precedence import PRECEDENCE
 
 from rigsight.simulate.printing.names import GREEK, ShownName, named
-from rigsight.simulate.printing.reading_order import ReadingOrder
-from rigsight.simulate.printing.shown import ShownEquation
+from rigsight.simulate.printing.shown import ReadingOrder, ShownEquation
 
 _DIGITS = 6
 """Significant digits of numbers in an effect's equation; values of parameters are given separately."""

@@ -10,8 +10,7 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.precedence import PRECEDENCE
 
 from rigsight.simulate.printing.names import ShownName, named
-from rigsight.simulate.printing.reading_order import ReadingOrder
-from rigsight.simulate.printing.shown import ShownEquation
+from rigsight.simulate.printing.shown import ReadingOrder, ShownEquation
 
 _TIMES = '<mo lspace="0.14em" rspace="0.14em">&InvisibleTimes;</mo>'
 """A little space, so that names of several letters do not run into each other."""

@@ -8,8 +8,7 @@ import sympy as sp
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.str import StrPrinter
 
-from rigsight.simulate.printing.reading_order import ReadingOrder
-from rigsight.simulate.printing.shown import ShownEquation
+from rigsight.simulate.printing.shown import ReadingOrder, ShownEquation
 
 _JOINED = {"": "", "+": " + ", "-": " - "}
 _WITHIN = " within |%s| <= %s"

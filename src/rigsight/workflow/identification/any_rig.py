@@ -19,11 +19,11 @@ from rigsight.identify import (
     OpenFactor,
     characteristic_scales,
     linear_start,
+    off_bounds,
     swallowed_by_offsets,
 )
-from rigsight.identify.amplitude_dependence import amplitude_dependence
-from rigsight.identify.helpful_sensors import helpful_sensors
-from rigsight.identify.identifiability import identifiability, relative_errors
+from rigsight.identify.amplitude_dependence import amplitude_dependence, measured_amplitude
+from rigsight.identify.identifiability import helpful_sensors, identifiability, relative_errors
 from rigsight.identify.identification import (
     Identification,
     JointIdentification,
@@ -39,7 +39,6 @@ from rigsight.identify.linear_view import (
     measured_responses,
     near_rest,
 )
-from rigsight.identify.measured_amplitude import measured_amplitude
 from rigsight.identify.reached_bounds import reached_bounds
 from rigsight.identify.record_identification import EstimationOptions
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
@@ -50,7 +49,6 @@ from rigsight.rigs import Rig, evaluated, has_built_in_parameters, is_built_in_m
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
-from rigsight.workflow.identification.effect_starts import start_with_effects
 from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters
 from rigsight.workflow.identification.warnings import (
     any_rig_warnings,
@@ -345,3 +343,23 @@ def _views(
         except SimulationError:
             continue
     return views
+
+
+def start_with_effects(
+    campaign: Campaign,
+    windows: Sequence[Record],
+    start: Mapping[str, float],
+    held: Mapping[str, float],
+    sizes: Mapping[str, float],
+) -> dict[str, float]:
+    """Return the parameters of the best of several fits: from the given values, and from inside of bounds at which they lie."""
+    structure = compose(campaign.rig, campaign.modelled)
+    begin = {**campaign.constants, **start, **held}
+    scales = characteristic_scales(campaign.rig, windows, begin)
+    fixed = {*held, *campaign.constants}
+    free = [p.name for p in structure.parameters if p.fitted and p.name not in fixed]
+    problem = GreyBoxFit(structure, windows, scales, sizes)
+    given = {**begin, **campaign.given, **held}
+    starts = [given, {**given, **begin}]
+    starts += [inside for own in starts if (inside := off_bounds(structure, own, free, scales)) is not None]
+    return min((problem.fit(own, free) for own in starts), key=lambda fit: fit.cost).values

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from scipy.stats import norm
+
+from rigsight.identify.hysteresis.derived import Derived
 from rigsight.identify.identification import (
+    HysteresisIdentification,
     Identification,
     JointIdentification,
     PathIdentification,
@@ -14,7 +18,6 @@ from rigsight.identify.identification import (
 from rigsight.identify.transfer.conicity import ConicityEstimate
 from rigsight.identify.transfer.running_gear_parameters import LEVEL, PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.workflow.identification.hysteresis_json import hysteresis_json
 from rigsight.workflow.identification.linear_json import (
     finite,
     identifiability_json,
@@ -196,3 +199,63 @@ def _scores(joint: JointIdentification) -> Sequence[dict[str, Any]]:
         for score in joint.scores
         if score.role == "estimation"
     ]
+
+
+def hysteresis_json(found: HysteresisIdentification) -> dict[str, Any]:
+    """Return the content of the key ``hysteresis``."""
+    fit, derived = found.calibration.fit, found.calibration.derived
+    width = float(norm.ppf(0.5 + 0.5 * LEVEL))
+    errors = fit.standard_errors
+    return {
+        "effects": list(found.effects),
+        "statement": found.statement,
+        "success": fit.success,
+        "message": fit.message,
+        "parameters": {
+            name: {
+                "value": fit.values[name],
+                "std": finite(errors[name]),
+                "interval": [
+                    finite(fit.values[name] - width * errors[name]),
+                    finite(fit.values[name] + width * errors[name]),
+                ],
+                "unit": found.units[name],
+            }
+            for name in fit.free
+        },
+        "held": dict(found.held),
+        "covariance": {
+            "parameters": list(fit.free),
+            "values": [[finite(value) for value in row] for row in fit.covariance],
+        },
+        "derived": {
+            "pairs": {pair.name: _derived(pair) for pair in derived.pairs},
+            "saturation": None
+            if derived.saturation is None
+            else {**_derived(derived.saturation), "statement": derived.saturation_in_words},
+            "loop_areas": [
+                {"amplitude": area.amplitude, **_derived(area.energy)} for area in derived.loop_areas
+            ],
+        },
+        "records": [
+            {
+                "record": score.record,
+                "role": score.role,
+                "nrmse_without": _all_finite(score.without),
+                "nrmse": _all_finite(score.nrmse),
+            }
+            for score in found.scores
+        ],
+        "minima": [
+            {"values": dict(minimum.values), "cost": finite(minimum.cost)}
+            for minimum in found.calibration.minima
+        ],
+    }
+
+
+def _derived(one: Derived) -> dict[str, Any]:
+    return {
+        "value": finite(one.value),
+        "interval": [finite(one.lower), finite(one.upper)],
+        "unit": one.unit,
+    }

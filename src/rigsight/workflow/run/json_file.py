@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+import platform
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
 from rigsight.records.formats.ordinary_file import file_size
+
+_VERSIONS_OF = ("rigsight", "numpy", "scipy")
+
 
 LARGEST_FILE = 10_000_000
 
@@ -56,3 +61,14 @@ def _without_repeated_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _refuse_constant(name: str) -> float:
     raise _MeaninglessError(f"{name} is not a finite number; give finite numbers.")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of these packages, by name."""
+    found = {"python": platform.python_version()}
+    for package in _VERSIONS_OF:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
