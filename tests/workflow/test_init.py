@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from rigsight.errors import InputError
 from rigsight.rigs import RIGS, rig_file_text
@@ -308,6 +309,12 @@ def test_a_rig_of_ones_own_is_named_by_its_file(tmp_path: Path) -> None:
     assert read_campaign(tmp_path).rig.name == "train"
 
 
+def test_a_rig_file_that_is_given_is_taken_whatever_the_channels_are_called(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "x": ANSWER}, {})
+    draft = run_init(tmp_path, rig_files=[own_train(tmp_path)])
+    assert (draft.model, draft.others) == ("train", ())
+
+
 def test_a_constant_keeps_all_its_digits(tmp_path: Path) -> None:
     write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "motor_angle": ANSWER, "load_angle": ANSWER}, {})
     file = own_train(tmp_path)
@@ -357,6 +364,13 @@ def test_every_candidate_is_listed(tmp_path: Path) -> None:
     write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, **extra}, {})
     text = run_init(tmp_path, model="axis").path.read_text(encoding="utf-8")
     assert all(f'"{name}"' in text for name in extra)
+
+
+def test_constants_beside_the_signals_are_no_candidates(tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", {"t": T, "u": SWEEP, "Weg": ANSWER, "Kraft": ANSWER, "gains": np.arange(4.0)})
+    text = run_init(tmp_path, model="axis").path.read_text(encoding="utf-8")
+    assert 'one of: "Weg", "Kraft"' in text
+    assert "gains" not in text
 
 
 def test_x_and_y_of_a_regression_are_asked_about(tmp_path: Path) -> None:

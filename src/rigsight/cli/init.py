@@ -28,7 +28,7 @@ def init(
         typer.Option(
             "--model",
             metavar="RIG",
-            show_default="the rig that matches the channels best",
+            show_default="the rig that matches the channels best, of --rigs where given",
             help="Name of a rig: one that 'rigsight rigs' lists, or one declared with --rigs.",
         ),
     ] = None,
@@ -111,7 +111,7 @@ def init(
         return
     count = len(draft.records)
     typer.echo(f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})")
-    if model is None:
+    if draft.others:
         typer.echo(
             f"The rig was guessed from the channels. If it is wrong, remove the file and run init again with --model "
             f"({', '.join(draft.others)}), or with --rigs FILE --model NAME for a rig file of your own (rigsight rigs NAME "

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigsight.errors import InputError, check_option
-from rigsight.rigs import RIGS
+from rigsight.rigs import RIGS, Rig
 from rigsight.robots import FreeRun, RigDraft, free_run, read_robot, rig_text, with_gears
 from rigsight.workflow.campaign.campaign_draft import (
     MEASURED_SUFFIXES,
@@ -60,9 +60,11 @@ def run_init(
     if path.exists() or path.is_symlink():
         raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
     own = own_rigs(rig_files)
-    # A user's own rigs come first: they are preferred to built-in ones that match equally well.
     known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
-    rigs = tuple(known.values()) if model is None else (known[check_option("--model", model, known)],)
+    if model is not None:
+        rigs: tuple[Rig, ...] = (known[check_option("--model", model, known)],)
+    else:
+        rigs = tuple(own.values()) or tuple(known.values())
     files = measured_files(folder)
     if len(files) > MOST_RECORDS:
         raise InputError(
@@ -75,7 +77,7 @@ def run_init(
             f"{folder} contains no usable measured file ({', '.join(MEASURED_SUFFIXES)}).{reasons}"
         )
     rig = proposals[0].guess.rig
-    others = () if model is not None else tuple(name for name in known if name != rig.name)
+    others = () if len(rigs) == 1 else tuple(name for name in known if name != rig.name)
     source = {own_rig.name: file for file, own_rig in own.items()}.get(rig.name)
     beside = {} if source is None else _copied(folder, source)
     inside = source and (folder / source.name if beside else source)

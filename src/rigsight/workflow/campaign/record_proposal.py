@@ -196,7 +196,9 @@ def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
     known = (guess.time, guess.reference, *guess.signals)
     taken = {one.channel.name for one in known if one.channel is not None}
     taken |= guess.times
-    free = [channel.name for channel in channels if channel.name not in taken]
+    # Constants beside the signals, such as the gains of the controller, have another length than the time.
+    length = None if guess.time.channel is None else guess.time.channel.n_samples
+    free = [c.name for c in channels if c.name not in taken and length in (None, c.n_samples)]
     return f"one of: {_listed(free)}" if free else ""
 
 
