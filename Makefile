@@ -46,9 +46,10 @@ test-all: $(DEVELOPMENT)  ## run all tests, with long studies, notebooks, wheel 
 
 release-check: check test-all docs  ## what a release must pass: checks, all tests, documentation; nightly too
 
-check: $(DEVELOPMENT)  ## format, lint, types, layers
+check: $(DEVELOPMENT)  ## format, lint, docstrings, types, layers
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/python -m numpydoc.hooks.validate_docstrings src/rigsight/api/*.py
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
