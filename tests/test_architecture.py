@@ -108,9 +108,9 @@ def test_no_text_names_a_module_of_a_room_above() -> None:
     for module in (ROOT / "src" / "rigsight").rglob("*.py"):
         own = module.relative_to(ROOT / "src" / "rigsight").with_suffix("").parts[0]
         tree = ast.parse(module.read_text(encoding="utf-8"))
-        told = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        reported = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
         for node in ast.walk(tree):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told:
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in reported:
                 named = re.findall(r"(?:^|import |from )rigsight\.([a-z_]+)", node.value)
                 found += [
                     f"{module}: {node.value}" for room in named if height.get(room, -99) > height.get(own, 0)

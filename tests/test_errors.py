@@ -8,18 +8,18 @@ from rigsight.errors import LONGEST_MESSAGE, InputError, shown
 
 
 def test_a_message_is_cut_in_its_middle() -> None:
-    told = str(InputError("run.csv: " + "x" * 1_000_000 + " Mend it."))
-    assert len(told) < LONGEST_MESSAGE + 10
-    assert told.startswith("run.csv: ")
-    assert told.endswith(" Mend it.")
+    reported = str(InputError("run.csv: " + "x" * 1_000_000 + " Mend it."))
+    assert len(reported) < LONGEST_MESSAGE + 10
+    assert reported.startswith("run.csv: ")
+    assert reported.endswith(" Mend it.")
 
 
 @pytest.mark.parametrize("sign", ["\x1b[31m", "\x07", "\ud800", "\x9b"])
 def test_what_a_message_quotes_does_not_reach_the_terminal_as_a_command(sign: str) -> None:
-    told = str(InputError(f"no channel '{sign}'\nnext line"))
-    assert ascii(sign)[1:-1] in told
-    assert "\nnext line" in told
-    told.encode()
+    reported = str(InputError(f"no channel '{sign}'\nnext line"))
+    assert ascii(sign)[1:-1] in reported
+    assert "\nnext line" in reported
+    reported.encode()
 
 
 def test_values_that_python_does_not_write_out_are_shown_by_their_type() -> None:

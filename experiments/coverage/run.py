@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from plants import Drawn, drawn
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.uncertainty.bootstrap import uncertainty_of
@@ -70,7 +70,7 @@ def fitted(plant: Drawn, rng: np.random.Generator) -> tuple[FitResult, bool]:
     best = min(rough, key=lambda fit: fit.cost)
     arrived = rough[0].cost < (1.0 + SAME) * best.cost
     ended = problem.fit(best.values, free, best.initial_states)
-    model = Scored(plant.effects, ended, ended, ended.weighted_rms)
+    model = FittedModel(plant.effects, ended, ended, ended.weighted_rms)
     return in_lowest_basins(bench, [model])[0].fit, arrived
 
 

@@ -29,7 +29,7 @@ from scipy.stats import multivariate_t
 
 import rigsight.diagnose.diagnosis as diagnosis
 from rigsight.diagnose.examination import Examination, examine
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.workflow.diagnose import run_diagnose
 
@@ -72,7 +72,7 @@ class Sampled:
     effective: float
 
 
-def sampled(context: FitContext, model: Scored, seed: int = 0) -> Sampled:
+def sampled(context: FitContext, model: FittedModel, seed: int = 0) -> Sampled:
     """Return the evidence of the estimation records by importance sampling."""
     whitened = _whitened(context, model)
     n = len(model.fit.free)
@@ -95,7 +95,7 @@ def sampled(context: FitContext, model: Scored, seed: int = 0) -> Sampled:
     )
 
 
-def _whitened(context: FitContext, model: Scored) -> Callable[[Floats], Floats]:
+def _whitened(context: FitContext, model: FittedModel) -> Callable[[Floats], Floats]:
     """Return the residual's lines over its spectrum at the fit, as a function of parameters in standard errors from the fit."""
     problem, best = context.problem(model.fit.structure, context.estimation), model.fit
     center = np.array([best.values[name] for name in best.free])

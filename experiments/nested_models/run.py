@@ -26,7 +26,7 @@ from plants import Drawn, drawn  # noqa: E402
 
 from rigsight.campaign import Campaign  # noqa: E402
 from rigsight.diagnose import examination  # noqa: E402
-from rigsight.diagnose.fitting.fit_context import Scored  # noqa: E402
+from rigsight.diagnose.fitting.fit_context import FittedModel  # noqa: E402
 from rigsight.diagnose.fitting.placed_effects import candidates_on  # noqa: E402
 from rigsight.diagnose.noise.adequacy import Checks  # noqa: E402
 from rigsight.diagnose.policy import VERDICT  # noqa: E402
@@ -68,12 +68,12 @@ def single_effects_only(_campaign, _noise, models, _effects, lower_bound, _allow
 examination.with_several_effects = single_effects_only
 
 
-def excess(model: Scored, special: Scored) -> float:
+def excess(model: FittedModel, special: FittedModel) -> float:
     """Return by what share of itself chi square of a model is above that of its special case."""
     return model.fit.cost / special.fit.cost - 1.0
 
 
-def others(model: Scored) -> list[str]:
+def others(model: FittedModel) -> list[str]:
     """Return the free parameters beside those of the effect."""
     own = {model.fit.structure.parameter_name(e, p.name) for e in model.effects for p in e.parameters}
     return [name for name in model.fit.free if name not in own]

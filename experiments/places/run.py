@@ -55,7 +55,7 @@ class Draw:
 
     @property
     def is_looked_at(self) -> bool:
-        return any(name == self.place and looked_at for name, _, looked_at in self.places)
+        return any(name == self.place and examined for name, _, examined in self.places)
 
 
 def values(rng: np.random.Generator) -> tuple[dict[str, float], float]:
@@ -132,7 +132,7 @@ def draw(seed: int) -> Draw | None:
     except RigsightError:
         return None
     return Draw(
-        effect.name, linear.error_over_noise, tuple((p.name, p.share, p.looked_at) for p in found.places)
+        effect.name, linear.error_over_noise, tuple((p.name, p.share, p.examined) for p in found.places)
     )
 
 

@@ -106,22 +106,22 @@ def test_it_says_what_it_is(name: str) -> None:
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_documented_parameters_are_those_of_the_signature(name: str) -> None:
-    told = documented(FUNCTIONS[name], "parameters")
-    assert list(told) == list(signature_of(FUNCTIONS[name]))
-    assert all(told.values())
+    reported = documented(FUNCTIONS[name], "parameters")
+    assert list(reported) == list(signature_of(FUNCTIONS[name]))
+    assert all(reported.values())
 
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_a_class_documents_what_it_is_made_of(name: str) -> None:
     held = CLASSES[name]
-    told = fields_of(held)
+    reported = fields_of(held)
     if issubclass(held, Exception):
         return
-    assert set(signature_of(held)) <= set(told)
+    assert set(signature_of(held)) <= set(reported)
     annotated = {field for base in held.__mro__ for field in vars(base).get("__annotations__", {})}
-    assert set(told) <= annotated | set(dir(held)) | set(signature_of(held))
+    assert set(reported) <= annotated | set(dir(held)) | set(signature_of(held))
     if is_dataclass(held) or name in ESTIMATORS:
-        assert all(told.values())
+        assert all(reported.values())
 
 
 @pytest.mark.parametrize("name", {**FUNCTIONS, **CLASSES})
@@ -140,14 +140,14 @@ def test_arrays_have_shapes_and_numbers_have_units(name: str) -> None:
     held = PUBLIC[name]
     if inspect.isclass(held) and issubclass(held, Exception):
         return
-    told = fields_of(held) if inspect.isclass(held) else documented(held, "parameters")
+    reported = fields_of(held) if inspect.isclass(held) else documented(held, "parameters")
     whole = inspect.getdoc(held) or ""
     for parameter, declared in signature_of(held).items():
         annotation = str(declared.annotation)
         if re.search(r"NDArray|ArrayLike", annotation):
-            assert "shape" in told[parameter], f"{name}: {parameter} has no shape"
+            assert "shape" in reported[parameter], f"{name}: {parameter} has no shape"
         if re.fullmatch(r"float( \| None)?", annotation):
-            assert re.search(r"\[[^\]]+\]|unit|dimensionless", told[parameter]), f"{name}: {parameter}"
+            assert re.search(r"\[[^\]]+\]|unit|dimensionless", reported[parameter]), f"{name}: {parameter}"
     if not inspect.isclass(held) and "NDArray" in str(inspect.signature(held).return_annotation):
         assert "shape" in whole
 

@@ -32,10 +32,10 @@ EXAMPLES = examples()
 
 
 def run(test: doctest.DocTest) -> None:
-    told: list[str] = []
-    result = doctest.DocTestRunner(optionflags=FLAGS).run(test, out=told.append)
+    reported: list[str] = []
+    result = doctest.DocTestRunner(optionflags=FLAGS).run(test, out=reported.append)
     assert result.attempted > 0
-    assert result.failed == 0, "".join(told)
+    assert result.failed == 0, "".join(reported)
 
 
 def test_the_estimators_and_functions_have_examples() -> None:

@@ -187,12 +187,12 @@ def call(run: Run, monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, A
 def test_every_option_is_in_the_table() -> None:
     table = PAGE.split("## Options\n")[1].split("\n## ")[0]
     rows = [line.split("|")[1:3] for line in table.split("\n") if line.startswith("| `")]
-    told = {(command.strip(), option) for option, used in rows for command in used.split(",")}
-    told = {(command, option.strip().strip("`")) for command, option in told}
+    reported = {(command.strip(), option) for option, used in rows for command in used.split(",")}
+    reported = {(command, option.strip().strip("`")) for command, option in reported}
     known = {
         (name, option) for name, options in OPTIONS.items() for option in options if option not in EVERYWHERE
     }
-    assert told == known, "add the command to the row of the option under 'Options' in docs/keys.md"
+    assert reported == known, "add the command to the row of the option under 'Options' in docs/keys.md"
 
 
 @pytest.mark.parametrize(

@@ -31,15 +31,15 @@ def test_every_format_is_told_to_people_and_machines(
     write(path, ROWS, {"u": "N", "x": "m"})
     code, stdout, stderr = run("inspect", path, "--json")
     assert (code, stderr) == (0, "")
-    told = json.loads(stdout)
-    channels = {one["name"].rpartition("/")[2]: one for one in told["channels"]}
+    reported = json.loads(stdout)
+    channels = {one["name"].rpartition("/")[2]: one for one in reported["channels"]}
     assert channels["x"]["n_samples"] == 300
     assert channels["x"]["minimum"] == pytest.approx(-0.01, rel=1e-3)
     assert channels["x"]["unit"] in ("m", None)
     assert channels["x"]["n_not_finite"] == 0
-    (record,) = tomllib.loads(told["proposal"]["toml"])["records"]
+    (record,) = tomllib.loads(reported["proposal"]["toml"])["records"]
     assert record["file"] == path.name
-    assert told["proposal"]["model"] == "axis"
+    assert reported["proposal"]["model"] == "axis"
 
 
 def test_text_is_inspected_with_its_gaps(tmp_path: Path, run: Run) -> None:
@@ -52,8 +52,8 @@ def test_text_is_inspected_with_its_gaps(tmp_path: Path, run: Run) -> None:
     assert code == 0
     for part in ("run.csv", "Weg mm", "299", "step 10, 1 gaps", 'unit = "ms"', 'unit = "mm"', "[[records]]"):
         assert part in stdout
-    told = json.loads(run("inspect", path, "--json")[1])
-    assert [one["n_not_finite"] for one in told["channels"]] == [0, 0, 1]
+    reported = json.loads(run("inspect", path, "--json")[1])
+    assert [one["n_not_finite"] for one in reported["channels"]] == [0, 0, 1]
 
 
 @pytest.mark.parametrize("header", ["t,u,x,x", "t,,u,", "t,control[0],control[1],pos [m]", "t,u,2,x"])
@@ -88,9 +88,9 @@ def test_one_channel_that_cannot_be_read_does_not_spoil_the_others(
     write_tdms(tmp_path / "run.tdms", ROWS, {})
     monkeypatch.setattr("rigsight.records.formats.read_tdms.open_tdms", opened)
     code, stdout, _ = run("inspect", tmp_path / "run.tdms", "--json")
-    told = json.loads(stdout)
-    assert (code, [one["name"] for one in told["channels"]]) == (0, list(ROWS))
-    (refused,) = told["refused"]
+    reported = json.loads(stdout)
+    assert (code, [one["name"] for one in reported["channels"]]) == (0, list(ROWS))
+    (refused,) = reported["refused"]
     assert (refused["name"], "7 of 300" in refused["reason"]) == ("oil", True)
 
 
@@ -99,13 +99,13 @@ def test_what_a_channel_does_not_show_is_told(tmp_path: Path, run: Run) -> None:
     coded, angle = ROWS["x"].copy(), np.mod(40.0 * ROWS["x"] * 50.0, 360.0)
     coded[7] = -9999.0
     write_text(tmp_path / "run.csv", {**ROWS, "held": held, "coded": coded, "angle": angle}, {})
-    told = {
+    reported = {
         one["name"]: one["remarks"]
         for one in json.loads(run("inspect", tmp_path / "run.csv", "--json")[1])["channels"]
     }
-    assert [name for name, remarks in told.items() if remarks] == ["held", "coded", "angle"]
+    assert [name for name, remarks in reported.items() if remarks] == ["held", "coded", "angle"]
     for name, part in (("held", "every 5 rows"), ("coded", "-9999"), ("angle", "360")):
-        assert part in told[name][0]
+        assert part in reported[name][0]
 
 
 def test_what_is_no_signal_is_told(tmp_path: Path, run: Run) -> None:

@@ -49,12 +49,12 @@ def test_machines_are_told_what_was_left_out(tmp_path: Path, run: Run) -> None:
     limited = CART.read_text("utf-8").replace('damping="0.5"', 'damping="0.5" range="-1 1" limited="true"')
     model.write_text(limited, "utf-8")
     code, stdout, _ = run("init", tmp_path, "--mjcf", model, "--json")
-    told = json.loads(stdout)
+    reported = json.loads(stdout)
     assert code == 0
-    assert told["left_out"] == [
+    assert reported["left_out"] == [
         "range of joints: slider; the rig has no end stops there; use the effect end_stop"
     ]
-    assert max(told["free_run"]["relative_difference"].values()) < 1e-5
+    assert max(reported["free_run"]["relative_difference"].values()) < 1e-5
 
 
 def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else_is(

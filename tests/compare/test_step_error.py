@@ -58,8 +58,8 @@ def test_a_record_that_ends_early_is_compared_up_to_its_end() -> None:
     ("u", "told"),
     [(np.ones(500), "constant"), (np.where(np.arange(500) < 1, 0.0, 1.0), "rest before the step")],
 )
-def test_a_step_without_offset_or_without_step_is_told(u: np.ndarray, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_a_step_without_offset_or_without_step_is_told(u: np.ndarray, reported: str) -> None:
+    with pytest.raises(InputError, match=reported):
         step_window(record(u), "u")
 
 

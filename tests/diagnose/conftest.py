@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import FitResult
 from rigsight.records.record import Record
@@ -17,7 +17,7 @@ from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
-MakeScored = Callable[..., Scored]
+MakeScored = Callable[..., FittedModel]
 TWO_MASSES = """
 name = "two_masses"
 summary = "Two carts, each with a motor, and a spring between them."
@@ -127,7 +127,7 @@ def scored() -> MakeScored:
         residuals: NDArray[np.float64] | None = None,
         n_free: int = 4,
         error_over_noise: float | None = None,
-    ) -> Scored:
+    ) -> FittedModel:
         chosen = tuple(effect_named(name) for name in effects)
         columns = () if residuals is None else (np.asarray(residuals, dtype=np.float64)[:, None],)
         if error_over_noise is None:
@@ -147,6 +147,6 @@ def scored() -> MakeScored:
             covariance=np.eye(n_free),
             residuals=columns,
         )
-        return Scored(chosen, fit, fit, error_over_noise)
+        return FittedModel(chosen, fit, fit, error_over_noise)
 
     return make

@@ -25,10 +25,10 @@ def test_sliders_are_printed_with_their_limits() -> None:
     assert latex[0].startswith(r"m \ddot{x} = ")
     limits = []
     for number, (plain, pretty) in enumerate(zip(text[1:], latex[1:], strict=True)):
-        told = re.fullmatch(rf"z_{number}' = x' within \|z_{number}\| <= (\S+) x_s", plain)
-        assert told is not None, plain
-        limits.append(float(told[1]))
-        limit = rf"\left|z_{{{number}}}\right| \leq {told[1]} x_{{s}}"
+        reported = re.fullmatch(rf"z_{number}' = x' within \|z_{number}\| <= (\S+) x_s", plain)
+        assert reported is not None, plain
+        limits.append(float(reported[1]))
+        limit = rf"\left|z_{{{number}}}\right| \leq {reported[1]} x_{{s}}"
         assert pretty == rf"\dot{{z}}_{{{number}}} = \dot{{x}},\quad {limit}"
     # Over 2.7 decades, each as far from the next.
     assert len(limits) == N_ELEMENTS

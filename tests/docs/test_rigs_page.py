@@ -72,5 +72,5 @@ unit = "m"
 
 
 def test_the_page_names_every_table_of_a_rig_file() -> None:
-    told = set(re.findall(r"^\| `\[(\w+)", PAGE, re.MULTILINE))
-    assert told == set(RigTable.model_fields) - {"name", "summary", "alternatives"}
+    reported = set(re.findall(r"^\| `\[(\w+)", PAGE, re.MULTILINE))
+    assert reported == set(RigTable.model_fields) - {"name", "summary", "alternatives"}

@@ -60,8 +60,8 @@ def test_a_deleted_result_is_the_only_one_that_is_made_again(
     config = experiment.read_configs()["amplitude_1.00"].model_copy(update={"with_published": True})
 
     def done() -> list[str]:
-        told = experiment.run_study(short, {"one": config}, tmp_path, n_jobs=1)
-        return [line.split(" done")[0] for line in told]
+        reported = experiment.run_study(short, {"one": config}, tmp_path, n_jobs=1)
+        return [line.split(" done")[0] for line in reported]
 
     assert done() == [
         "evaluation: measured", "one: campaign", "one: identify", "one: calibrate", "one: compare"

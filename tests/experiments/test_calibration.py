@@ -139,9 +139,9 @@ def test_a_shortened_line_has_the_probabilities_that_the_diagnosis_states(
     stated = trained().probabilities(situation, list(shares.values()))
     found = judged.scored(line, trained())
     assert found.stated == pytest.approx(stated[0], rel=1e-4)
-    told = judged.with_probabilities(line["diagnosis"], line["key"], trained())
+    reported = judged.with_probabilities(line["diagnosis"], line["key"], trained())
     outside = 1.0 - trained().probability_listed(situation)
-    assert 1.0 - sum(c["probability"] for c in told["candidates"]) >= outside - 1e-9
+    assert 1.0 - sum(c["probability"] for c in reported["candidates"]) >= outside - 1e-9
 
 
 def test_the_first_outcome_of_a_trial_counts(study: ModuleType, tmp_path: Path) -> None:

@@ -116,9 +116,11 @@ class Case:
     def outputs(self) -> tuple[str, ...]:
         return tuple(signal.name for signal in self.model.structure.rig.outputs)
 
-    def errors(self, simulated: Mapping[str, NDArray[np.float64]], told: bool = False) -> dict[str, float]:
+    def errors(
+        self, simulated: Mapping[str, NDArray[np.float64]], reported: bool = False
+    ) -> dict[str, float]:
         """Relative root mean square difference of each output; a shorter simulation is held to its part."""
-        truth = self.as_told if told else self.reference
+        truth = self.as_told if reported else self.reference
         return {
             name: float(
                 np.linalg.norm(simulated[name] - truth[name][: len(simulated[name])])

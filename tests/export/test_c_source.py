@@ -55,7 +55,7 @@ def test_it_gives_the_outputs_of_the_engine_to_rounding(case, tmp_path: Path):
     written(case, tmp_path)
     flags = (*(option for option in kernel_options() if option != "-w"), *WARNED)
     simulated = output_of(compiled(tmp_path, "-DRIG_MAIN", "rig.c", flags=flags), case)
-    assert max(case.errors(simulated, told=True).values()) <= TO_ROUNDING
+    assert max(case.errors(simulated, reported=True).values()) <= TO_ROUNDING
 
 
 # One of each kind of text that the integrator has; FMUs are compiled with yet other options.
@@ -74,7 +74,7 @@ def test_other_options_give_them_too(name: str, case_named, tmp_path: Path):
     case = case_named(name)
     written(case, tmp_path)
     simulated = output_of(compiled(tmp_path, "-DRIG_MAIN", "rig.c"), case)
-    assert max(case.errors(simulated, told=True).values()) <= OTHER_ROUNDING
+    assert max(case.errors(simulated, reported=True).values()) <= OTHER_ROUNDING
 
 
 def test_it_holds_the_engine_s_own_text(case_named, tmp_path: Path):
@@ -90,7 +90,7 @@ def test_its_accuracy_can_be_chosen(case_named, tmp_path: Path):
         output_of(compiled(tmp_path, "-DRIG_MAIN", f"-DRIG_ACCURACY={accuracy}", "rig.c"), case)
         for accuracy in ("1e-6", "1e-8")
     )
-    assert max(case.errors(usual, told=True).values()) <= OTHER_ROUNDING
+    assert max(case.errors(usual, reported=True).values()) <= OTHER_ROUNDING
     assert max(case.errors(fine).values()) < 0.1 * max(case.errors(usual).values())
 
 

@@ -136,7 +136,7 @@ def test_it_gives_the_outputs_of_the_engine_to_rounding(name: str, target: str, 
     case = case_named(name)
     path = written(case, tmp_path, target)
     simulated = SLAVES[target](path, tmp_path).run(case, linear=case.model.hold != "zoh")
-    assert max(case.errors(simulated, told=True).values()) <= OTHER_ROUNDING
+    assert max(case.errors(simulated, reported=True).values()) <= OTHER_ROUNDING
 
 
 @pytest.mark.parametrize("target", VERSIONS)
@@ -153,7 +153,7 @@ def test_fmpy_simulates_a_constant_hold_by_itself(name: str, target: str, case_n
     )
     simulated = {name: result[name] for name in case.outputs}
     assert len(simulated[case.outputs[0]]) == len(case.t)
-    assert max(case.errors(simulated, told=True).values()) <= OTHER_ROUNDING
+    assert max(case.errors(simulated, reported=True).values()) <= OTHER_ROUNDING
 
 
 def test_fmpy_simulates_straight_lines_by_fmi_3_with_slopes(case_named, tmp_path: Path):
@@ -171,7 +171,7 @@ def test_fmpy_simulates_straight_lines_by_fmi_3_with_slopes(case_named, tmp_path
         output=list(case.outputs),
     )
     simulated = {name: result[name] for name in case.outputs}
-    assert max(case.errors(simulated, told=True).values()) <= OTHER_ROUNDING
+    assert max(case.errors(simulated, reported=True).values()) <= OTHER_ROUNDING
 
 
 @pytest.mark.parametrize("target", VERSIONS)

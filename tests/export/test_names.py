@@ -55,12 +55,12 @@ class Named:
     inputs: tuple[str, ...]
     t: NDArray[np.float64]
     fed: tuple[NDArray[np.float64], ...]
-    told: Record
+    reported: Record
     reference: Record
 
-    def worst(self, outputs: dict[str, NDArray[np.float64]], told: bool = False) -> float:
+    def worst(self, outputs: dict[str, NDArray[np.float64]], reported: bool = False) -> float:
         """Return the largest relative error of an output."""
-        truth = self.told if told else self.reference
+        truth = self.reported if reported else self.reference
         assert len(outputs) == len(self.model.structure.rig.outputs)
         return max(
             float(np.linalg.norm(found - truth[signal.name]) / np.linalg.norm(truth[signal.name]))
@@ -79,7 +79,7 @@ def named(rig: Rig, effects: Sequence[str] = (), first: float = 0.0, **values: f
     record = Record("named", DT, fed, {source.name: source.unit for source in rig.inputs}, hold="foh")
     return Named(
         model, tuple(fed), t, tuple(fed.values()),
-        told=simulate(structure, model.values, record),
+        reported=simulate(structure, model.values, record),
         reference=simulate(structure, model.values, record, accuracy=1e-9),
     )  # fmt: skip
 
@@ -218,7 +218,7 @@ def test_the_control_system_gives_the_outputs_of_the_engine(all_named: Named):
 
 
 def test_the_c_file_gives_the_outputs_of_the_engine(all_named: Named, tmp_path: Path):
-    assert all_named.worst(c_outputs(all_named, tmp_path), told=True) <= 1e-8
+    assert all_named.worst(c_outputs(all_named, tmp_path), reported=True) <= 1e-8
 
 
 def test_the_matlab_function_binds_no_name_twice(all_named: Named):
@@ -341,7 +341,7 @@ def part_named(request: pytest.FixtureRequest, tmp_path: Path) -> Named:
 
 def test_an_equilibrium_and_friction_are_those_of_the_engine(part_named: Named, tmp_path: Path):
     assert part_named.worst(python_outputs(part_named)) <= 1e-6
-    assert part_named.worst(c_outputs(part_named, tmp_path), told=True) <= 1e-8
+    assert part_named.worst(c_outputs(part_named, tmp_path), reported=True) <= 1e-8
 
 
 @pytest.mark.parametrize("target", ["fmu", "fmu3"])

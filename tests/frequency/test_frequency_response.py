@@ -63,8 +63,8 @@ def test_python_control_sees_the_same_values() -> None:
         ({"omega": 1.0}, "must have shape"),
     ],
 )
-def test_what_is_no_response_is_refused(changes: dict[str, object], told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_what_is_no_response_is_refused(changes: dict[str, object], reported: str) -> None:
+    with pytest.raises(InputError, match=reported):
         response(**changes)
 
 

@@ -35,12 +35,12 @@ def test_more_excitation_is_advised_only_where_noise_hides_the_response() -> Non
     drive = rng.standard_normal(N)
     turning = np.cumsum(np.cumsum(drive)) * 10.0
     wrapped, still = (turning + np.pi) % (2.0 * np.pi) - np.pi, rng.standard_normal(N)
-    told = {}
+    reported = {}
     for name, reading in (("wrapped", np.convolve(wrapped, np.ones(9) / 9.0, "same")), ("still", still)):
         record = Record(name, DT, {"left": drive, "x": reading}, {}, kind="multisine")
-        told[name] = responses_of_inputs([record], ["left"], ["x"]).problems["left", "x"]
-    assert "more strongly" in told["still"]
-    assert "more strongly" not in told["wrapped"]
+        reported[name] = responses_of_inputs([record], ["left"], ["x"]).problems["left", "x"]
+    assert "more strongly" in reported["still"]
+    assert "more strongly" not in reported["wrapped"]
 
 
 def recorded(

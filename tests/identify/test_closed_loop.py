@@ -77,14 +77,14 @@ def test_without_noise_the_instrument_shows_the_rig() -> None:
 
 @pytest.mark.parametrize("estimator", [local_rational_response, local_polynomial_response])
 def test_the_variance_is_that_of_the_errors(estimator) -> None:  # type: ignore[no-untyped-def]
-    scatter, told = [], []
+    scatter, reported = [], []
     for seed in range(8):
         found = estimator(loop(0.05, seed=seed), "u", "x", hold="zoh", instrument="reference", wanted=LINES)
         near = [int(np.argmin(np.abs(found.omega - line))) for line in LINES[4:12:2]]
         omega = found.omega[near]
         scatter.append(np.abs(found.values[near] - 1.0 / (K - M * omega**2 + 1j * D * omega)) ** 2)
-        told.append(found.variance[near])
-    assert 0.5 < np.median(scatter) / np.log(2.0) / np.median(told) < 2.0
+        reported.append(found.variance[near])
+    assert 0.5 < np.median(scatter) / np.log(2.0) / np.median(reported) < 2.0
 
 
 def test_a_reference_that_drives_nothing_is_not_used_and_that_is_told() -> None:
@@ -103,15 +103,15 @@ def test_a_method_without_use_for_an_instrument_says_so() -> None:
 def test_identify_tells_what_the_reference_was_used_for() -> None:
     campaign = make_campaign("axis", [loop(0.02), loop(0.02, 0.01)], constants={"gain": 1.0})
     found = identify_campaign(campaign, EstimationOptions())
-    (told,) = [text for text in found.warnings if "closed-loop records" in text]
-    assert "'loop_0.02', 'loop_0.01'" in told
-    assert "instrument" in told
+    (reported,) = [text for text in found.warnings if "closed-loop records" in text]
+    assert "'loop_0.02', 'loop_0.01'" in reported
+    assert "instrument" in reported
     assert all("by reference" in record.motion.measured.method for record in found.records)  # type: ignore[union-attr]
 
 
 def test_a_reference_that_never_changes_is_told_and_none_is_not() -> None:
     still = loop().with_signals(reference=np.ones(N))
-    (told,) = closed_loop_notes([still], AXIS, "It is used.")
-    assert "never changes" in told
+    (reported,) = closed_loop_notes([still], AXIS, "It is used.")
+    assert "never changes" in reported
     bare = Record("bare", DT, {"u": loop()["u"], "x": loop()["x"]}, {})
     assert closed_loop_notes([bare], AXIS, "It is used.") == []

@@ -146,8 +146,8 @@ def broken(case: str) -> np.ndarray:
         ("logarithmic", ["not equally spaced"]),
     ],
 )
-def test_unusable_time_is_told_with_line_and_mend(case: str, told: list[str]) -> None:
+def test_unusable_time_is_told_with_line_and_mend(case: str, reported: list[str]) -> None:
     with pytest.raises(InputError) as caught:
         base_of(broken(case))
-    for fragment in ["log.csv", *told]:
+    for fragment in ["log.csv", *reported]:
         assert fragment in str(caught.value)

@@ -45,7 +45,7 @@ def contents(tmp_path: Path, name: str) -> tuple[Path, bytes]:
     return path, path.read_bytes()
 
 
-def told(path: Path) -> str | None:
+def reported(path: Path) -> str | None:
     """Return the message, None if the file could be read; anything but a message fails the test."""
     try:
         read(path)
@@ -64,7 +64,7 @@ def test_a_file_cut_short_is_told(tmp_path: Path, name: str) -> None:
     unseen = 0
     for length in np.linspace(1, len(good) - 64, TRIALS.get(name, 60)).astype(int):
         path.write_bytes(good[:length])
-        unseen += told(path) is None
+        unseen += reported(path) is None
     # Between two variables or datasets such a file may end as well; then y is missing, which a record may lack.
     assert unseen <= (2 if name in ("MATLAB 5", "UFF") else 0)
 
@@ -80,14 +80,14 @@ def test_flipped_bytes_are_told_or_read(tmp_path: Path, name: str) -> None:
         for _ in range(int(rng.integers(1, 6))):
             damaged[int(rng.integers(end))] = int(rng.integers(256))
         path.write_bytes(damaged)
-        told(path)
+        reported(path)
 
 
 @formats
 def test_damaged_files_are_not_said_to_be_a_defect_of_the_program(tmp_path: Path, name: str) -> None:
     path, good = contents(tmp_path, name)
     path.write_bytes(good[: len(good) * 3 // 5])
-    message = told(path)
+    message = reported(path)
     assert message is not None
     assert len(message) < 600
     assert "Export it again" in message
@@ -104,7 +104,7 @@ def test_flipped_text_is_told_or_read(tmp_path: Path) -> None:
         for _ in range(int(rng.integers(0, 4))):
             damaged[int(rng.integers(len(damaged)))] = int(rng.integers(256))
         path.write_bytes(damaged)
-        told(path)
+        reported(path)
 
 
 HEADER = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
@@ -152,7 +152,7 @@ def test_a_matlab_variable_without_its_parts_is_refused(
     path = tmp_path / "run.mat"
     behind = matrix(DOUBLE, (1, 60), element(9, bytes(480)), b"psi")
     path.write_bytes(HEADER + flagged(flags, n_parts * element(9, bytes(480))) + behind)
-    message = told(path)
+    message = reported(path)
     assert message is not None
     assert ("lacks parts" in message) == (not is_sound)
 
@@ -168,7 +168,7 @@ def test_a_matlab_file_that_declares_more_than_it_holds_is_refused_unread(
     monkeypatch.setattr("scipy.io.loadmat", load)
     path = tmp_path / "run.mat"
     path.write_bytes(HEADER + BOMBS[bomb])
-    assert told(path) is not None
+    assert reported(path) is not None
 
 
 def test_a_matlab_file_that_unpacks_to_too_much_is_refused(
@@ -203,6 +203,6 @@ def test_a_library_that_does_not_come_back_is_ended_and_told(
 ) -> None:
     path, _ = contents(tmp_path, name)
     monkeypatch.setattr("rigsight.records.formats.isolated_reader.LONGEST_WAIT", 0.0)
-    message = told(path)
+    message = reported(path)
     assert message is not None
     assert "crashes or does not finish" in message

@@ -97,10 +97,10 @@ def test_a_separator_that_separates_nothing_is_refused(tmp_path: Path, separator
     ],
 )
 def test_numbers_that_nobody_measures_are_refused(
-    tmp_path: Path, changed: dict[str, np.ndarray], told: str
+    tmp_path: Path, changed: dict[str, np.ndarray], reported: str
 ) -> None:
     (tmp_path / "run.csv").write_text(csv_text(**changed), encoding="utf-8")
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         read(tmp_path / "run.csv")
 
 

@@ -136,11 +136,11 @@ BROKEN: list[tuple[str, str | bytes, dict[str, object], list[str]]] = [
     ("content", "options", "told"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN]
 )
 def test_broken_files_are_told_with_place_and_mend(
-    tmp_path: Path, content: str | bytes, options: dict[str, object], told: list[str]
+    tmp_path: Path, content: str | bytes, options: dict[str, object], reported: list[str]
 ) -> None:
     with pytest.raises(InputError) as caught:
         read(tmp_path, content, **options)
-    for fragment in ["log.csv", *told]:
+    for fragment in ["log.csv", *reported]:
         assert fragment in str(caught.value)
 
 

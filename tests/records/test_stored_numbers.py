@@ -91,9 +91,9 @@ def test_an_attribute_of_no_convention_is_asked_about(tmp_path: Path, name: str)
     given = read(path, columns={"x": ColumnMapping("x", scale=0.5)})
     np.testing.assert_array_equal(given["x"], 0.5 * COUNTS)
     # Numbers with a point may be converted already.
-    told = read(write_hdf5(tmp_path / "floats.h5", X, **{name: 0.25}))
-    np.testing.assert_array_equal(told["x"], X)
-    assert any(f"{name} = 0.25" in note for note in told.notes)
+    reported = read(write_hdf5(tmp_path / "floats.h5", X, **{name: 0.25}))
+    np.testing.assert_array_equal(reported["x"], X)
+    assert any(f"{name} = 0.25" in note for note in reported.notes)
 
 
 def test_attributes_that_are_no_conversion_are_passed_over() -> None:

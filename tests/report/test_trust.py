@@ -43,8 +43,8 @@ SAME = replace(
 
 
 def with_trust(diagnosis: Diagnosis, *numbers: ParameterTrust) -> Diagnosis:
-    told = statement(numbers, (), 3, ("record", "amplitude"))
-    return replace(diagnosis, trust=Trust(told, numbers))
+    reported = statement(numbers, (), 3, ("record", "amplitude"))
+    return replace(diagnosis, trust=Trust(reported, numbers))
 
 
 def page(diagnosis: Diagnosis) -> str:

@@ -58,7 +58,7 @@ def test_an_expression_means_what_it_says(text: str, expected: float) -> None:
         ("a" * 6000, 0, "5000 characters"),
     ],
 )
-def test_what_has_no_meaning_is_told_with_its_place(text: str, place: int, told: str) -> None:
-    with pytest.raises(ExpressionError, match=told) as caught:
+def test_what_has_no_meaning_is_told_with_its_place(text: str, place: int, reported: str) -> None:
+    with pytest.raises(ExpressionError, match=reported) as caught:
         to_sympy(parsed(text), NAMES)
     assert caught.value.place == place

@@ -143,13 +143,13 @@ def test_every_key_of_a_rig_file_is_in_the_table() -> None:
     rows = {
         line.split("`")[1]: line.split("|")[2].strip() for line in table.split("\n") if line.startswith("| `")
     }
-    told = {key.removesuffix(" *"): cell for key, cell in rows.items()}
-    mend = "add a row to 'Keys of a rig file' in docs/keys.md and a line to USED or REFUSED here"
-    assert set(told) == set(_keys(RigTable)), mend
+    reported = {key.removesuffix(" *"): cell for key, cell in rows.items()}
+    remedy = "add a row to 'Keys of a rig file' in docs/keys.md and a line to USED or REFUSED here"
+    assert set(reported) == set(_keys(RigTable)), remedy
     expected = {_without_names(key): "used" for key in USED} | {
         _without_names(key): "refused" for key in REFUSED
     }
-    assert told == expected, mend
+    assert reported == expected, remedy
 
 
 @pytest.mark.parametrize("key", [*USED, *REFUSED])

@@ -168,11 +168,11 @@ WRONG = {
 
 @pytest.mark.parametrize("case", WRONG)
 def test_what_is_wrong_is_one_message(case: str) -> None:
-    text, told = WRONG[case]
+    text, reported = WRONG[case]
     with pytest.raises(InputError, match=r"rig\.toml") as caught:
         rig_of_text(text, "rig.toml")
     message = str(caught.value)
-    assert re.search(told, message), message
+    assert re.search(reported, message), message
     assert "\n" not in message
     assert message.endswith(".") or "TOML" in message
 

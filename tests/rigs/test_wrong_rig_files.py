@@ -47,9 +47,9 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("old", "new", "told"), MISTAKES)
-def test_a_mistake_is_one_message_with_its_place_and_mend(old: str, new: str, told: str) -> None:
+def test_a_mistake_is_one_message_with_its_place_and_mend(old: str, new: str, reported: str) -> None:
     assert old in TRAIN
-    with pytest.raises(InputError, match=told) as caught:
+    with pytest.raises(InputError, match=reported) as caught:
         rig_of_text(TRAIN.replace(old, new, 1), "rig.toml")
     message = str(caught.value)
     assert message.startswith("rig.toml, line ")
@@ -68,10 +68,10 @@ ALTERNATIVES = [
 
 
 @pytest.mark.parametrize(("old", "new", "told"), ALTERNATIVES)
-def test_an_alternative_follows_from_itself_and_constants(old: str, new: str, told: str) -> None:
+def test_an_alternative_follows_from_itself_and_constants(old: str, new: str, reported: str) -> None:
     text = rig_file_text("running_gear")
     assert old in text
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         rig_of_text(text.replace(old, new, 1), "rig.toml")
 
 

@@ -108,13 +108,13 @@ def test_a_delay_that_is_no_whole_number_of_steps_is_kept_on_average(tmp_path: P
     step, late = 0.001, 0.0124
     found = write_back(model_of({}, {"input_delay@shoulder_motor": {"T_d": late}}), arm)
     delayed, prompt = mujoco.MjModel.from_xml_string(found.text), mujoco.MjModel.from_xml_path(str(arm))
-    told = sweeping(2000)
+    reported = sweeping(2000)
     whole = round(late / step)
-    shifted = [np.vstack([np.zeros((n, 2)), told])[: len(told)] for n in (whole, whole + 1)]
+    shifted = [np.vstack([np.zeros((n, 2)), reported])[: len(reported)] for n in (whole, whole + 1)]
     for controls in shifted:
-        controls[:, 1] = told[:, 1]
+        controls[:, 1] = reported[:, 1]
     sooner, later = (run(prompt, controls, integrator)[:, 0] for controls in shifted)
-    own = run(delayed, told, integrator)[:, 0]
+    own = run(delayed, reported, integrator)[:, 0]
     # Between the two, and as far from each as 0.4 of a step says.
     share = np.vdot(own - sooner, later - sooner) / np.vdot(later - sooner, later - sooner)
     assert share == pytest.approx(late / step - whole, abs=0.1)

@@ -84,8 +84,8 @@ def test_noise_moves_a_spline_as_another_spline_of_that_smoothness_says() -> Non
     spline = make_smoothing_spline(np.arange(float(n)), noise, lam=_penalty(motion / np.std(motion)))
     index, inside = np.arange(float(n)), slice(100, -100)
     expected = spline(index), spline.derivative()(index) / dt
-    for told, change in zip(smoothed_noise(motion, noise, dt), expected, strict=True):
-        assert np.std((told - change)[inside]) < 0.05 * np.std(change[inside])
+    for reported, change in zip(smoothed_noise(motion, noise, dt), expected, strict=True):
+        assert np.std((reported - change)[inside]) < 0.05 * np.std(change[inside])
 
 
 @pytest.mark.parametrize("samples_per_cycle", [12, 17, 30])

@@ -203,9 +203,9 @@ def test_what_is_wrong_is_told_with_its_place(way, old, new, message, folder):
     rig_of(way, folder)
     text = (folder / f"{way.replace(' ', '_')}.toml").read_text()
     assert old in text
-    with pytest.raises(InputError, match=message) as told:
+    with pytest.raises(InputError, match=message) as reported:
         rig_of_text(text.replace(old, new), "cart.toml", folder=folder)
-    assert "cart.toml, line" in str(told.value)
+    assert "cart.toml, line" in str(reported.value)
 
 
 @pytest.mark.parametrize(

@@ -148,9 +148,9 @@ def test_what_is_deeper_or_longer_than_can_be_read_is_told(tmp_path: Path, text:
     path = tmp_path / "file.toml"
     path.write_text(text, encoding="utf-8")
     for take in (read_campaign_table, read_model, read_json):
-        with pytest.raises(InputError, match=r"file\.toml") as told:
+        with pytest.raises(InputError, match=r"file\.toml") as reported:
             take(path)
-        assert len(str(told.value)) < 5000
+        assert len(str(reported.value)) < 5000
 
 
 @pytest.mark.parametrize("file", ["a" * 300 + ".csv", "a/" * 3000, "\ud800.csv", "\x00", "loop/a.csv"])

@@ -139,8 +139,8 @@ def test_a_model_of_another_rig_is_refused_before_anything_is_done(
     ("model", "told"),
     [("nominl", "Did you mean 'nominal'"), ("=nominal", "NAME=MODEL"), ("missing.json", "does not exist")],
 )
-def test_a_model_that_is_none_is_told(axis_campaign: Path, model: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_a_model_that_is_none_is_told(axis_campaign: Path, model: str, reported: str) -> None:
+    with pytest.raises(InputError, match=reported):
         run_compare(axis_campaign, [model])
 
 
@@ -218,10 +218,10 @@ def test_what_was_done_to_a_record_is_told(axis_campaign: Path, linear_model: Pa
         app, ["compare", str(axis_campaign), str(linear_model), "--out", str(tmp_path / "o")]
     )
     assert result.exit_code == 0, result.output
-    (told,) = [
+    (reported,) = [
         n for n in json.loads((tmp_path / "o" / "comparison.json").read_text())["notes"] if "x_mm" in n
     ]
-    assert told.startswith("Record 'fit': fit.csv, column 'x_mm': values taken as m without conversion")
+    assert reported.startswith("Record 'fit': fit.csv, column 'x_mm': values taken as m without conversion")
     assert "values taken as m" in (tmp_path / "o" / "comparison.html").read_text()
     assert "taken as m" in re.sub(r"\s+", " ", result.output)
 

@@ -47,9 +47,9 @@ def test_every_key_of_a_campaign_is_in_the_table() -> None:
     tables = {"": CampaignTable, "rig.": RigTable, "records.": RecordTable, "columns.": ColumnTable}
     keys = [prefix + name for prefix, table in tables.items() for name in table.model_fields]
     keys = [key for key in keys if key not in ("rig", "records")]
-    mend = "add a row to 'Keys of a campaign' in docs/keys.md and a line to CHANGES in tests/workflow/keys_of_campaigns.py"
-    assert set(OF_CAMPAIGNS) == set(keys), mend
-    assert set(CHANGES) == set(keys), mend
+    remedy = "add a row to 'Keys of a campaign' in docs/keys.md and a line to CHANGES in tests/workflow/keys_of_campaigns.py"
+    assert set(OF_CAMPAIGNS) == set(keys), remedy
+    assert set(CHANGES) == set(keys), remedy
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -89,13 +89,13 @@ def outcome(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str, boo
             return f"REFUSED {refused}"
 
     @cache
-    def told(command: str) -> str:
+    def reported(command: str) -> str:
         changes = [CHANGES[key][1] for key in TOLD]
         return result(command, read_campaign(written(tmp_path_factory.mktemp("told") / "c", *changes)))
 
     def call(command: str, key: str, given: bool) -> str:
         if key in TOLD:
-            return f"tells it: {TOLD[key] in (told if given else base)(command)}"
+            return f"tells it: {TOLD[key] in (reported if given else base)(command)}"
         without, found = campaign(key, False), campaign(key, True)
         read = found if given else without
         if isinstance(read, str):
@@ -159,8 +159,8 @@ MODEL_CHANGES: dict[str, Mapping[str, Any]] = {
 
 
 def test_every_key_of_a_model_is_in_the_table() -> None:
-    mend = "add a row to 'Keys of model.json' in docs/keys.md and a line to MODEL_CHANGES here"
-    assert set(OF_MODELS) == set(MODEL_CHANGES) == set(ModelTable.model_fields), mend
+    remedy = "add a row to 'Keys of model.json' in docs/keys.md and a line to MODEL_CHANGES here"
+    assert set(OF_MODELS) == set(MODEL_CHANGES) == set(ModelTable.model_fields), remedy
 
 
 @pytest.fixture(scope="module")

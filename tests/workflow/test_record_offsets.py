@@ -85,7 +85,7 @@ def diagnosed(made: Campaign, names: Sequence[str] = RIVALS) -> Diagnosis:
     return diagnose_campaign(made, [effect_named(name) for name in names])
 
 
-def told(diagnosis: Diagnosis) -> list[Any]:
+def reported(diagnosis: Diagnosis) -> list[Any]:
     assert diagnosis.data_quality is not None
     return [finding for finding in diagnosis.data_quality.findings if finding.kind == "offset"]
 
@@ -93,8 +93,8 @@ def told(diagnosis: Diagnosis) -> list[Any]:
 def test_offsets_that_nobody_declared_are_told_before_a_second_effect_is_believed() -> None:
     found = diagnosed(campaign(), ["coulomb_friction", "iwan_hysteresis"])
     assert found.effects == ("coulomb_friction",)
-    (finding,) = told(found)
-    assert 'offsets = "per_record"' in finding.mend
+    (finding,) = reported(found)
+    assert 'offsets = "per_record"' in finding.remedy
     assert finding.signal == "x"
     assert found.gap["x"].after == pytest.approx(found.gap["x"].noise_floor, rel=0.1)
     # What is estimated is no part of the model.
@@ -105,7 +105,7 @@ def test_offsets_that_nobody_declared_are_told_before_a_second_effect_is_believe
 def test_declared_offsets_leave_the_numbers_right(factor: float) -> None:
     found = diagnosed(campaign("per_record", factor=factor))
     assert found.effects == ("coulomb_friction",)
-    assert told(found) == []
+    assert reported(found) == []
     best = found.candidates[0].parameters
     for name, true in {**AXIS_VALUES, "T_c": 0.3}.items():
         if name in best:
@@ -121,7 +121,7 @@ def test_a_memory_beside_offsets_is_named_alone() -> None:
     memory = ("bouc_wen_hysteresis", {"A": 1.0, "a": 0.4, "beta": 500.0, "gamma": -100.0, "n": 1.0})
     found = diagnosed(campaign(effects=[memory]))
     assert found.effects == ("bouc_wen_hysteresis",)
-    assert len(told(found)) == 1
+    assert len(reported(found)) == 1
 
 
 @pytest.mark.parametrize(
@@ -138,13 +138,13 @@ def test_a_memory_beside_offsets_is_named_alone() -> None:
 )
 def test_records_without_such_offsets_are_left_in_peace(effects: Any) -> None:
     found = diagnosed(campaign(effects=effects, factor=0.0))
-    assert [finding for finding in told(found) if finding.serious] == []
+    assert [finding for finding in reported(found) if finding.serious] == []
     assert "coulomb_friction" in found.effects or not effects
 
 
 @pytest.mark.slow
 def test_levels_farther_apart_than_the_motion_are_told() -> None:
-    (finding,) = told(diagnosed(campaign(factor=1e3), ["coulomb_friction"]))
+    (finding,) = reported(diagnosed(campaign(factor=1e3), ["coulomb_friction"]))
     assert finding.serious
     assert "times its motion in any record" in finding.sentence
 

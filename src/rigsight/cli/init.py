@@ -123,8 +123,8 @@ def init(
 
 
 def _say_what_is_next(n_blanks: int, folder: Path) -> None:
-    mend = f'Replace each "FILL IN" ({n_blanks} times) in it.' if n_blanks else "Check the comments in it."
-    typer.echo(f"{mend} Then: rigsight diagnose {folder}")
+    remedy = f'Replace each "FILL IN" ({n_blanks} times) in it.' if n_blanks else "Check the comments in it."
+    typer.echo(f"{remedy} Then: rigsight diagnose {folder}")
 
 
 def _init_from_mjcf(

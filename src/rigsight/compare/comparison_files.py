@@ -90,8 +90,8 @@ def comparison_csv(comparison: Comparison) -> str:
         for s in own.scores:
             floor = "" if s.noise_floor is None else f"{s.noise_floor:.9g}"
             first = "yes" if s.model in winners[s.column] else "no"
-            told = (f"{s.value:.9g}", floor, s.n_values, first, "")
-            table.writerow((s.model, *facts, s.column.signal, s.column.quantity, s.column.unit, *told))
+            reported = (f"{s.value:.9g}", floor, s.n_values, first, "")
+            table.writerow((s.model, *facts, s.column.signal, s.column.quantity, s.column.unit, *reported))
         for f in own.failures:
             missing = [f.column] if f.column else comparison.columns(record.name)
             for column in missing or (None,):

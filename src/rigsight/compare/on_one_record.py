@@ -197,9 +197,11 @@ def _trial(
         if step is not None:
             simulated = run.simulated[floor.output]
             trial.moved[floor.output] = step.moved(simulated)
-            left = step.error(record[floor.output], simulated)
+            remainder = step.error(record[floor.output], simulated)
             n_inside = step.inside.stop - step.inside.start
-            trial.add(Column("step_rmse", floor.output, floor.unit), left, step.floor(floor.std), n_inside)
+            trial.add(
+                Column("step_rmse", floor.output, floor.unit), remainder, step.floor(floor.std), n_inside
+            )
     return trial
 
 

@@ -227,11 +227,11 @@ def _among_others(
             f"'{method}' handles one input at a time, but {' and '.join(moving)} move at once; use local_rational."
         )
     smooth = () if path.is_commanded else (path.source,)
-    told = responses_of_inputs([record], moving, [path.response], poles=_POLES[method], smooth=smooth)
+    reported = responses_of_inputs([record], moving, [path.response], poles=_POLES[method], smooth=smooth)
     key = (path.source, path.response)
-    if key not in told.found:
-        raise InputError(told.problems[key])
-    return told.found[key]
+    if key not in reported.found:
+        raise InputError(reported.problems[key])
+    return reported.found[key]
 
 
 def response_error(measured: FrequencyResponse, simulated: FrequencyResponse) -> ResponseError:

@@ -6,7 +6,7 @@ from rigsight.diagnose.fitting.placed_effects import candidates_on as candidates
 from rigsight.diagnose.result import Candidate as Candidate
 from rigsight.diagnose.result import Diagnosis as Diagnosis
 from rigsight.diagnose.result import LikelyCauses as LikelyCauses
-from rigsight.diagnose.search.screening import structures_of_lineup as structures_of_lineup
+from rigsight.diagnose.search.screening import structures_of_shortlist as structures_of_shortlist
 from rigsight.diagnose.verdict.calibration import Calibration as Calibration
 from rigsight.diagnose.verdict.calibration import Situation as Situation
 from rigsight.diagnose.verdict.judgement import Verdict as Verdict

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES
 from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep, step
@@ -48,7 +48,7 @@ class Advice:
 
 
 def advise(
-    context: FitContext, chosen: Scored, rivals: Sequence[Scored], noise: Mapping[str, float]
+    context: FitContext, chosen: FittedModel, rivals: Sequence[FittedModel], noise: Mapping[str, float]
 ) -> tuple[Advice, ...]:
     """Return, for each rival, the candidate experiment that would distinguish it best from the chosen model.
 
@@ -80,7 +80,11 @@ def advise(
 
 
 def _separations(
-    context: FitContext, chosen: Scored, rival: Scored, experiment: _Experiment, noise: Mapping[str, float]
+    context: FitContext,
+    chosen: FittedModel,
+    rival: FittedModel,
+    experiment: _Experiment,
+    noise: Mapping[str, float],
 ) -> Iterator[tuple[str, float]]:
     hold: Hold = context.estimation[0].hold
     units = {source.name: source.unit for source in context.rig.inputs}

@@ -13,7 +13,7 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.advise import advise
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.fitting.absent_spring import with_weighed_spring
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.fitting.windows import readings
@@ -174,12 +174,12 @@ def _assembled(
     where = tuple(rig.where(effect) for effect in chosen)
     if judgement.verdict == "unknown":
         where = _evidence(found)
-    left = None
+    remainder = None
     if found.adequacy is not None and found.adequacy.adequate:
         floors = tuple(_up_to(floor, _column(rig, judgement.model, floor.output)) for floor in floors)
     if found.adequacy is not None:
         lower_bound = any(floor.lower_bound for floor in floors)
-        left = remainder_of(reidentified, judgement.model, found.adequacy, lower_bound, is_effect)
+        remainder = remainder_of(reidentified, judgement.model, found.adequacy, lower_bound, is_effect)
     if judgement.verdict != "unknown":
         floors = _with_disturbance(context, judgement.model, floors, found.windowing.bandwidth)
     return Diagnosis(
@@ -211,7 +211,7 @@ def _assembled(
         ),
         places=found.places,
         adequate=None if found.adequacy is None else found.adequacy.adequate,
-        remainder=left,
+        remainder=remainder,
         localization=localize(context, traces, scored_on, before, reidentified, after, rng, floors),
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
@@ -260,18 +260,18 @@ def _not_distinguished(
 
 
 def _with_disturbance(
-    context: FitContext, model: Scored, floors: Sequence[NoiseFloor], bandwidth: float | None
+    context: FitContext, model: FittedModel, floors: Sequence[NoiseFloor], bandwidth: float | None
 ) -> tuple[NoiseFloor, ...]:
     """Return the floors, that of the first output with the disturbance force that would cause the error of a model above it."""
     first = context.rig.outputs[0].name
     if not all(first in record for record in context.scoring):
         return tuple(floors)
-    left = [residual[:, 0] for residual in model.residuals]
+    residuals = [residual[:, 0] for residual in model.residuals]
     return tuple(
         replace(
             floor,
             disturbance=disturbance(
-                context.rig, model.fit.values, context.scoring, left, floor.std, bandwidth
+                context.rig, model.fit.values, context.scoring, residuals, floor.std, bandwidth
             ),
         )
         if floor.output == first
@@ -280,11 +280,11 @@ def _with_disturbance(
     )
 
 
-def _up_to(floor: NoiseFloor, left: NDArray[np.float64]) -> NoiseFloor:
+def _up_to(floor: NoiseFloor, residual: NDArray[np.float64]) -> NoiseFloor:
     """Return a lower bound with the upper limit that an adequate model's remainder gives it; another floor as it is."""
-    if not floor.lower_bound or not left.size:
+    if not floor.lower_bound or not residual.size:
         return floor
-    return replace(floor, interval=(floor.interval[0], max(float(np.std(left)), floor.std)))
+    return replace(floor, interval=(floor.interval[0], max(float(np.std(residual)), floor.std)))
 
 
 def _evidence(found: Examination) -> tuple[str, ...]:
@@ -294,14 +294,14 @@ def _evidence(found: Examination) -> tuple[str, ...]:
     the place of the best effect.
     """
     if found.places:
-        return tuple(place.name for place in found.places if place.looked_at and place.share > 0.0)
+        return tuple(place.name for place in found.places if place.examined and place.share > 0.0)
     rig = found.context.rig
     if found.gap_at:
         return ("sensor" if found.gap_at in {signal.name for signal in rig.outputs} else found.gap_at,)
     return tuple(dict.fromkeys(rig.where(effect) for effect in found.judgement.model.effects))
 
 
-def _column(rig: Rig, model: Scored, output: str) -> NDArray[np.float64]:
+def _column(rig: Rig, model: FittedModel, output: str) -> NDArray[np.float64]:
     index = [signal.name for signal in rig.outputs].index(output)
     column = np.concatenate([residual[:, index] for residual in model.residuals])
     return np.asarray(column[np.isfinite(column)])
@@ -313,12 +313,12 @@ def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, NDArray[np.float
 
 
 def _candidate(
-    context: FitContext, model: Scored, probability: float, grounds: Grounds | None = None
+    context: FitContext, model: FittedModel, probability: float, grounds: Grounds | None = None
 ) -> Candidate:
     units = {p.name: p.unit for p in model.fit.structure.parameters}
     measured = _measured(context.rig, context.scoring)
     fitted = _measured(context.rig, context.estimation)
-    estimation = Scored(model.effects, model.fit, model.fit, 0.0)
+    estimation = FittedModel(model.effects, model.fit, model.fit, 0.0)
     return Candidate(
         effects=model.names,
         where=tuple(context.rig.where(effect) for effect in model.effects),

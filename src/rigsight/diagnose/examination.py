@@ -12,7 +12,7 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model, with_offsets_told
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.adequacy import Adequacy
@@ -21,12 +21,12 @@ from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.fitted_models import AllModels, single_models, with_several_effects
-from rigsight.diagnose.search.horizon import brings_back, preparing, windowing_of
+from rigsight.diagnose.search.horizon import preparing, restores, windowing_of
 from rigsight.diagnose.search.places import SuspectedPlace
 from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbance, with_parts
 from rigsight.diagnose.search.several.one_law import split_distinguishable
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
-from rigsight.diagnose.verdict.judgement import Judgement, judge, most_left
+from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
 from rigsight.diagnose.verdict.main_cause import main_cause
 from rigsight.diagnose.verdict.plausibility import doubts, has_size_of_zero, plausible_first
 from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
@@ -43,13 +43,13 @@ class Examination:
     context: FitContext  # records, scales and noise
     windowing: Windowing  # how records were cut
     # The given simulation, and its equations with refitted parameters.
-    before: Scored
-    reidentified: Scored
+    before: FittedModel
+    reidentified: FittedModel
     ranking: Ranking  # the candidates
     judgement: Judgement  # the verdict
     quality: DataQuality  # quality of the data
     # Pairs with a low error that do not compete, because other laws fit equally well.
-    imitations: tuple[Scored, ...] = ()
+    imitations: tuple[FittedModel, ...] = ()
     # Share of the gap that a push explains, by place; empty on a rig with one motion.
     places: tuple[SuspectedPlace, ...] = ()
     # Whether the residual of the diagnosed model is correlated with anything; None where that model could not
@@ -79,7 +79,7 @@ def examine(
     ready = preparing(prepare, windowing.cut(campaign.records))
     alone = single_models(campaign, noise, effects, windowing, n_jobs, say, ready, memory)
     quality = data_quality(alone.context, campaign.records, alone.reidentified)
-    allowed = VERDICT.at_lower_bound if lower_bound else most_left(alone.reidentified.error_over_noise)
+    allowed = VERDICT.at_lower_bound if lower_bound else most_remainder(alone.reidentified.error_over_noise)
     asked = (
         asked_offsets(alone.context, alone.reidentified, alone.singles, allowed) if windowing.whole else None
     )
@@ -105,7 +105,7 @@ def examine(
     )
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
-    left = checks.of(judgement.model) if judgement.model.residuals else None
+    remainder = checks.of(judgement.model) if judgement.model.residuals else None
     say("adequacy")
     return Examination(
         floors,
@@ -118,7 +118,7 @@ def examine(
         quality,
         imitations,
         models.alone.search.places,
-        left,
+        remainder,
         tuple(doubt.text for doubt in doubts(judgement.model, reidentified))
         if judgement.model.effects
         else (),
@@ -128,7 +128,7 @@ def examine(
 
 def _floors(campaign: Campaign, n_jobs: int, at_rest: bool) -> tuple[tuple[NoiseFloor, ...], Windowing]:
     """Return the noise floor of each output, and how records are compared with models."""
-    drifts = campaign.drifts or not brings_back(campaign)
+    drifts = campaign.drifts or not restores(campaign)
     floors = noise_floors(campaign.rig, campaign.records, drifts, at_rest)
     if not drifts:
         return floors, Windowing()
@@ -147,7 +147,7 @@ def _ranked(
     noise: NDArray[np.float64],
     allowed: float,
     rng: np.random.Generator,
-) -> tuple[Ranking, tuple[Scored, ...]]:
+) -> tuple[Ranking, tuple[FittedModel, ...]]:
     """Return the ranking of all models with effects, and those that do not compete because other laws fit equally well."""
     context, reidentified, singles = models.alone.context, models.alone.reidentified, models.alone.singles
     several, imitations = split_distinguishable(models.several, singles, allowed, models.checks.is_adequate)
@@ -157,8 +157,8 @@ def _ranked(
         stand = beyond_disturbance(evidence, singles, models.forms.with_own_evidence(singles, several))
         several = with_parts(stand, several)
     fitted = [*singles, *several]
-    candidates: list[Scored] = []
-    of_no_size: list[Scored] = []
+    candidates: list[FittedModel] = []
+    of_no_size: list[FittedModel] = []
     for model in fitted:
         (of_no_size if has_size_of_zero(model, [reidentified, *fitted]) else candidates).append(model)
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
@@ -187,7 +187,7 @@ def _with_offset_rivals(
     noise: NDArray[np.float64],
     rng: np.random.Generator,
     gap: float,
-    criterion: Callable[[Scored], float],
+    criterion: Callable[[FittedModel], float],
     evidence_counts: bool,
 ) -> Ranking:
     """Let an even effect without a constant force compete where the best model needs a constant force.

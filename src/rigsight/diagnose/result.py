@@ -259,7 +259,7 @@ class Diagnosis:
             },
             **self.localization.to_json(),
             "gap_by_place": [
-                {"place": place.name, "share": _number(place.share), "looked_at": place.looked_at}
+                {"place": place.name, "share": _number(place.share), "looked_at": place.examined}
                 for place in self.places
             ],
             "effect_shares": {

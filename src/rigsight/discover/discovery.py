@@ -288,9 +288,9 @@ def _polished(data: RegressionData, bench: Bench, chosen: Trial) -> tuple[FitRes
     held = fitted(compose(rig, effects, special), fit.values, free - set(special))
     if not math.isfinite(held.cost):
         return fit, ""
-    told = ", ".join(f"{name} = {value:.4g} +/- {error:.2g}" for name, (value, error) in known.items())
+    reported = ", ".join(f"{name} = {value:.4g} +/- {error:.2g}" for name, (value, error) in known.items())
     kept = ", ".join(f"{name} = {value:g}" for name, value in special.items())
     return (
         held,
-        f"{kept} is held; if released, the fit gives {told}, and the other coefficients change with it.",
+        f"{kept} is held; if released, the fit gives {reported}, and the other coefficients change with it.",
     )

@@ -157,20 +157,20 @@ def _one_amplitude(selection: Selection, chosen: Trial) -> str:
     )
     near = [t for t in others if t.error_over_noise < _NEAR * chosen.error_over_noise]
     if not others:
-        told = (
+        reported = (
             "Softening, hardening, friction or hysteresis may look like other parameters of the same equation at this "
             "amplitude"
         )
     elif near:
         listed = "; ".join(", ".join(sorted(trial.support)) or "no term at all" for trial in near[:3])
-        told = f"At this amplitude {listed} is nearly as good"
+        reported = f"At this amplitude {listed} is nearly as good"
     else:
         ratio = others[0].error_over_noise / chosen.error_over_noise
-        told = (
+        reported = (
             f"At this amplitude the terms are distinguished (the error of the next equation is {ratio:.3g} times as large), "
             f"at others they are untested"
         )
     return (
-        f"The records have only one amplitude, so they do not show how a force grows with amplitude. {told}. "
+        f"The records have only one amplitude, so they do not show how a force grows with amplitude. {reported}. "
         "Add a record at half or twice the amplitude."
     )

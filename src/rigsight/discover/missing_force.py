@@ -58,9 +58,9 @@ class MissingForce:
         """The finding in words."""
         if not self.terms:
             return "No product of displacement x and velocity v describes the missing force."
-        told = " and ".join(f"{t.coefficient:.3g} {t.term} ({t.unit})" for t in self.terms)
+        reported = " and ".join(f"{t.coefficient:.3g} {t.term} ({t.unit})" for t in self.terms)
         return (
-            f"In these records the missing force is about {told}, with displacement x and velocity v; this explains "
+            f"In these records the missing force is about {reported}, with displacement x and velocity v; this explains "
             f"{self.share:.0%} of the error of the equations."
         )
 

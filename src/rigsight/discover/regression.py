@@ -67,13 +67,13 @@ class Projected:
 
     def explained(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Return coefficients of further columns and the share that they explain of the residual of the base."""
-        left, added = self.rest, self.rest_of(columns)
+        remainder, added = self.rest, self.rest_of(columns)
         size = np.linalg.norm(added, axis=0)
         if np.any(size <= _TINY * np.linalg.norm(columns, axis=0)):
             return np.zeros(columns.shape[1]), 0.0
-        solution = np.linalg.lstsq(added / size, left, rcond=1e-10)[0]
-        rest = left - (added / size) @ solution
-        return solution / size, float(1.0 - (rest @ rest) / (left @ left))
+        solution = np.linalg.lstsq(added / size, remainder, rcond=1e-10)[0]
+        rest = remainder - (added / size) @ solution
+        return solution / size, float(1.0 - (rest @ rest) / (remainder @ remainder))
 
     def solved(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Return coefficients of base and further columns, shape (n_base + n_columns,), and the RMS of the residual."""
@@ -110,12 +110,12 @@ def inclusion_probabilities(
         rows = np.concatenate([blocks[i] for i in rng.integers(len(blocks), size=len(blocks))])
         own_matrix, own_target = _compressed(matrix[rows], target[rows])
         supports = [(), *_shrinking(own_matrix, own_target)]
-        left = np.array([_left(own_matrix, own_target, support) for support in supports])
+        remainder = np.array([_remainder(own_matrix, own_target, support) for support in supports])
         costs = [
             information_criterion(square / rows.size, len(support), projected.independent)
-            for square, support in zip(left, supports, strict=True)
+            for square, support in zip(remainder, supports, strict=True)
         ]
-        enough = np.flatnonzero(left <= _CLEARLY**2 * left[int(np.argmin(costs))])[0]
+        enough = np.flatnonzero(remainder <= _CLEARLY**2 * remainder[int(np.argmin(costs))])[0]
         counts[list(supports[int(enough)])] += 1.0
     return np.asarray(counts / N_ENSEMBLE)
 
@@ -184,7 +184,7 @@ def _supports(history: Sequence[NDArray[np.float64]]) -> list[tuple[int, ...]]:
     return sorted({support for support in supports if support}, key=lambda s: (len(s), s))
 
 
-def _left(matrix: NDArray[np.float64], target: NDArray[np.float64], support: tuple[int, ...]) -> float:
+def _remainder(matrix: NDArray[np.float64], target: NDArray[np.float64], support: tuple[int, ...]) -> float:
     if not support:
         return float(target @ target)
     chosen = matrix[:, list(support)]

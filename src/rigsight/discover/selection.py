@@ -162,17 +162,19 @@ def proposals(bench: Bench) -> list[Support]:
     shares = [bench.projected.explained(columns[:, [i]])[1] for i in range(len(names))]
     supports |= {(int(i),) for i in np.argsort(shares)[::-1][:_GROWTH]}
 
-    def left(support: tuple[int, ...]) -> float:
+    def remainder(support: tuple[int, ...]) -> float:
         return bench.projected.solved(columns[:, list(support)])[1] ** 2
 
     def worth(support: tuple[int, ...]) -> bool:
         shorter = [tuple(i for i in support if i != out) for out in support]
-        return len(support) == 1 or all(left(support) < (1.0 - _WORTH) * left(less) for less in shorter)
+        return len(support) == 1 or all(
+            remainder(support) < (1.0 - _WORTH) * remainder(less) for less in shorter
+        )
 
     short = [support for support in supports if 0 < len(support) <= _LONGEST_SEED and worth(support)]
 
     def cost(support: tuple[int, ...]) -> float:
-        return information_criterion(left(support), len(support), bench.projected.independent)
+        return information_criterion(remainder(support), len(support), bench.projected.independent)
 
     # Short ones first: if one term reaches the noise floor, two need not be tried.
     ordered = sorted(sorted(short, key=cost)[:_SEEDS], key=lambda support: (len(support), cost(support)))
@@ -201,7 +203,7 @@ def next_terms(bench: Bench, support: Support) -> list[str]:
     """Return the terms that explain most of the regression residual of a support, the best first."""
     inside = [bench.candidates[name].column for name in sorted(support)]
     projected = replace(bench.projected, base=np.column_stack([bench.projected.base, *inside]))
-    left = [name for name in bench.candidates if name not in support]
-    shares = [projected.explained(bench.candidates[name].column[:, None])[1] for name in left]
+    unused = [name for name in bench.candidates if name not in support]
+    shares = [projected.explained(bench.candidates[name].column[:, None])[1] for name in unused]
     ranked = np.argsort(shares)[::-1][:_GROWTH]
-    return [left[i] for rank, i in enumerate(ranked) if rank == 0 or shares[i] > _WORTH]
+    return [unused[i] for rank, i in enumerate(ranked) if rank == 0 or shares[i] > _WORTH]

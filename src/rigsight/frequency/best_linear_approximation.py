@@ -301,12 +301,12 @@ def _excited_lines(
     strongest = power.max()
     if strongest == 0.0:
         raise InputError(f"Record '{name}': '{source}' is constant: without excitation there is no response.")
-    heard = power > _EXCITED * strongest
-    lines = np.flatnonzero(heard & (omega >= lower) & (omega <= upper))
+    excited = power > _EXCITED * strongest
+    lines = np.flatnonzero(excited & (omega >= lower) & (omega <= upper))
     if lines.size == 0:
         raise InputError(
             f"Record '{name}': '{source}' excites no line from {lower:g} to {upper:g} rad/s; it excites "
-            f"{omega[heard][0]:.4g} to {omega[heard][-1]:.4g} rad/s."
+            f"{omega[excited][0]:.4g} to {omega[excited][-1]:.4g} rad/s."
         )
     return lines
 

@@ -124,10 +124,10 @@ def excited(
         )
     silent = wished & ~heard
     if silent.any():
-        heard_omega = omega[heard]
+        excited_omega = omega[heard]
         raise InputError(
             f"{what} does not excite {omega[silent][0]:.4g} to {omega[silent][-1]:.4g} rad/s of the requested band, "
-            f"{lower:g} to {upper:g} rad/s. It excites {heard_omega[0]:.4g} to {heard_omega[-1]:.4g} rad/s: choose a band "
+            f"{lower:g} to {upper:g} rad/s. It excites {excited_omega[0]:.4g} to {excited_omega[-1]:.4g} rad/s: choose a band "
             "within, or record with a wider excitation."
         )
     return wished

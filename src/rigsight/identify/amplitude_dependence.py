@@ -51,7 +51,7 @@ def amplitude_dependence(
     span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g} {unit}".rstrip()
     if not names:
         return f"No parameter was found at all amplitudes {span}; nothing can be compared.", ()
-    changing, told = [], []
+    changing, reported = [], []
     for name in names:
         means = [_mean([record.estimates[name] for record in group]) for _, group in compared]
         if not all(np.isfinite(error) for _, error in means) or _chance(means) >= _CHANCE / len(names):
@@ -60,15 +60,17 @@ def amplitude_dependence(
         low, high = means[0][0], means[-1][0]
         values = [value for value, _ in means]
         if min(low, high) > min(values) or max(low, high) < max(values):
-            told.append(f"{name} moves between {min(values):.3g} and {max(values):.3g} {units.get(name, '')}")
+            reported.append(
+                f"{name} moves between {min(values):.3g} and {max(values):.3g} {units.get(name, '')}"
+            )
         else:
             verb = "falls" if high < low else "rises"
-            told.append(f"{name} {verb} from {low:.3g} to {high:.3g} {units.get(name, '')}")
+            reported.append(f"{name} {verb} from {low:.3g} to {high:.3g} {units.get(name, '')}")
     if not changing:
         text = f"No parameter changes with the amplitude ({span.removeprefix('from ')}) beyond its interval."
         return text + _moving_resonance(compared), ()
     return (
-        f"With amplitudes {span}, {'; '.join(text.strip() for text in told)}. These changes exceed the confidence intervals, "
+        f"With amplitudes {span}, {'; '.join(text.strip() for text in reported)}. These changes exceed the confidence intervals, "
         "which indicates a nonlinear effect; 'rigsight diagnose' looks for it."
         + _no_single_inertia(compared, units, changing)
     ), tuple(changing)

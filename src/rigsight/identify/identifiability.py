@@ -343,15 +343,15 @@ def helpful_sensors(
         ]
     except SimulationError:
         return ()
-    told = []
+    reported = []
     for name in lacking:
         with_it = [record.with_signals(**{name: s[name]}) for record, s in zip(records, shown, strict=True)]
         size = float(np.std(np.concatenate([s[name] for s in shown])))
         if size == 0.0:
             continue
         fit = GreyBoxFit(structure, with_it, scales, {**noise, name: _NOISE * size})
-        left = free_directions(information(fit, result))
-        if left < before:
-            much = "all parameters" if left == 0 else "more of them"
-            told.append(f"If '{name}' were also recorded, these inputs would determine {much}.")
-    return tuple(told)
+        remainder = free_directions(information(fit, result))
+        if remainder < before:
+            much = "all parameters" if remainder == 0 else "more of them"
+            reported.append(f"If '{name}' were also recorded, these inputs would determine {much}.")
+    return tuple(reported)

@@ -115,10 +115,10 @@ class _Model:
 
     def minimum(self) -> Floats:
         """Return the parameters at the minimum of the linearized fit without bounds, in their units, shape (n,)."""
-        rows, left = np.vstack(self.rows), np.concatenate(self._residuals)
+        rows, remainder = np.vstack(self.rows), np.concatenate(self._residuals)
         size = np.linalg.norm(rows, axis=0)
         size[size == 0.0] = 1.0
-        return np.asarray(self._place - np.linalg.lstsq(rows / size, left, rcond=_FOLLOWED)[0] / size)
+        return np.asarray(self._place - np.linalg.lstsq(rows / size, remainder, rcond=_FOLLOWED)[0] / size)
 
     def change(self, values: Mapping[str, float]) -> float:
         """Return the length of the change of all weighted outputs when parameters take other values."""
@@ -166,11 +166,16 @@ def _triangle(rows: Floats) -> Floats:
 
 def _coloring(root: Floats, result: FitResult, names: Sequence[str], sizes: Floats) -> float:
     """Return the ratio of the standard errors to those for white residuals, as the median over the parameters."""
-    left, singular, right = np.linalg.svd(root, full_matrices=False)
-    del left
+    remainder, singular, right = np.linalg.svd(root, full_matrices=False)
+    del remainder
     known = singular > 1e-6 * singular[:1]
     white = np.sqrt(np.sum((right[known] / singular[known, None]) ** 2, axis=0))
-    told = np.array([result.standard_errors[name] for name in names]) / np.abs(sizes)
+    reported = np.array([result.standard_errors[name] for name in names]) / np.abs(sizes)
     # The two are comparable only for parameters without a component in an undetermined direction.
-    seen = np.all(np.abs(right[~known]) < 1e-3, axis=0) & np.isfinite(told) & (told > 0.0) & (white > 0.0)
-    return max(float(np.median(told[seen] / white[seen])), 1.0) if np.any(seen) else 1.0
+    seen = (
+        np.all(np.abs(right[~known]) < 1e-3, axis=0)
+        & np.isfinite(reported)
+        & (reported > 0.0)
+        & (white > 0.0)
+    )
+    return max(float(np.median(reported[seen] / white[seen])), 1.0) if np.any(seen) else 1.0

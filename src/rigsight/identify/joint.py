@@ -218,8 +218,8 @@ def _residual_noise(structure: Structure, fit: FitResult, noise: Mapping[str, fl
     found = {}
     for i, signal in enumerate(structure.rig.outputs):
         if signal.name in noise:
-            left = np.concatenate([residual[:, i] for residual in fit.residuals])
-            found[signal.name] = max(float(np.sqrt(np.nanmean(left**2))), 1e-6 * noise[signal.name])
+            remainder = np.concatenate([residual[:, i] for residual in fit.residuals])
+            found[signal.name] = max(float(np.sqrt(np.nanmean(remainder**2))), 1e-6 * noise[signal.name])
     return found
 
 

@@ -93,7 +93,7 @@ class OneStep:
         found = sandwich_covariance(self._bread, filling, self._error)
         return propagated_covariance(found, self._chain)
 
-    def left(self, changes: Sequence[Floats]) -> list[Floats]:
+    def remainder(self, changes: Sequence[Floats]) -> list[Floats]:
         """Return the changes that remain after the step, in units of the noise, shape as given; 0 for unmeasured outputs."""
         stacked = self._stacked(changes)
         steps = self._inverse @ self._gradients(stacked)
@@ -128,5 +128,5 @@ class OneStep:
 def _basis(columns: Floats) -> Floats:
     """Return an orthonormal basis of the span of the columns, shape (n, rank)."""
     size = np.linalg.norm(columns, axis=0)
-    left, singular, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
-    return np.asarray(left[:, singular > _FOLLOWED * np.max(singular, initial=0.0)])
+    remainder, singular, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+    return np.asarray(remainder[:, singular > _FOLLOWED * np.max(singular, initial=0.0)])

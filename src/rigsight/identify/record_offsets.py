@@ -104,15 +104,15 @@ def differing_means(
 
 
 def _differing(output: str, residuals: Mapping[str, Floats]) -> DifferingMeans:
-    means = {name: float(np.mean(left)) for name, left in residuals.items()}
+    means = {name: float(np.mean(remainder)) for name, remainder in residuals.items()}
     values = np.array(list(means.values()))
-    variances = np.array([_variance_of_mean(left) for left in residuals.values()])
+    variances = np.array([_variance_of_mean(remainder) for remainder in residuals.values()])
     weights = 1.0 / np.maximum(variances, 1e-300)
     middle = float(weights @ values / np.sum(weights))
     degrees = len(means) - 1
     statistic = float(weights @ (values - middle) ** 2) / degrees
-    sizes = np.array([left.size for left in residuals.values()])
-    squares = sum(float(left @ left) for left in residuals.values())
+    sizes = np.array([remainder.size for remainder in residuals.values()])
+    squares = sum(float(remainder @ remainder) for remainder in residuals.values())
     return DifferingMeans(
         output=output,
         means=means,
@@ -121,10 +121,10 @@ def _differing(output: str, residuals: Mapping[str, Floats]) -> DifferingMeans:
     )
 
 
-def _variance_of_mean(left: Floats) -> float:
+def _variance_of_mean(remainder: Floats) -> float:
     """Return the variance of the mean of a colored residual: its power per line near zero frequency, over its length."""
-    lines = np.abs(np.fft.rfft(left - np.mean(left))[1 : SMOOTHED + 1]) ** 2
-    return float(np.mean(lines)) / left.size**2
+    lines = np.abs(np.fft.rfft(remainder - np.mean(remainder))[1 : SMOOTHED + 1]) ** 2
+    return float(np.mean(lines)) / remainder.size**2
 
 
 def without_offsets(records: Sequence[Record], fit: FitResult) -> list[Record]:

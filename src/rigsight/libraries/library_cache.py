@@ -115,7 +115,7 @@ def _path(text: str, compiler: Compiler) -> Path:
 @cache
 def processor() -> str:
     """Return an identifier that distinguishes this processor from others that cannot run its code."""
-    told = f"{platform.machine()} {platform.processor()}"
+    reported = f"{platform.machine()} {platform.processor()}"
     with contextlib.suppress(OSError):
         first = Path("/proc/cpuinfo").read_text("utf-8", errors="replace").partition("\n\n")[0]
         names = (
@@ -129,8 +129,8 @@ def processor() -> str:
             "CPU part",
         )
         lines = [line for line in first.splitlines() if line.partition(":")[0].strip() in names]
-        told = "\n".join([told, *lines])
-    return told
+        reported = "\n".join([reported, *lines])
+    return reported
 
 
 def _sound(path: Path) -> bool:

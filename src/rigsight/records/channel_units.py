@@ -198,12 +198,12 @@ def si_mapping(
             return mapping, ()
         if mapping.offset is None:
             own = f'{signal} = {{ name = "{label}", unit = "{named}" }}'
-            mend = f"{own} (on a command line --unit {signal}={named}); if not, scale = 1.0"
+            remedy = f"{own} (on a command line --unit {signal}={named}); if not, scale = 1.0"
         else:
-            mend = f"scale = {factor(named, taken):.9g} beside the offset; if not, scale = 1.0"
+            remedy = f"scale = {factor(named, taken):.9g} beside the offset; if not, scale = 1.0"
         return mapping, (
             f"{where}: values taken as {taken} without conversion, although the name ends with {named}. If it is in {named}, "
-            f"write {mend}.",
+            f"write {remedy}.",
         )
     if not has_si(si):
         if mapping.unit is not None:

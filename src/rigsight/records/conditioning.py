@@ -109,7 +109,7 @@ def time_base(
         worst = int(np.argmax(np.abs(steps - dt)))
         raise InputError(
             f"{file}, {row} {lines[worst + 1]}: the samples are not equally spaced; the step to "
-            f"t = {told_stamp(stamps, worst + 1)} is {steps[worst]:.4g}, the mean step {dt:.4g} "
+            f"t = {stamp_text(stamps, worst + 1)} is {steps[worst]:.4g}, the mean step {dt:.4g} "
             f"(jitter {100 * jitter:.2g} %, at most {100 * LARGEST_JITTER:g} % is resampled). "
             "Record with a fixed sample time, or cut the record to its even part with start and end."
         )
@@ -129,7 +129,7 @@ def time_base(
     return TimeBase(float(stamps[0]), _plain(dt, jitter * dt / stamps.size), stamps.size, stamps, jitter)
 
 
-def told_stamp(stamps: NDArray[np.float64], sample: int) -> str:
+def stamp_text(stamps: NDArray[np.float64], sample: int) -> str:
     """Return a stamp as text that tells it from its neighbors."""
     steps = np.abs(np.diff(stamps))
     finest = float(np.min(steps[steps > 0.0], initial=np.inf))
@@ -219,12 +219,14 @@ def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: st
     where = f"{file}, {row} {lines[first + 1]}: "
     if steps[first] < 0.0:
         raise InputError(
-            f"{where}time is not increasing: {told_stamp(stamps, first + 1)} follows {told_stamp(stamps, first)}. "
+            f"{where}time is not increasing: {stamp_text(stamps, first + 1)} follows {stamp_text(stamps, first)}. "
             "Sort the rows, or split the file where a new record begins."
         )
     count = int(np.count_nonzero(steps == 0.0))
-    mend = "Write the time with more digits." if count > stamps.size // 10 else "Delete the repeated row."
-    raise InputError(f"{where}duplicate time stamp {told_stamp(stamps, first)} ({count} in the file). {mend}")
+    remedy = "Write the time with more digits." if count > stamps.size // 10 else "Delete the repeated row."
+    raise InputError(
+        f"{where}duplicate time stamp {stamp_text(stamps, first)} ({count} in the file). {remedy}"
+    )
 
 
 def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str) -> None:
@@ -236,6 +238,6 @@ def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str
     more = f" ({gaps.size} gaps in the file)" if gaps.size > 1 else ""
     raise InputError(
         f"{file}, between {row}s {lines[first]} and {lines[first + 1]}: {missing_behind(stamps, first)} samples are "
-        f"missing, the time jumps from {told_stamp(stamps, first)} to {told_stamp(stamps, first + 1)}{more}. "
+        f"missing, the time jumps from {stamp_text(stamps, first)} to {stamp_text(stamps, first + 1)}{more}. "
         "Split the record there into two files."
     )

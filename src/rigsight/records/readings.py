@@ -26,15 +26,15 @@ def refuse_codes(path: Path, table: Columns) -> None:
         found = codes(samples)
         if not found:
             continue
-        told = []
+        reported = []
         for code in found:
             rows = [str(table.lines[place]) for place in code.samples[:_LISTED]]
             more = f" and {code.samples.size - _LISTED} more" if code.samples.size > _LISTED else ""
-            told.append(
+            reported.append(
                 f"{code.value:.6g} in {table.row}{'s' if code.samples.size > 1 else ''} {', '.join(rows)}{more}"
             )
         raise InputError(
-            f"{path.name}, column '{table.labels[signal]}': {'; '.join(told)}: such a number stands for a missing or invalid "
+            f"{path.name}, column '{table.labels[signal]}': {'; '.join(reported)}: such a number stands for a missing or invalid "
             "reading. Cut the record there, or fill the gap before reading if you know what was there."
         )
 

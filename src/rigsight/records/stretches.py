@@ -21,7 +21,7 @@ from rigsight.records.conditioning import (
     missing_behind,
     pauses,
     resolution,
-    told_stamp,
+    stamp_text,
 )
 from rigsight.records.plausibility import is_constant
 from rigsight.records.stamps import written_span
@@ -124,9 +124,9 @@ def one_stretch(file: str, found: Stretches) -> Columns:
     """Return the table of a record that is to be one."""
     if len(found.parts) == 1 and not found.notes:
         return found.parts[0]
-    told = found.notes[0].removeprefix(f"{file}: ").partition(".")[0]
+    reported = found.notes[0].removeprefix(f"{file}: ").partition(".")[0]
     raise InputError(
-        f"{file}: {told}. Split it there into separate files; a campaign reads each stretch as a separate record."
+        f"{file}: {reported}. Split it there into separate files; a campaign reads each stretch as a separate record."
     )
 
 
@@ -136,7 +136,7 @@ def _where(stamps: NDArray[np.float64], table: Columns, ends: NDArray[np.intp]) 
     others = "" if ends.size == 1 else f", and at {ends.size - 1} more place{'s' if ends.size > 2 else ''}"
     return (
         f"between {table.row}s {table.lines[first]} and {table.lines[first + 1]} ({missing_behind(stamps, first)}; the time "
-        f"jumps from {told_stamp(stamps, first)} to {told_stamp(stamps, first + 1)}){others}"
+        f"jumps from {stamp_text(stamps, first)} to {stamp_text(stamps, first + 1)}){others}"
     )
 
 

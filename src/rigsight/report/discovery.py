@@ -85,8 +85,8 @@ def _term(term: Term) -> str:
 
 def _joint(joint: JointForce) -> str:
     left = f"leaves {joint.error_over_noise:.3g} x floor"
-    told = " and ".join(term.text for term in joint.law.terms) or "not a function of the motion"
-    return f"explains {100 * joint.share:.4g} % of the sensor errors, {left}: {told}"
+    reported = " and ".join(term.text for term in joint.law.terms) or "not a function of the motion"
+    return f"explains {100 * joint.share:.4g} % of the sensor errors, {left}: {reported}"
 
 
 def _alone(found: Discovery | str) -> str:

@@ -155,8 +155,10 @@ def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
     """Yield subject and words: the numbers of the joint fit, and how it follows each record."""
     fit, reached = found.joint.fit.fit, {bound.name: bound.side for bound in found.reached}
     for name in found.joint.names:
-        told = estimate_text(Estimate(fit.values[name], fit.standard_errors[name], found.units.get(name, "")))
-        yield name, f"{told}, at its {reached[name]} bound" if name in reached else told
+        reported = estimate_text(
+            Estimate(fit.values[name], fit.standard_errors[name], found.units.get(name, ""))
+        )
+        yield name, f"{reported}, at its {reached[name]} bound" if name in reached else reported
     if found.joint.pooled is not None:
         errors = found.joint.pooled.standard_errors
         for name, value in found.joint.pooled.values.items():

@@ -52,25 +52,26 @@ def render_identification(
     seed: int | None = None,
 ) -> str:
     """Return the page of an identification."""
-    told = identification.identifiability
-    assert told is not None
+    reported = identification.identifiability
+    assert reported is not None
     names = identification.joint.names
     return (
         environment()
         .get_template("identification.html.jinja")
         .render(
             identification=identification,
-            sentence=told.sentence,
-            all_determined=len(told.determined) == len(names) and identification.joint.fit.fit.success,
-            n_determined=len(told.determined),
+            sentence=reported.sentence,
+            all_determined=len(reported.determined) == len(names) and identification.joint.fit.fit.success,
+            n_determined=len(reported.determined),
             n_parameters=len(names),
             views=_views(identification, drawings),
             parameters=[_parameter(identification, name) for name in names],
             combinations=[
-                _row(c.text, c.value, c.std, c.unit, f"of {', '.join(c.members)}") for c in told.combinations
+                _row(c.text, c.value, c.std, c.unit, f"of {', '.join(c.members)}")
+                for c in reported.combinations
             ],
             errors_hold=ERRORS_HOLD,
-            statements=told.statements,
+            statements=reported.statements,
             outputs=list(dict.fromkeys(name for s in identification.joint.scores for name in s.nrmse)),
             scores=[
                 {

@@ -21,8 +21,8 @@ from rigsight.report.wording import (
     percent,
     sentence_case,
     stage_names,
-    stages_told,
-    told_unit,
+    stages_reported,
+    unit_text,
 )
 
 
@@ -107,7 +107,7 @@ def place_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
         (
             place.name,
             percent(place.share),
-            "first" if place.looked_at else "only if the others explain too little of the gap",
+            "first" if place.examined else "only if the others explain too little of the gap",
         )
         for place in diagnosis.places
     ]
@@ -160,7 +160,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             page_figure(
                 plot.gap_bands(bands, stages),
                 f"{key}-bands",
-                f"Bars of the gap by band of frequency. {_told(said, diagnosis)}",
+                f"Bars of the gap by band of frequency. {_reported(said, diagnosis)}",
                 f"By frequency. {_largest(said, rest)} The squares of the bars add up to the square of the gap; the "
                 f"noise floor is {spread}.",
             )
@@ -174,7 +174,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             page_figure(
                 plot.gap_amplitudes(amplitudes, labels, stages),
                 f"{key}-amplitudes",
-                f"Bars of the gap by amplitude of the input. {_told(said_of, diagnosis)}",
+                f"Bars of the gap by amplitude of the input. {_reported(said_of, diagnosis)}",
                 "By amplitude of the input, each relative to the motion there"
                 + (
                     ": " + "; ".join(f"{_size(p)} {p.records[0]}" for p in amplitudes)
@@ -191,7 +191,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             page_figure(
                 plot.gap_records(records, labels, stages),
                 f"{key}-records",
-                f"Bars of the gap by record. {_told([(p.record, p) for p in records], diagnosis)}",
+                f"Bars of the gap by record. {_reported([(p.record, p) for p in records], diagnosis)}",
                 "By record, each relative to its own motion: "
                 + "; ".join(f"{i} {p.record} ({p.role})" for i, p in enumerate(records, start=1))
                 + ".",
@@ -234,12 +234,12 @@ def _states_figure(states: Sequence[StatePart], output: str, motion: str, key: s
     )
 
 
-def _told(parts: Sequence[tuple[str, GapPart]], diagnosis: Diagnosis) -> str:
+def _reported(parts: Sequence[tuple[str, GapPart]], diagnosis: Diagnosis) -> str:
     """Return the bars in words, for who cannot see them."""
     sentences = []
     for name, part in parts:
         sentences.append(
-            f"{sentence_case(name)}: {stages_told(diagnosis, part)}, noise floor {gap_percent(part.noise_floor)}."
+            f"{sentence_case(name)}: {stages_reported(diagnosis, part)}, noise floor {gap_percent(part.noise_floor)}."
         )
     return " ".join(sentences)
 
@@ -288,4 +288,4 @@ def _amplitude_label(part: AmplitudePart) -> str:
 
 def _size(part: AmplitudePart) -> str:
     scale = plot.display_scale(part.units["amplitude"], part.amplitude)
-    return f"{part.amplitude * scale.factor:.4g} {told_unit(scale.unit)}".strip()
+    return f"{part.amplitude * scale.factor:.4g} {unit_text(scale.unit)}".strip()

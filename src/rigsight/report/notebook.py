@@ -78,11 +78,11 @@ def identification_html(identification: Identification) -> str:
         ],
     )
     together = NotebookTable(("all records", ""), list(joint_rows(identification)))
-    told = identification.identifiability
+    reported = identification.identifiability
     sentences = [
         identification.amplitude_statement,
         identification.joint.statement,
-        "" if told is None else told.sentence,
+        "" if reported is None else reported.sentence,
     ]
     tables = [alone, together]
     if (hysteresis := identification.hysteresis) is not None:

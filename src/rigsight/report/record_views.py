@@ -30,7 +30,7 @@ from rigsight.report.drawing.response_charts import response_chart
 from rigsight.report.quantities import gap_percent
 from rigsight.report.responses import PathResponse
 from rigsight.report.sections import output_label
-from rigsight.report.wording import sentence_case, stage_names, told_unit
+from rigsight.report.wording import sentence_case, stage_names, unit_text
 
 if TYPE_CHECKING:
     from rigsight.plot import Figure
@@ -217,6 +217,6 @@ def _facts(diagnosis: Diagnosis, trace: Trace) -> str:
     scale = plot.display_scale(unit, abs(trace.amplitude or 0.0))
     facts = [f"{trace.role} record", trace.kind]
     if trace.amplitude is not None:
-        facts.append(f"amplitude {trace.amplitude * scale.factor:.4g} {told_unit(scale.unit)}".strip())
+        facts.append(f"amplitude {trace.amplitude * scale.factor:.4g} {unit_text(scale.unit)}".strip())
     length = float(trace.t[-1] - trace.t[0]) if trace.t.size else 0.0
     return ", ".join([*facts, f"{length:.4g} s", f"{trace.t.size} samples"])

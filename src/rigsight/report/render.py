@@ -107,7 +107,7 @@ def render_report(
             parameters=sections.parameter_rows(diagnosis, known),
             has_given=bool(diagnosis.given),
             trust=trust_view(diagnosis),
-            errors_told=sections.errors_told(diagnosis),
+            errors_reported=sections.errors_reported(diagnosis),
             equations=equation_groups(diagnosis, known),
             amplitude_figures=amplitude_figures(diagnosis, responses),
             loops=loop_figures(diagnosis),

@@ -32,7 +32,7 @@ from rigsight.report.wording import (
     named_candidate,
     percent,
     sentence_case,
-    stages_told,
+    stages_reported,
 )
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class FindingRow:
     where: str
     kind: str
     sentence: str
-    mend: str
+    remedy: str
     serious: bool
     explained: str
 
@@ -88,7 +88,7 @@ def budget_drawing(diagnosis: Diagnosis) -> Figure:
 def budget_figure(diagnosis: Diagnosis) -> PageFigure:
     """Return the gap budget with its caption."""
     alt = " ".join(
-        f"{output}: {stages_told(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}."
+        f"{output}: {stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}."
         for output, gap in diagnosis.gap.items()
     )
     meaning = (
@@ -198,7 +198,7 @@ def parameter_rows(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> list[
     ]
 
 
-def errors_told(diagnosis: Diagnosis) -> str:
+def errors_reported(diagnosis: Diagnosis) -> str:
     """Return in a sentence where the standard errors of the numbers come from; empty where no number was fitted."""
     candidate = named_candidate(diagnosis)
     if candidate is None or not candidate.parameters or diagnosis.verdict not in ("effect", "parameters"):
@@ -273,7 +273,7 @@ def finding_rows(diagnosis: Diagnosis) -> list[FindingRow]:
             where=", ".join(part for part in (finding.record or "all records", finding.signal) if part),
             kind=finding.kind.replace("_", " "),
             sentence=finding.sentence,
-            mend=finding.mend,
+            remedy=finding.remedy,
             serious=finding.serious,
             explained="not measured" if finding.explained is None else percent(finding.explained),
         )
@@ -283,8 +283,8 @@ def finding_rows(diagnosis: Diagnosis) -> list[FindingRow]:
 
 def other_notes(diagnosis: Diagnosis) -> list[str]:
     """Return the notes that do not stand under data quality already."""
-    told = () if diagnosis.data_quality is None else diagnosis.data_quality.notes
-    return [note for note in diagnosis.notes if note not in told]
+    reported = () if diagnosis.data_quality is None else diagnosis.data_quality.notes
+    return [note for note in diagnosis.notes if note not in reported]
 
 
 def _parameters(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Iterator[Parameter]:

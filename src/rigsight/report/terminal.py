@@ -26,7 +26,7 @@ from rigsight.report.wording import (
     named_candidate,
     percent,
     remainder_sentence,
-    stages_told,
+    stages_reported,
     verdict_name,
     verdict_sentence,
     what_is_probable,
@@ -96,7 +96,7 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     for output, gap in diagnosis.gap.items():
         yield (
             f"gap in {output}",
-            f"{stages_told(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
+            f"{stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
         )
     if diagnosis.candidates:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))

@@ -53,11 +53,11 @@ def trust_view(diagnosis: Diagnosis) -> TrustView | None:
         return None
     figure = None
     if _drawn(diagnosis):
-        told = "; ".join(f"{n.name}: {_how(n)}" for n in _drawn(diagnosis))
+        reported = "; ".join(f"{n.name}: {_how(n)}" for n in _drawn(diagnosis))
         figure = page_figure(
             trust_drawing(diagnosis),
             "figure-trust",
-            f"Parameters estimated from single groups of records, with 95 % intervals. {told}.",
+            f"Parameters estimated from single groups of records, with 95 % intervals. {reported}.",
             "Each parameter as estimated from one record, level or window alone, with 95 % intervals. Dashed line with band: the "
             "common fit.",
         )
@@ -91,11 +91,11 @@ def trust_line(diagnosis: Diagnosis) -> str:
     differing = [number for number in diagnosis.trust.parameters if not number.stable]
     if not differing:
         return f"Trust: {diagnosis.trust.statement}"
-    told = [f"{number.name} {_how(number)}" for number in differing[:_TOLD_IN_A_LINE]]
-    more = len(differing) - len(told)
+    reported = [f"{number.name} {_how(number)}" for number in differing[:_TOLD_IN_A_LINE]]
+    more = len(differing) - len(reported)
     rest = f"; {more} more {'differs' if more == 1 else 'differ'}" if more > 0 else ""
     first = differing[0].points_to
-    return f"Trust: {'; '.join(told)}{rest}. {sentence_case(first.cause) if first else ''}."
+    return f"Trust: {'; '.join(reported)}{rest}. {sentence_case(first.cause) if first else ''}."
 
 
 def trust_rows(diagnosis: Diagnosis) -> Iterator[dict[str, Any]]:
@@ -118,8 +118,8 @@ def trust_rows(diagnosis: Diagnosis) -> Iterator[dict[str, Any]]:
 
 def _drawn(diagnosis: Diagnosis) -> list[ParameterTrust]:
     numbers = () if diagnosis.trust is None else diagnosis.trust.parameters
-    told = [n for n in numbers if (not n.stable or n.of_effect) and len(n.groups.get(_shown(n), ())) > 1]
-    return told[:_MOST_PANELS]
+    reported = [n for n in numbers if (not n.stable or n.of_effect) and len(n.groups.get(_shown(n), ())) > 1]
+    return reported[:_MOST_PANELS]
 
 
 def _shown(number: ParameterTrust) -> str:
@@ -147,7 +147,7 @@ def _how(number: ParameterTrust) -> str:
 
 
 def _row(number: ParameterTrust) -> TrustRow:
-    told = number.points_to
+    reported = number.points_to
     return TrustRow(
         name=number.name,
         number=written(number.value, number.std),
@@ -158,5 +158,5 @@ def _row(number: ParameterTrust) -> TrustRow:
         else f"{number.p_value:.2g}"
         if number.p_value > 1e-6
         else "< 1e-6",
-        points_to="" if told is None else f"{sentence_case(told.cause)}. Next: {told.experiment}",
+        points_to="" if reported is None else f"{sentence_case(reported.cause)}. Next: {reported.experiment}",
     )

@@ -117,7 +117,7 @@ def stage_names(diagnosis: Diagnosis) -> dict[Stage, str]:
     return names
 
 
-def stages_told(diagnosis: Diagnosis, gap: OutputGap | GapPart) -> str:
+def stages_reported(diagnosis: Diagnosis, gap: OutputGap | GapPart) -> str:
     """Return the error of each stage: ``"given simulation 42 %, re-identified 13 %, with effect 0.94 %"``."""
     return ", ".join(
         f"{name} {gap_percent(getattr(gap, stage))}" for stage, name in stage_names(diagnosis).items()
@@ -247,7 +247,7 @@ def fault_sentences(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.data_quality is None:
         return []
     faults = [finding for finding in diagnosis.data_quality.findings if finding.serious]
-    return [f"Check the records first: {finding.sentence} {finding.mend}".strip() for finding in faults]
+    return [f"Check the records first: {finding.sentence} {finding.remedy}".strip() for finding in faults]
 
 
 def missing_force_sentence(diagnosis: Diagnosis) -> str:
@@ -280,7 +280,7 @@ def ambiguity_sentence(diagnosis: Diagnosis) -> str:
     return " ".join(sentences)
 
 
-def told_unit(unit: str) -> str:
+def unit_text(unit: str) -> str:
     """Return a unit as it stands behind a number; an axis calls the unit of its input just that."""
     return "" if unit in ("input", "1") else unit
 
@@ -291,7 +291,7 @@ def advice_sentences(diagnosis: Diagnosis) -> list[str]:
     sentences = []
     for advice in diagnosis.advice:
         unit = diagnosis.units.get(advice.source, "")
-        size = f"amplitude {advice.amplitude:.3g} {told_unit(unit)}".strip()
+        size = f"amplitude {advice.amplitude:.3g} {unit_text(unit)}".strip()
         band = f" on {advice.source}" if several else ""
         if advice.band is not None:
             low, high = advice.band

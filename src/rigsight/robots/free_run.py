@@ -80,12 +80,12 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     for index in (index for index in draft.controls.values() if index >= 0):
         low, high = own.actuator_ctrlrange[index] if own.actuator_ctrllimited[index] else _CONTROL
         data.ctrl[index] = rng.uniform(low, high)
-    start, told = data.qpos.copy(), data.ctrl.copy()
+    start, reported = data.qpos.copy(), data.ctrl.copy()
     theirs = np.empty((SAMPLES, own.nq))
     for row in theirs:
         row[:] = data.qpos
         mujoco.mj_step(own, data, STEPS_PER_SAMPLE)
-    ours = _ours(draft, {name: start[place] for name, place in coordinates.items()}, told)
+    ours = _ours(draft, {name: start[place] for name, place in coordinates.items()}, reported)
     differences = {}
     for name, place in coordinates.items():
         moved = np.ptp(theirs[:, place])
@@ -95,7 +95,7 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
 
 
 def _ours(
-    draft: RigDraft, start: dict[str, float], told: NDArray[np.float64]
+    draft: RigDraft, start: dict[str, float], reported: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
     """Return the coordinates of the rig along the run, shape (SAMPLES,) each."""
     rig = watched(draft)
@@ -104,7 +104,7 @@ def _ours(
         name for name, fields in draft.fields.items() if any(f.attribute == "frictionloss" for f in fields)
     }
     values = {name: 0.0 if name in dry else value for name, value in draft.values.items()}
-    held = {control: told[index] for control, index in draft.controls.items() if index >= 0}
+    held = {control: reported[index] for control, index in draft.controls.items() if index >= 0}
     inputs = {signal.name: np.full(SAMPLES, held.get(signal.name, 0.0)) for signal in rig.inputs}
     units = {signal.name: signal.unit for signal in rig.inputs}
     record = Record("free run", STEP * STEPS_PER_SAMPLE, inputs, units, hold="zoh")

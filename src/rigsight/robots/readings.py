@@ -30,8 +30,8 @@ def sensor_readings(model: mujoco.MjModel, controls: NDArray[np.float64], dt: fl
         )
     data = mujoco.MjData(model)
     readings = np.empty((len(controls), model.nsensordata))
-    for told, reading in zip(controls, readings, strict=True):
-        data.ctrl[:] = told
+    for reported, reading in zip(controls, readings, strict=True):
+        data.ctrl[:] = reported
         mujoco.mj_forward(model, data)
         reading[:] = data.sensordata
         mujoco.mj_step(model, data, round(steps))

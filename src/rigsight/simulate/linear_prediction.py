@@ -36,8 +36,8 @@ def _following(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     # Normal equations: ten times as fast as a singular value decomposition, and this runs for every window of every record.
     powers, directions = np.linalg.eigh(regressors.T @ regressors)
     directions, powers = directions[:, powers > _RANK * powers[-1]], powers[powers > _RANK * powers[-1]]
-    told = directions.T @ (regressors.T @ np.concatenate([rows[:, -1], rows[:, 0]]))
-    weights = directions @ (told / powers)
+    reported = directions.T @ (regressors.T @ np.concatenate([rows[:, -1], rows[:, 0]]))
+    weights = directions @ (reported / powers)
     # Limited, because noise may make the prediction unstable.
     lowest, highest = 2.0 * low - high - mean, 2.0 * high - low - mean
     latest = (known - mean)[: -order - 1 : -1].tolist()

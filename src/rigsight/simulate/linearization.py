@@ -264,13 +264,13 @@ def is_linear(structure: Structure, values: Mapping[str, float]) -> bool:
     numbers = map(sp.Float, parameter_vector(structure, values))
     known = dict(zip(structure.parameter_symbols, numbers, strict=True))
 
-    def told(expression: sp.Expr) -> sp.Expr:
+    def reported(expression: sp.Expr) -> sp.Expr:
         return tree.flattened(expression).xreplace(known)
 
     if any(state.limit is not None for state in tree.states):
         return False
     # The mass matrix of an arm is the shortest part that shows that it is not linear.
-    if any(told(mass).free_symbols & moving for mass in motion.mass):
+    if any(reported(mass).free_symbols & moving for mass in motion.mass):
         return False
     parts = [*motion.forces, *(state.rate for state in tree.states)]
     shown = [sp.Add(*output.terms) for output in tree.outputs]
@@ -279,7 +279,7 @@ def is_linear(structure: Structure, values: Mapping[str, float]) -> bool:
         own = part.free_symbols & moving
         return not own or (bool(part.is_polynomial(*own)) and sp.total_degree(part, *own) <= 1)
 
-    return all(TIME not in part.free_symbols and is_affine(part) for part in map(told, [*parts, *shown]))
+    return all(TIME not in part.free_symbols and is_affine(part) for part in map(reported, [*parts, *shown]))
 
 
 @lru_cache(maxsize=128)

@@ -116,9 +116,9 @@ class Bodies:
         return 3 if self.program.reads_forces else 2
 
     @cached_property
-    def answers(self) -> Answers:
+    def answers(self) -> Responses:
         """The program as a function of numbers."""
-        return Answers(self)
+        return Responses(self)
 
     @cached_property
     def program(self) -> Program:
@@ -138,7 +138,7 @@ class Bodies:
         return program
 
 
-class Answers:
+class Responses:
     """Evaluates bodies at many points, with a compiled library.
 
     Parameters

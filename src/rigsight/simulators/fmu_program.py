@@ -163,15 +163,15 @@ class FmuProgram:
         places = (ctypes.c_int * len(self._places))(*self._places)
         forces = (ctypes.c_uint * len(self._forces))(*self._forces)
         parameters = (ctypes.c_uint * max(1, len(self._parameters)))(*self._parameters)
-        told = _Told(
+        reported = _Told(
             *self._strings,
             *(ctypes.addressof(array) for array in (places, forces, parameters)),
             ctypes.addressof(self._failed),
         )
         library.connect.restype = None
-        library.connect(table, ctypes.byref(told))
+        library.connect(table, ctypes.byref(reported))
         # The library keeps the addresses.
-        self._kept.append((binary, table, places, forces, parameters, told))
+        self._kept.append((binary, table, places, forces, parameters, reported))
 
     def check(self) -> None:
         """See `Program.check`."""

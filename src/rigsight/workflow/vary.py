@@ -187,12 +187,12 @@ def _values(
     )
     first, last = (least if low is None else low), (most if high is None else high)
     if first >= last:
-        told = ", ".join(
+        reported = ", ".join(
             f"{option} {end:g}{' (the default)' if value is None else ''}"
             for option, value, end in (("--from", low, first), ("--to", high, last))
         )
         raise InputError(
-            f"The values of '{name}' do not increase: {told}. Give --from and --to, the smaller value first."
+            f"The values of '{name}' do not increase: {reported}. Give --from and --to, the smaller value first."
         )
     if low is None and high is None and first * last > 0.0:
         values = np.geomspace(abs(first), abs(last), steps) * math.copysign(1.0, first)

@@ -17,7 +17,7 @@ from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependen
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model
 from rigsight.diagnose.data_quality.finding import DataQuality, Finding
 from rigsight.diagnose.data_quality.sensor_faults import sensor_faults
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, liveliest
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import effect_named
@@ -69,7 +69,7 @@ def sweeps(
 
 def prepared(
     records: Sequence[Record], rig: Rig = AXIS, constants: dict[str, float] = CONSTANTS
-) -> tuple[FitContext, Scored]:
+) -> tuple[FitContext, FittedModel]:
     estimation = [record for record in records if record.role == "estimation"]
     start = {**constants, **linear_start(rig, estimation, constants, {})}
     context = FitContext(
@@ -84,7 +84,7 @@ def prepared(
     return context, reidentify(context, start)
 
 
-def looked_at(
+def examined(
     records: Sequence[Record], rig: Rig = AXIS, constants: dict[str, float] = CONSTANTS
 ) -> DataQuality:
     context, reidentified = prepared(records, rig, constants)
@@ -102,15 +102,15 @@ def with_first(records: list[Record], change: Callable[[NDArray[np.float64]], ND
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("hold", ["zoh", "foh", "band_limited"])
 def test_sound_records_are_left_in_peace(hold: Hold, seed: int):
-    quality = looked_at(sweeps(hold=hold, seed=seed))
+    quality = examined(sweeps(hold=hold, seed=seed))
     assert quality.findings == ()
-    assert quality.amplitudes[0].answer == "no"
+    assert quality.amplitudes[0].response == "no"
 
 
 def test_sound_records_of_the_running_gear_are_left_in_peace():
-    quality = looked_at(sweeps(RUNNING_GEAR, GEAR_VALUES), RUNNING_GEAR, GEAR_CONSTANTS)
+    quality = examined(sweeps(RUNNING_GEAR, GEAR_VALUES), RUNNING_GEAR, GEAR_CONSTANTS)
     assert quality.findings == ()
-    assert quality.amplitudes[0].answer == "no"
+    assert quality.amplitudes[0].response == "no"
 
 
 @pytest.mark.parametrize(
@@ -124,38 +124,38 @@ def test_sound_records_of_the_running_gear_are_left_in_peace():
     ids=lambda effect: effect[0],
 )
 def test_a_nonlinear_effect_is_no_fault_of_the_data(effect):
-    quality = looked_at(sweeps(effect=effect))
+    quality = examined(sweeps(effect=effect))
     assert quality.findings == ()
-    assert quality.amplitudes[0].answer == "yes"
+    assert quality.amplitudes[0].response == "yes"
     assert "a nonlinear effect is involved" in quality.notes[-1]
 
 
 def test_what_scatters_too_much_is_not_called_linear():
     """Play scatters the response from line to line by more than it changes with the amplitude."""
-    quality = looked_at(sweeps(effect=("backlash", {"g": 5e-4})))
+    quality = examined(sweeps(effect=("backlash", {"g": 5e-4})))
     assert quality.findings == ()
-    assert quality.amplitudes[0].answer == "cannot tell"
+    assert quality.amplitudes[0].response == "cannot tell"
 
 
 def test_a_flexible_mode_is_linear():
-    quality = looked_at(sweeps(effect=("flexible_mode", {"m_a": 0.3, "w_a": 35.0, "zeta_a": 0.03})))
+    quality = examined(sweeps(effect=("flexible_mode", {"m_a": 0.3, "w_a": 35.0, "zeta_a": 0.03})))
     assert quality.findings == ()
-    assert quality.amplitudes[0].answer == "no"
+    assert quality.amplitudes[0].response == "no"
 
 
 @pytest.mark.parametrize(("true", "given"), [("foh", "zoh"), ("band_limited", "zoh")])
 def test_a_wrong_hold_that_no_delay_explains_is_serious(true: Hold, given: Hold):
-    (finding,) = looked_at(misdeclared(sweeps(hold=true), given)).findings
+    (finding,) = examined(misdeclared(sweeps(hold=true), given)).findings
     assert (finding.kind, finding.serious) == ("hold", True)
     assert finding.explained == pytest.approx(1.0, abs=0.01)
-    assert f'"{true}"' in finding.mend
-    assert "campaign.toml" in finding.mend
+    assert f'"{true}"' in finding.remedy
+    assert "campaign.toml" in finding.remedy
 
 
 def test_a_hold_that_a_delay_explains_as_well_is_told_with_its_rival():
-    (finding,) = looked_at(misdeclared(sweeps(hold="zoh"), "foh")).findings
+    (finding,) = examined(misdeclared(sweeps(hold="zoh"), "foh")).findings
     assert (finding.kind, finding.serious) == ("hold", False)
-    assert 'hold = "zoh"' in finding.mend
+    assert 'hold = "zoh"' in finding.remedy
     assert "a time offset of 2.5" in finding.sentence
 
 
@@ -168,11 +168,11 @@ def test_a_shift_of_the_time_base_is_measured(sign: int, serious: bool):
     }
     inputs, outputs = cut[sign]
     records = [replace(r, signals={"u": r["u"][inputs], "x": r["x"][outputs]}) for r in sweeps()]
-    (finding,) = looked_at(records).findings
+    (finding,) = examined(records).findings
     assert (finding.kind, finding.serious) == ("time_shift", serious)
-    told = re.search(r"come (\S+) ms", finding.sentence)
-    assert told is not None
-    assert float(told.group(1)) == pytest.approx(1e3 * SHIFTED * DT, abs=0.05)
+    reported = re.search(r"come (\S+) ms", finding.sentence)
+    assert reported is not None
+    assert float(reported.group(1)) == pytest.approx(1e3 * SHIFTED * DT, abs=0.05)
     assert finding.explained == pytest.approx(1.0, abs=0.01)
 
 
@@ -184,7 +184,7 @@ def test_a_hold_hidden_by_an_effect_shows_with_the_effect_in_the_model():
     (finding,) = with_best_model(quality, context, model).findings
     assert finding.kind == "hold"
     assert finding.sentence.startswith("With cubic_stiffness in the model: ")
-    assert '"foh"' in finding.mend
+    assert '"foh"' in finding.remedy
     assert finding.explained == pytest.approx(1.0, abs=0.02)
 
 
@@ -198,7 +198,7 @@ def test_a_delay_of_half_a_sample_in_the_model_hides_no_wrong_hold():
     (finding,) = with_best_model(replace(quality, findings=()), context, model).findings
     assert finding.kind == "hold"
     assert finding.sentence.startswith("With cubic_stiffness in the model: ")
-    assert '"zoh"' in finding.mend
+    assert '"zoh"' in finding.remedy
     assert "a delay in the rig" in finding.sentence
     assert finding.serious
 
@@ -251,11 +251,11 @@ def with_lost_counts(x):
         (with_lost_counts, "jump", "at 10 s"),
     ],
 )
-def test_a_channel_at_fault_is_told_with_its_place(fault, kind, told):
+def test_a_channel_at_fault_is_told_with_its_place(fault, kind, reported):
     records = sweeps()
     found = sensor_faults(AXIS, with_first(records, fault))
     assert {finding.kind for finding in found} == {kind}
-    assert told in found[0].sentence
+    assert reported in found[0].sentence
     assert {(finding.record, finding.signal) for finding in found} == {("sweep_1", "x")}
     for record in records:
         assert sensor_faults(AXIS, record) == []
@@ -274,9 +274,9 @@ def test_the_force_of_an_element_that_is_moved_in_steps_is_not_coarse():
 def test_a_channel_at_fault_does_not_speak_of_amplitude():
     """Clipping makes the gain fall with amplitude as a nonlinear effect does."""
     records = sweeps()
-    quality = looked_at([with_first(records, clipped), *records[1:]])
+    quality = examined([with_first(records, clipped), *records[1:]])
     assert {finding.kind for finding in quality.findings} == {"clipping"}
-    assert quality.amplitudes[0].answer == "no"
+    assert quality.amplitudes[0].response == "no"
     assert "sweep_1" not in quality.amplitudes[0].records
 
 
@@ -319,26 +319,26 @@ def test_an_encoder_that_toggles_by_one_count_does_not_jump():
 def test_steps_of_several_heights_are_not_said_to_be_one_amplitude():
     record = replace(sweeps()[0], kind="step", amplitude=None)
     steps = [replace(record.with_signals(u=h * record["u"]), name=f"s{h}") for h in (1.0, 2.0, 3.0)]
-    (told,) = amplitude_dependences(AXIS, steps)
-    assert (told.answer, "3 heights" in told.sentence) == ("cannot tell", True)
+    (reported,) = amplitude_dependences(AXIS, steps)
+    assert (reported.response, "3 heights" in reported.sentence) == ("cannot tell", True)
 
 
 def test_one_amplitude_cannot_tell():
     record = sweeps()[0]
-    quality = looked_at([record, replace(record, name="again", role="validation")])
-    assert quality.amplitudes[0].answer == "cannot tell"
+    quality = examined([record, replace(record, name="again", role="validation")])
+    assert quality.amplitudes[0].response == "cannot tell"
     assert "Record another amplitude" in quality.amplitudes[0].sentence
 
 
 def test_the_list_of_the_file_says_the_same():
-    quality = looked_at(misdeclared(sweeps(), "zoh"))
+    quality = examined(misdeclared(sweeps(), "zoh"))
     content = json.loads(json.dumps(quality.to_json()))
     assert [entry["kind"] for entry in content] == ["hold", "amplitude_dependence"]
-    assert content[0]["mend"] == quality.findings[0].mend
+    assert content[0]["mend"] == quality.findings[0].remedy
     assert content[1]["answer"] == "no"
 
 
-def measured(folder: Path, hold: Hold | None = None) -> tuple[FitContext, Scored, DataQuality]:
+def measured(folder: Path, hold: Hold | None = None) -> tuple[FitContext, FittedModel, DataQuality]:
     campaign = read_campaign(folder)
     records = campaign.records if hold is None else misdeclared(campaign.records, hold)
     context, reidentified = prepared(records, campaign.rig, campaign.constants)
@@ -351,7 +351,7 @@ def test_measured_oscillator_shows_its_hold_once_the_cubic_spring_is_in(shared_d
     model = fit_candidate(context, (effect_named("cubic_stiffness"),), reidentified.fit)
     (finding,) = with_best_model(quality, context, model).findings
     assert (finding.kind, finding.serious) == ("hold", True)
-    assert '"band_limited"' in finding.mend
+    assert '"band_limited"' in finding.remedy
     assert finding.explained is not None
     assert finding.explained > 0.8
 
@@ -364,7 +364,7 @@ def test_measured_campaigns_as_they_are_declared_have_no_fault(shared_data: Path
 def test_an_element_has_no_frequency_response(shared_data: Path):
     _, _, quality = measured(shared_data / "mr_damper/campaign_on.toml")
     assert ELEMENT.is_driven is False
-    assert quality.amplitudes[0].answer == "cannot tell"
+    assert quality.amplitudes[0].response == "cannot tell"
 
 
 def test_a_reading_that_an_input_may_move_at_once_is_not_told_to_jump():

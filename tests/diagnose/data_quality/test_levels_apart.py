@@ -17,7 +17,7 @@ NUMBERS = {"m": 1.0, "k": 40.0, "c": 20.0, "d": 1.0}
 T = 0.01 * np.arange(500)
 
 
-def told(rig: Rig, records: Sequence[Record], given: Mapping[str, float] = NUMBERS) -> list[Finding]:
+def reported(rig: Rig, records: Sequence[Record], given: Mapping[str, float] = NUMBERS) -> list[Finding]:
     noise = {signal.name: 1e-4 for signal in rig.outputs}
     shown = tuple(records)
     return levels_apart(FitContext(rig, shown, shown, shown, {}, noise, frozenset(), given=given), shown)
@@ -31,25 +31,25 @@ def runs(zero: float, push: float = 0.0) -> list[Record]:
 
 
 def test_a_sensor_that_lies_elsewhere_in_another_record_is_named(two_masses: Rig) -> None:
-    (found,) = told(two_masses, runs(5.0))
+    (found,) = reported(two_masses, runs(5.0))
     assert (found.kind, found.signal) == ("offset", "second_place")
     assert "'first' and 'again'" in found.sentence
 
 
 def test_nothing_is_said_of_a_level_that_moves_less_than_the_rig(two_masses: Rig) -> None:
-    assert told(two_masses, runs(0.5)) == []
+    assert reported(two_masses, runs(0.5)) == []
 
 
 def test_what_another_push_or_payload_moves_is_no_offset(two_masses: Rig) -> None:
-    assert told(two_masses, runs(5.0, push=9.0)) == []
+    assert reported(two_masses, runs(5.0, push=9.0)) == []
     first, again = runs(5.0)
-    assert told(two_masses, [first, replace(again, constants={"m": 2.0})]) == []
+    assert reported(two_masses, [first, replace(again, constants={"m": 2.0})]) == []
 
 
 def test_a_rig_that_can_rest_anywhere_may_lie_anywhere(two_masses: Rig) -> None:
-    assert told(two_masses, runs(5.0), {**NUMBERS, "k": 0.0}) == []
+    assert reported(two_masses, runs(5.0), {**NUMBERS, "k": 0.0}) == []
 
 
 def test_runs_forward_and_backward_are_no_other_zero(two_masses: Rig) -> None:
-    assert told(two_masses, runs(3.0, push=1.8)) == []
-    assert len(told(two_masses, runs(3.0))) == 1
+    assert reported(two_masses, runs(3.0, push=1.8)) == []
+    assert len(reported(two_masses, runs(3.0))) == 1

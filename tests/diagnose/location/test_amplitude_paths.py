@@ -47,20 +47,20 @@ def runs(
     return records
 
 
-def answers(two_masses: Rig, records: list[Record]) -> dict[str, str]:
-    return {found.path: found.answer for found in amplitude_dependences(two_masses, records)}
+def responses(two_masses: Rig, records: list[Record]) -> dict[str, str]:
+    return {found.path: found.response for found in amplitude_dependences(two_masses, records)}
 
 
 BOTH = {"f_1": (1.0, 3.0), "f_2": (1.0, 3.0)}
 
 
 def test_a_linear_rig_has_linear_paths_where_its_motors_move_at_once(two_masses: Rig) -> None:
-    assert answers(two_masses, runs(two_masses, BOTH)) == dict.fromkeys(PATHS, "no")
+    assert responses(two_masses, runs(two_masses, BOTH)) == dict.fromkeys(PATHS, "no")
 
 
 def test_a_bent_spring_between_the_masses_bends_every_path(two_masses: Rig) -> None:
     spring = placed(effect_named("cubic_stiffness"), "between"), {"k_3": 4e4}
-    assert answers(two_masses, runs(two_masses, BOTH, spring)) == dict.fromkeys(PATHS, "yes")
+    assert responses(two_masses, runs(two_masses, BOTH, spring)) == dict.fromkeys(PATHS, "yes")
 
 
 def test_a_saturated_motor_bends_its_own_paths_alone(two_masses: Rig) -> None:
@@ -68,32 +68,35 @@ def test_a_saturated_motor_bends_its_own_paths_alone(two_masses: Rig) -> None:
     motor = placed(effect_named("input_saturation"), "motor_2"), {"u_max": 2.0}
     alone = runs(two_masses, {"f_2": (1.0, 3.0), "f_1": (0.0, 0.0)}, motor)
     moved = runs(two_masses, {"f_1": (1.0, 3.0), "f_2": (0.0, 0.0)}, motor)
-    found = answers(two_masses, [*alone, *moved])
-    assert {path for path, answer in found.items() if answer == "yes"} == {
+    found = responses(two_masses, [*alone, *moved])
+    assert {path for path, response in found.items() if response == "yes"} == {
         "f_2 -> first_place", "f_2 -> second_place",
     }  # fmt: skip
-    assert {path for path, answer in found.items() if answer == "no"} == {
+    assert {path for path, response in found.items() if response == "no"} == {
         "f_1 -> first_place", "f_1 -> second_place",
     }  # fmt: skip
 
 
 def test_a_path_without_another_amplitude_says_so_by_name(two_masses: Rig) -> None:
     records = runs(two_masses, {"f_1": (1.0, 3.0), "f_2": (1.0, 1.0)})
-    told = {found.path: found for found in amplitude_dependences(two_masses, records)}
-    assert {path for path, found in told.items() if found.answer == "cannot tell"} == {
+    reported = {found.path: found for found in amplitude_dependences(two_masses, records)}
+    assert {path for path, found in reported.items() if found.response == "cannot tell"} == {
         "f_2 -> first_place", "f_2 -> second_place",
     }  # fmt: skip
-    assert "one amplitude of f_2" in told["f_2 -> first_place"].sentence
-    content = json.loads(json.dumps(DataQuality((), tuple(told.values())).to_json()))
+    assert "one amplitude of f_2" in reported["f_2 -> first_place"].sentence
+    content = json.loads(json.dumps(DataQuality((), tuple(reported.values())).to_json()))
     assert {entry["path"] for entry in content} == PATHS
 
 
 def test_a_reading_at_fault_is_left_out_of_its_own_paths(two_masses: Rig) -> None:
     records = runs(two_masses, BOTH)
     found = amplitude_dependences(two_masses, records, {("large", "first_place")})
-    assert {own.path for own in found if own.answer == "no"} == {"f_1 -> second_place", "f_2 -> second_place"}
+    assert {own.path for own in found if own.response == "no"} == {
+        "f_1 -> second_place",
+        "f_2 -> second_place",
+    }
 
 
 def test_a_rig_without_an_input_has_no_response(two_masses: Rig) -> None:
     (found,) = amplitude_dependences(ELEMENT, [])
-    assert found.answer == "cannot tell"
+    assert found.response == "cannot tell"

@@ -37,8 +37,8 @@ def test_the_ends_of_a_sweep_weigh_as_much_as_its_middle() -> None:
 
 def test_the_bands_span_what_the_input_excites_and_the_rig_answers() -> None:
     source = linear_sweep(T, 1.0, 3.0, 50.0)
-    answer = source + 1e-3 * np.random.default_rng(2).standard_normal(T.size)
-    edges = band_edges([(source, answer, DT)], 1e-3)
+    response = source + 1e-3 * np.random.default_rng(2).standard_normal(T.size)
+    edges = band_edges([(source, response, DT)], 1e-3)
     assert edges[0] == 0.0
     assert edges[-1] == pytest.approx(np.pi / DT)
     assert 2.0 < edges[1] < 8.0
@@ -48,8 +48,8 @@ def test_the_bands_span_what_the_input_excites_and_the_rig_answers() -> None:
 
 def test_the_bands_of_a_step_reach_to_where_the_rig_rings() -> None:
     step = np.where(T > 10.0, 1.0, 0.0)
-    answer = step * (1.0 - np.exp(-1.2 * (T - 10.0)) * np.cos(12.0 * (T - 10.0)))
-    edges = band_edges([(step, answer, DT)], 1e-3)
+    response = step * (1.0 - np.exp(-1.2 * (T - 10.0)) * np.cos(12.0 * (T - 10.0)))
+    edges = band_edges([(step, response, DT)], 1e-3)
     assert 12.0 < edges[-2] < 40.0
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location import joint_planes
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.joint_planes import joint_parts
@@ -21,7 +21,7 @@ from rigsight.records.record import Record
 FRICTION = 0.01
 
 
-def told(train: Any, records: tuple[Record, ...]) -> tuple[FitContext, Scored, list[Trace]]:
+def reported(train: Any, records: tuple[Record, ...]) -> tuple[FitContext, FittedModel, list[Trace]]:
     """The true numbers without the friction on the record that judges."""
     fitted, scored = records[:2], records[2:]
     context = FitContext(
@@ -45,7 +45,7 @@ def told(train: Any, records: tuple[Record, ...]) -> tuple[FitContext, Scored, l
 @pytest.fixture(scope="module")
 def hidden(train: Any) -> tuple[tuple[StatePart, ...], list[Trace]]:
     records = train.records([placed(effect_named("coulomb_friction"), "load_bearing")], {"T_c": FRICTION})
-    context, reidentified, traces = told(train, records)
+    context, reidentified, traces = reported(train, records)
     return joint_parts(context, reidentified, traces), traces
 
 
@@ -76,7 +76,7 @@ def test_of_long_records_the_stretch_with_the_largest_gap_is_mapped(
     train: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(joint_planes, "MAPS", replace(MAPS, mapped_samples=300))
-    context, reidentified, (trace,) = told(train, train.records())
+    context, reidentified, (trace,) = reported(train, train.records())
     late = {name: np.where(trace.t > 4.0, samples + 1.0, samples) for name, samples in trace.before.items()}
     parts = joint_parts(context, reidentified, [replace(trace, before=late, reidentified=late)])
     own = [part for part in parts if (part.joint, part.output) == ("shaft", "load_angle")]
@@ -85,12 +85,12 @@ def test_of_long_records_the_stretch_with_the_largest_gap_is_mapped(
 
 
 def test_without_a_gap_no_force_is_lacking(train: Any) -> None:
-    parts = joint_parts(*told(train, train.records()))
+    parts = joint_parts(*reported(train, train.records()))
     assert {part.joint for part in parts} == {"shaft", "motor_bearing", "load_bearing"}
     assert all(np.isnan(part.force_mean) for part in parts)
 
 
 def test_beside_a_modelled_effect_there_is_none(train: Any) -> None:
-    context, reidentified, traces = told(train, train.records())
+    context, reidentified, traces = reported(train, train.records())
     modelled = replace(context, modelled=(placed(effect_named("coulomb_friction"), "shaft"),))
     assert joint_parts(modelled, reidentified, traces) == ()

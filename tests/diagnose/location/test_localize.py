@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.trace import STAGES, Trace
@@ -63,13 +63,13 @@ def workbench(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) 
     )
 
 
-def as_given(context: FitContext, values: Mapping[str, float]) -> Scored:
+def as_given(context: FitContext, values: Mapping[str, float]) -> FittedModel:
     """The simulation with these very numbers; only initial states are estimated."""
     fit = GreyBoxFit(context.composed(), context.estimation, context.scales, context.noise).fit(values, [])
     return context.score((), fit)
 
 
-def traces(context: FitContext, *stages: Scored) -> tuple[Trace, ...]:
+def traces(context: FitContext, *stages: FittedModel) -> tuple[Trace, ...]:
     names = [signal.name for signal in context.rig.outputs]
     found = []
     for i, record in enumerate(context.scoring):
@@ -94,7 +94,7 @@ def traces(context: FitContext, *stages: Scored) -> tuple[Trace, ...]:
 
 
 def localized(
-    context: FitContext, before: Scored, reidentified: Scored, after: Scored
+    context: FitContext, before: FittedModel, reidentified: FittedModel, after: FittedModel
 ) -> tuple[Localization, tuple[Trace, ...]]:
     shown = traces(context, before, reidentified, after)
     where = localize(context, shown, "validation", before, reidentified, after, np.random.default_rng(0))

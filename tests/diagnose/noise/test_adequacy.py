@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.adequacy import Adequacy, Agreement, adequacy
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.single_effects import reidentify
@@ -55,13 +55,13 @@ def axis_bench(
     return FitContext(AXIS, fitted, scoring, fitted, scales, {"x": NOISE}, frozenset({"force_off"}), VALUES)
 
 
-def fitted(context: FitContext, effects: tuple[Effect, ...], values: dict[str, float]) -> Scored:
+def fitted(context: FitContext, effects: tuple[Effect, ...], values: dict[str, float]) -> FittedModel:
     structure = context.composed(effects)
     fit = context.problem(structure, context.estimation)
     return context.score(effects, fit.fit({**VALUES, **values}, context.free_parameters(structure)))
 
 
-def asked(context: FitContext, model: Scored) -> Adequacy:
+def asked(context: FitContext, model: FittedModel) -> Adequacy:
     return adequacy(context, model, np.random.default_rng(1))
 
 

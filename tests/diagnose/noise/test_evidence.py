@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbance
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
@@ -43,7 +43,7 @@ def bench_of(own: Mapping[str, float], force: float, seed: int = 2) -> FitContex
     return FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset(), VALUES)
 
 
-def modelled(context: FitContext) -> tuple[Scored, Scored, Scored, Scored]:
+def modelled(context: FitContext) -> tuple[FittedModel, FittedModel, FittedModel, FittedModel]:
     """The equations, a spring that hardens, a tone beside it and friction beside it."""
     reidentified = reidentify(context, VALUES)
     single = fit_candidate(context, (CUBIC,), reidentified.fit)

@@ -103,13 +103,13 @@ def test_repeated_records_of_a_rig_with_two_inputs() -> None:
     rng = np.random.default_rng(12)
     chirp = linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)
     rig = next(rig for rig in RIGS.values() if len(rig.inputs) == 2)
-    answer = rng.standard_normal(chirp.size)
+    response = rng.standard_normal(chirp.size)
     records = [
         Record(
             name=f"r{i}",
             dt=DT,
             signals={source.name: chirp for source in rig.inputs}
-            | {sensor.name: answer + SIGMA * rng.standard_normal(chirp.size) for sensor in rig.outputs},
+            | {sensor.name: response + SIGMA * rng.standard_normal(chirp.size) for sensor in rig.outputs},
             units={},
         )
         for i in range(2)

@@ -43,11 +43,11 @@ def shown(size: float = 1.0, **inputs: np.ndarray) -> np.ndarray:
 
 def test_pushes_add_to_what_a_drive_is_told_and_to_what_a_sensor_shows() -> None:
     wave = np.sin(7.0 * T)
-    told = shown(u=wave)
-    np.testing.assert_allclose(shown(2.0, **{push("motor"): 0.5 * wave})[:, :2], told[:, :2], atol=1e-9)
+    reported = shown(u=wave)
+    np.testing.assert_allclose(shown(2.0, **{push("motor"): 0.5 * wave})[:, :2], reported[:, :2], atol=1e-9)
     biased = shown(0.5, u=wave, **{push("load_angle"): 2.0 * wave})
-    np.testing.assert_allclose(biased[:, 1] - told[:, 1], wave, atol=1e-9)
-    np.testing.assert_allclose(biased[:, 0], told[:, 0], atol=1e-12)
+    np.testing.assert_allclose(biased[:, 1] - reported[:, 1], wave, atol=1e-9)
+    np.testing.assert_allclose(biased[:, 0], reported[:, 0], atol=1e-12)
 
 
 def test_a_push_at_a_joint_acts_along_its_motion() -> None:

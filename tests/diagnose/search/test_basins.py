@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search import basins
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.effects import Effect, effect_named
@@ -44,7 +44,9 @@ def bench() -> FitContext:
     return FitContext(AXIS, runs, runs, runs, scales, {"x": NOISE}, frozenset(), TRUE)
 
 
-def fitted(bench: FitContext, effect: Effect, start: Mapping[str, float], evaluations: int = 60) -> Scored:
+def fitted(
+    bench: FitContext, effect: Effect, start: Mapping[str, float], evaluations: int = 60
+) -> FittedModel:
     structure = bench.composed((effect,))
     problem = bench.problem(structure, bench.estimation)
     fit = problem.fit(start, bench.free_parameters(structure), max_evaluations=evaluations)
@@ -83,7 +85,7 @@ def test_a_rival_beside_wrong_numbers_of_the_rig_gets_those_of_the_best(bench: F
 
 @pytest.mark.slow
 def test_a_rival_of_several_effects_gets_the_effect_that_both_have(bench: FitContext) -> None:
-    def both(other: str, own: Mapping[str, float], evaluations: int) -> Scored:
+    def both(other: str, own: Mapping[str, float], evaluations: int) -> FittedModel:
         effects = (STRIBECK, effect_named(other))
         structure = bench.composed(effects)
         problem = bench.problem(structure, bench.estimation)
@@ -107,7 +109,7 @@ def test_the_best_one_starts_from_the_numbers_of_the_next_too(
     next_one = fitted(bench, effect_named("coulomb_friction"), {**TRUE, "T_c": 2e-3})
     asked: dict[tuple[str, ...], list[Mapping[str, float]]] = {}
 
-    def noted(_: FitContext, own: Scored, starts: list[Mapping[str, float]]) -> Scored:
+    def noted(_: FitContext, own: FittedModel, starts: list[Mapping[str, float]]) -> FittedModel:
         asked[own.names] = starts
         return own
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.search.nested_models import (
     at_least_as_good,
@@ -45,7 +45,7 @@ def bench_with(*effects: Effect, modelled: tuple[Effect, ...] = ()) -> FitContex
 
 
 @pytest.fixture(scope="module")
-def linear() -> tuple[FitContext, Scored]:
+def linear() -> tuple[FitContext, FittedModel]:
     bench = bench_with()
     return bench, reidentify(bench, bench.start)
 
@@ -55,7 +55,7 @@ def dry() -> FitContext:
     return bench_with(COULOMB)
 
 
-def stuck(bench: FitContext, effect: Effect, base: Scored) -> Scored:
+def stuck(bench: FitContext, effect: Effect, base: FittedModel) -> FittedModel:
     """Return a candidate far from any minimum: the strongest of its declared starts, on a rig that is too heavy."""
     structure = bench.simplest((effect,))
     *_, start = start_values(bench, structure, effect, base.fit, {})
@@ -77,7 +77,7 @@ ON_AXIS = [
 
 @pytest.mark.parametrize("effect", ON_AXIS, ids=lambda effect: effect.name)
 def test_no_effect_ends_above_the_equations_without_it(
-    linear: tuple[FitContext, Scored], effect: Effect
+    linear: tuple[FitContext, FittedModel], effect: Effect
 ) -> None:
     bench, base = linear
     model = at_least_as_good(bench, stuck(bench, effect, base), base)
@@ -121,7 +121,7 @@ def test_parameters_given_at_a_bound_start_inside(dry: FitContext) -> None:
     assert off_bounds(structure, TRUE, free, dry.scales) is None
 
 
-def test_a_size_of_zero_is_no_cause(linear: tuple[FitContext, Scored], dry: FitContext) -> None:
+def test_a_size_of_zero_is_no_cause(linear: tuple[FitContext, FittedModel], dry: FitContext) -> None:
     bench, base = linear
     absent = at_least_as_good(bench, stuck(bench, effect_named("cubic_stiffness"), base), base)
     assert has_size_of_zero(absent, [base])
@@ -135,7 +135,7 @@ def test_a_size_of_zero_is_no_cause(linear: tuple[FitContext, Scored], dry: FitC
     assert has_size_of_zero(with_others, [replace(without, fit=replace(without.fit, cost=present.fit.cost))])
 
 
-def test_sizes_of_one_effect_count_together(linear: tuple[FitContext, Scored]) -> None:
+def test_sizes_of_one_effect_count_together(linear: tuple[FitContext, FittedModel]) -> None:
     """Sine and cosine of a ripple share its amplitude: each may be near zero while the amplitude is not."""
     bench, base = linear
     model = stuck(bench, effect_named("torque_ripple"), base)
@@ -145,7 +145,7 @@ def test_sizes_of_one_effect_count_together(linear: tuple[FitContext, Scored]) -
     covariance[np.ix_(at, at)] = np.array([[1.0, -0.98], [-0.98, 1.0]])
     errors = {**model.fit.standard_errors, **dict.fromkeys(names, 1.0)}
 
-    def with_sizes(sine: float, cosine: float) -> Scored:
+    def with_sizes(sine: float, cosine: float) -> FittedModel:
         values = {**model.fit.values, "T_sin": sine, "T_cos": cosine}
         return replace(
             model, fit=replace(model.fit, values=values, covariance=covariance, standard_errors=errors)

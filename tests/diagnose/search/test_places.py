@@ -50,10 +50,10 @@ def test_effect_and_place_are_named(train: Any) -> None:
     records = train.records([placed(effect_named("quadratic_damping"), "load_bearing")], {"c_2": 2e-4})
     found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, records), EFFECTS[:2])
     assert (found.verdict, found.effects) == ("effect", ("quadratic_damping@load_bearing",))
-    told = found.to_json()
-    assert (told["effects"], told["where"]) == (["quadratic_damping"], ["load_bearing"])
-    assert set(told["gap"]) == {"motor_angle", "load_angle"}
-    assert told["gap_by_place"][0]["place"] == "load_bearing"
+    reported = found.to_json()
+    assert (reported["effects"], reported["where"]) == (["quadratic_damping"], ["load_bearing"])
+    assert set(reported["gap"]) == {"motor_angle", "load_angle"}
+    assert reported["gap_by_place"][0]["place"] == "load_bearing"
     c_2 = next(c for c in found.candidates if c.effects == found.effects).parameters["c_2"]
     assert abs(c_2.value - 2e-4) < 5.0 * c_2.std
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.effects import effect_named, placed
 from rigsight.excitation import linear_sweep
@@ -18,7 +18,7 @@ DT, NOISE = 0.01, 1e-5
 VALUES = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
 
 
-def model_of(effects: dict[str, dict[str, float]]) -> tuple[FitContext, Scored]:
+def model_of(effects: dict[str, dict[str, float]]) -> tuple[FitContext, FittedModel]:
     structure = compose(AXIS, [effect_named(name) for name in effects])
     values = {**VALUES, **{name: value for own in effects.values() for name, value in own.items()}}
     t = DT * np.arange(4000)
@@ -28,7 +28,7 @@ def model_of(effects: dict[str, dict[str, float]]) -> tuple[FitContext, Scored]:
     noise = {"x": NOISE}
     context = FitContext(AXIS, (record,), (record,), (record,), scales, noise, frozenset())
     fit = GreyBoxFit(structure, [record], scales, noise).fit(values, [])
-    return context, Scored(structure.effects, fit, fit, fit.weighted_rms)
+    return context, FittedModel(structure.effects, fit, fit, fit.weighted_rms)
 
 
 def growth(effects: dict[str, dict[str, float]]) -> float:
@@ -63,7 +63,7 @@ def test_each_input_is_disturbed_and_each_sensor_looked_at(two_masses: Rig) -> N
         scales = characteristic_scales(two_masses, [record], values)
         context = FitContext(two_masses, (record,), (record,), (record,), scales, noise, frozenset())
         fit = GreyBoxFit(structure, [record], scales, noise).fit(values | own, [])
-        models.append(Scored(structure.effects, fit, fit, fit.weighted_rms))
+        models.append(FittedModel(structure.effects, fit, fit, fit.weighted_rms))
     reidentified, with_play = models
     rng = np.random.default_rng(0)
     assert growth_of_disturbances(context, reidentified, reidentified, rng) == pytest.approx(1.0, rel=1e-6)

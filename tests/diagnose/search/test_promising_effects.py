@@ -11,7 +11,7 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose import Diagnosis, diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, liveliest
 from rigsight.diagnose.search.places import Search, search_places
-from rigsight.diagnose.search.screening import Lineup
+from rigsight.diagnose.search.screening import Shortlist
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
@@ -55,7 +55,7 @@ def diagnosed(effects: Sequence[str], values: Mapping[str, float], tried: Sequen
     return diagnose(campaign, [effect_named(name) for name in tried])
 
 
-def looked_at(name: str, values: Mapping[str, float]) -> tuple[Search, list[Effect]]:
+def examined(name: str, values: Mapping[str, float]) -> tuple[Search, list[Effect]]:
     fitted = tuple(record for record in records([name], values) if record.role == "estimation")
     scales = characteristic_scales(AXIS, fitted, VALUES)
     context = FitContext(AXIS, fitted, fitted, fitted, scales, {"x": NOISE}, frozenset(), VALUES)
@@ -67,7 +67,7 @@ def looked_at(name: str, values: Mapping[str, float]) -> tuple[Search, list[Effe
 def test_the_true_one_is_looked_at_first_and_its_push_tells_its_size(
     name: str, values: Mapping[str, float]
 ) -> None:
-    search, offered = looked_at(name, values)
+    search, offered = examined(name, values)
     first = {effect.name for effect in search.effects}
     assert name in first
     assert search.others
@@ -88,7 +88,7 @@ def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:
         AXIS, fitted, fitted, liveliest(fitted, AXIS, 600), scales, {"x": NOISE}, frozenset(), VALUES
     )
     at_the_drive = [effect_named(name) for name in ("input_delay", "actuator_lag", "input_dead_zone")]
-    lineup = Lineup(context, reidentify(context, VALUES), liveliest=True)
+    lineup = Shortlist(context, reidentify(context, VALUES), liveliest=True)
     assert all(suspect.share < 0.1 for suspect in lineup.suspects(at_the_drive))
 
 

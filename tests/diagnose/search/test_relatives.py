@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.diagnose.verdict.ranking import noise_vector, rank
 from rigsight.effects import effect_named
@@ -95,7 +95,7 @@ def bench_of(case: Case, records: tuple[Record, ...]) -> FitContext:
     return FitContext(rig, fitted, scored, fitted, scales, noise, held, values, values)
 
 
-def ranked(case: Case, names: tuple[str, ...]) -> tuple[Scored, ...]:
+def ranked(case: Case, names: tuple[str, ...]) -> tuple[FittedModel, ...]:
     """Return each effect alone, fitted and scored, the likeliest first."""
     context = bench_of(case, measured(case))
     models = fit_candidates(

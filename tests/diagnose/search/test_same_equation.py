@@ -7,14 +7,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.rigs import AXIS
 
 NOTHING_KNOWN = SimpleNamespace(constant_forces_beside=lambda _: {})
 
 
-def shifted(model: Scored, time: float) -> Scored:
+def shifted(model: FittedModel, time: float) -> FittedModel:
     """Return a model with a time shift, shifted by so much."""
     fit = replace(model.fit, values={**dict.fromkeys(model.fit.structure.names, 1.0), "T_x": time})
     return replace(model, fit=fit)

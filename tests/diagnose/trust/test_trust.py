@@ -12,7 +12,7 @@ from scipy.stats import kstest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.observer import Observer
 from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.homogeneity import adjusted, course, spread
@@ -64,7 +64,7 @@ def context_of(
     return FitContext(rig, records, records, records, scales, noise, held, known)
 
 
-def fitted(context: FitContext, effects: tuple[Effect, ...], start: Mapping[str, float]) -> Scored:
+def fitted(context: FitContext, effects: tuple[Effect, ...], start: Mapping[str, float]) -> FittedModel:
     structure = context.composed(effects)
     fit = context.problem(structure, context.estimation).fit(
         {**context.start, **start}, context.free_parameters(structure)
@@ -118,9 +118,9 @@ def test_mass_stiffness_and_damping_that_grow_together_point_to_the_drive() -> N
     effects = (effect_named("input_saturation"),)
     found = asked(axis_records((1.0, 4.0, 0.5, 2.0), effects, {"u_max": 9.0}))
     for name in ("m", "k", "d"):
-        told = number(found, name).points_to
-        assert told is not None
-        assert "saturation" in told.cause
+        reported = number(found, name).points_to
+        assert reported is not None
+        assert "saturation" in reported.cause
 
 
 def test_amplitude_and_time_that_go_together_are_told_apart_by_nobody() -> None:
@@ -294,9 +294,9 @@ def test_a_diagnosis_carries_it() -> None:
     given = {"m": 1.0, "d": 2.5, "k": 95.0, "x_off": 0.0, "force_off": 0.0}
     found = diagnose(Campaign("axis", AXIS, {"gain": 1.0}, given, named), list(effects))
     assert found.effects == ("coulomb_friction",)
-    told = found.to_json()["trust"]
-    assert told["stable"]
-    friction = next(one for one in told["parameters"] if one["name"] == "T_c")
+    reported = found.to_json()["trust"]
+    assert reported["stable"]
+    friction = next(one for one in reported["parameters"] if one["name"] == "T_c")
     assert friction["of_effect"]
     assert [one["group"] for one in friction["by_group"]["record"]] == ["r0", "r1", "r2"]
     assert friction["points_to"] is None

@@ -159,8 +159,8 @@ def test_sizes_of_forces_and_noise_are_found_again() -> None:
     def shown(force: np.ndarray) -> np.ndarray:
         # A mass that a spring holds, by its impulse response: no simulation.
         t = dt * np.arange(500)
-        answer = np.exp(-0.5 * t) * np.sin(10.0 * t) / 10.0 * dt
-        return np.stack([np.convolve(own, answer)[: own.size] for own in force.T], axis=1)
+        response = np.exp(-0.5 * t) * np.sin(10.0 * t) / 10.0 * dt
+        return np.stack([np.convolve(own, response)[: own.size] for own in force.T], axis=1)
 
     true = Sources(np.array([0.002]), np.array([[0.0, 1.0]]), corners)
     force = true.forces(20_000, dt, 1, rng)[:, 0]

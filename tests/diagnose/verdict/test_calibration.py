@@ -26,9 +26,9 @@ def stated(situation: Situation) -> float:
 
 def test_probabilities_and_what_is_left_for_all_else_add_up_to_one() -> None:
     calibration = trained()
-    told = calibration.probabilities(CLEAR, [0.7, 0.2, 0.1])
-    assert sum(told) == pytest.approx(calibration.probability_listed(CLEAR))
-    assert told[1] == pytest.approx(2.0 * told[2])
+    reported = calibration.probabilities(CLEAR, [0.7, 0.2, 0.1])
+    assert sum(reported) == pytest.approx(calibration.probability_listed(CLEAR))
+    assert reported[1] == pytest.approx(2.0 * reported[2])
     assert calibration.without_effect(CLEAR) == 0.0
 
 

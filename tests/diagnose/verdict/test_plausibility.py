@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 
 PLACES = {"coulomb_friction": "dynamics", "stribeck_friction": "dynamics", "actuator_lag": "actuator"}
 
 
-def with_numbers(model: Scored, values: dict[str, float], errors: dict[str, float]) -> Scored:
+def with_numbers(model: FittedModel, values: dict[str, float], errors: dict[str, float]) -> FittedModel:
     fit = replace(model.fit, values=values, standard_errors=errors, free=tuple(values), success=True)
     return replace(model, fit=fit)
 
@@ -38,7 +38,7 @@ def models(scored):
     return reidentified, coulomb, stribeck
 
 
-def ranked(*models: Scored) -> Ranking:
+def ranked(*models: FittedModel) -> Ranking:
     shares = tuple(np.arange(len(models), 0, -1) / sum(range(len(models) + 1)))
     return Ranking(
         models,

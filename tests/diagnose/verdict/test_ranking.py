@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking, noise_vector, rank
 
 N = 4000
 
 
-def ranked(*models: Scored, seed: int = 0, gap: float = 1.0) -> Ranking:
+def ranked(*models: FittedModel, seed: int = 0, gap: float = 1.0) -> Ranking:
     return rank(models, np.ones(1), np.random.default_rng(seed), gap)
 
 
@@ -176,10 +176,10 @@ def test_evidence_decides_between_models_whose_errors_tell_little(scored, white)
     plain = scored(("coulomb_friction",), 9.0 * white, n_free=4)
     true = scored(("load_dependent_friction",), 8.9 * white, n_free=5)
     far = scored(("end_stop",), 20.0 * white, n_free=5)
-    told = {plain.names: 900.0, true.names: 0.0}
+    reported = {plain.names: 900.0, true.names: 0.0}
     models, rng = [plain, true, far], np.random.default_rng(0)
     assert rank(models, np.ones(1), rng).order[0] is plain
-    ranking = rank(models, np.ones(1), rng, criterion=lambda model: told[model.names])
+    ranking = rank(models, np.ones(1), rng, criterion=lambda model: reported[model.names])
     assert ranking.order[0] is true
     assert ranking.tied == ()
     assert rank(models, np.ones(1), rng, criterion=lambda _: 0.0).tied == (true,)

@@ -11,7 +11,7 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, liveliest
 from rigsight.diagnose.verdict.main_cause import force_of_one_motion, traced_to
 from rigsight.discover import JointForce, JointLaw
 from rigsight.effects import effect_named, placed
@@ -38,9 +38,9 @@ def test_a_missing_force_is_traced_to_its_joint(train: Any) -> None:
     records = replace(train, n_samples=240).records(HIDDEN, {"c_2": 1e-3})
     found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, records), [effect_named("sensor_lag")])
     assert (found.verdict, found.where) == ("unknown", ("load_bearing",))
-    told = json.loads(json.dumps(found.to_json(), allow_nan=False))
-    assert told["missing_force"] is None
-    first, *others = told["missing_force_by_joint"]
+    reported = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert reported["missing_force"] is None
+    first, *others = reported["missing_force_by_joint"]
     assert {one["where"] for one in others} == {"shaft", "motor_bearing"}
     assert first["error_in_noise_floors"] < 1.2
     (term,) = first["terms"]
@@ -63,7 +63,7 @@ def test_sensor_zeros_of_single_records_do_not_bend_the_missing_force() -> None:
     fit = GreyBoxFit(compose(AXIS), records, scales, noise).fit(values, ["m", "d", "k"])
     several = tuple(records)
     context = FitContext(AXIS, several, several, several, scales, noise, frozenset())
-    found = force_of_one_motion(context, Scored((), fit, fit, 100.0), True, np.random.default_rng(0))
+    found = force_of_one_motion(context, FittedModel((), fit, fit, 100.0), True, np.random.default_rng(0))
     assert found is not None
     assert [term.term for term in found.terms] == ["x^3"]
     assert found.terms[0].coefficient == pytest.approx(4e6, rel=0.1)

@@ -62,22 +62,22 @@ def test_an_open_factor_is_told() -> None:
 
 
 def test_a_noise_floor_that_a_model_undercuts_is_told() -> None:
-    told = notes.moving_at_rest_note(basis(below_rest=0.31))
-    assert told is not None
-    assert "error is 0.31 of the noise floor measured at rest" in told
+    reported = notes.moving_at_rest_note(basis(below_rest=0.31))
+    assert reported is not None
+    assert "error is 0.31 of the noise floor measured at rest" in reported
 
 
 def test_observers_are_told_with_the_time_over_which_errors_build_up() -> None:
-    told = notes.observer_note(basis(windowing=SimpleNamespace(bandwidth=4.0, cycles=None)))
-    assert told is not None
-    assert "up to 4 rad/s" in told
-    assert "within 0.25 s" in told
+    reported = notes.observer_note(basis(windowing=SimpleNamespace(bandwidth=4.0, cycles=None)))
+    assert reported is not None
+    assert "up to 4 rad/s" in reported
+    assert "within 0.25 s" in reported
 
 
 def test_windows_are_told_with_their_cycles() -> None:
-    told = notes.windows_note(basis(windowing=Windowing.by_cycles({})))
-    assert told is not None
-    assert f"in windows of {VERDICT.window_cycles} cycles" in told
+    reported = notes.windows_note(basis(windowing=Windowing.by_cycles({})))
+    assert reported is not None
+    assert f"in windows of {VERDICT.window_cycles} cycles" in reported
 
 
 def test_a_sensitive_motion_is_told_where_the_cause_is_unknown_and_records_are_whole(
@@ -86,18 +86,18 @@ def test_a_sensitive_motion_is_told_where_the_cause_is_unknown_and_records_are_w
     growth.value = VERDICT.sensitive
     assert notes.sensitive_motion_note(basis("unknown")) is None
     growth.value = 40.0
-    told = notes.sensitive_motion_note(basis("unknown"))
-    assert told is not None
-    assert "changes it by 40 times the noise" in told
+    reported = notes.sensitive_motion_note(basis("unknown"))
+    assert reported is not None
+    assert "changes it by 40 times the noise" in reported
     assert notes.sensitive_motion_note(basis("effect")) is None
     assert notes.sensitive_motion_note(basis("unknown", windowing=Windowing.by_cycles({}))) is None
 
 
 def test_of_pairs_that_imitate_the_nearest_is_told_where_the_cause_is_unknown() -> None:
     pairs = [SimpleNamespace(names=("a", name), error_over_noise=e) for name, e in (("b", 1.5), ("c", 1.25))]
-    told = notes.imitations_note(basis("unknown", imitations=pairs))
-    assert told is not None
-    assert told.startswith("Together a and c leave 1.25 times the noise floor")
+    reported = notes.imitations_note(basis("unknown", imitations=pairs))
+    assert reported is not None
+    assert reported.startswith("Together a and c leave 1.25 times the noise floor")
     assert notes.imitations_note(basis("effect", imitations=pairs)) is None
 
 
@@ -112,9 +112,9 @@ def test_all_are_read_in_order_and_none_holds_a_brace(growth: SimpleNamespace) -
             "unknown", below_rest=0.3, factor=factor, imitations=(pair,),
             windowing=SimpleNamespace(bandwidth=4.0, cycles=cycles),
         )  # fmt: skip
-        told = notes.verdict_notes(full)
-        assert not [note for note in told if "{" in note or "}" in note]
-        begun.append([" ".join(note.split()[:3]) for note in told])
+        reported = notes.verdict_notes(full)
+        assert not [note for note in reported if "{" in note or "}" in note]
+        begun.append([" ".join(note.split()[:3]) for note in reported])
     before = ["of the campaign", "of a record", "It is open.", "A model's error", "The rig has"]
     after = ["of the quality", "the reason", "a doubt", "Together a and"]
     assert begun == [[*before, "The motion of", *after], [*before, "In free run", *after]]
@@ -130,7 +130,7 @@ def test_every_rule_is_called() -> None:
     ("delay", "uncertainty", "told"), [(1e-3, 2e-3, True), (3e-3, 2e-3, False), (1e-3, 0.0, False)]
 )
 def test_a_delay_shorter_than_the_clocks_can_tell_is_said(
-    effect: str, delay: float, uncertainty: float, told: bool
+    effect: str, delay: float, uncertainty: float, reported: bool
 ) -> None:
     late = effect_named(effect)
     structure = compose(AXIS, (late,))
@@ -140,5 +140,5 @@ def test_a_delay_shorter_than_the_clocks_can_tell_is_said(
     record = replace(found.campaign.records[0], clock_uncertainty=uncertainty)
     found = replace(found, campaign=SimpleNamespace(records=(record,)))
     note = notes.clocks_note(found)
-    assert (note is not None) == told
+    assert (note is not None) == reported
     assert note is None or f"{effect} of 0.001 s" in note

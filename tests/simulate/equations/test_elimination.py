@@ -204,6 +204,6 @@ def test_an_inertia_that_is_no_formula_is_told(monkeypatch: pytest.MonkeyPatch) 
         compose(rig, [placed(reading, "elbow")])
     assert not rig.offers(placed(reading, "elbow"))
     joints = tuple(replace(joint, inertia=sp.Symbol("I_2", real=True)) for joint in rig.mechanism.joints)
-    told = replace(rig, mechanism=replace(rig.mechanism, joints=joints))
-    assert told.offers(placed(reading, "elbow"))
-    assert compose(told, [placed(reading, "elbow")]).elimination is not None
+    reported = replace(rig, mechanism=replace(rig.mechanism, joints=joints))
+    assert reported.offers(placed(reading, "elbow"))
+    assert compose(reported, [placed(reading, "elbow")]).elimination is not None

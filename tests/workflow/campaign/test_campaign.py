@@ -261,7 +261,7 @@ BROKEN: list[tuple[str, str, str, list[str]]] = [
     ("old", "new", "told"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN]
 )
 def test_broken_campaigns_are_told_with_key_and_mend(
-    campaign: Callable[..., Path], old: str, new: str, told: list[str], request: pytest.FixtureRequest
+    campaign: Callable[..., Path], old: str, new: str, reported: list[str], request: pytest.FixtureRequest
 ) -> None:
     text = HEAD + RECORDS
     assert old in text
@@ -272,7 +272,7 @@ def test_broken_campaigns_are_told_with_key_and_mend(
     with pytest.raises(InputError) as caught:
         read_campaign(folder)
     message = str(caught.value)
-    for fragment in ["campaign.toml", *told]:
+    for fragment in ["campaign.toml", *reported]:
         assert fragment in message
     assert len(message.splitlines()) == 1
     assert "pydantic" not in message
@@ -403,10 +403,10 @@ def test_what_a_rig_does_not_know_is_told_with_line_and_column(campaign: Callabl
     text = (HEAD + RECORDS).replace("b = 0.3", "bb = 0.3")
     line = 1 + text.splitlines().index("bb = 0.3")
     folder = campaign(text)
-    told = (
+    reported = (
         rf"campaign.toml, line {line}, column 6: rig.constants.bb: unknown to running_gear. Did you mean 'b'"
     )
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         read_campaign(folder)
 
 
@@ -426,10 +426,10 @@ def test_what_a_rig_does_not_know_is_told_with_line_and_column(campaign: Callabl
     ],
 )
 def test_a_number_in_the_table_of_the_others_is_told(
-    moved: str, before: str, told: str, campaign: Callable[..., Path]
+    moved: str, before: str, reported: str, campaign: Callable[..., Path]
 ) -> None:
     text = (HEAD + RECORDS).replace(f"{moved}\n", "").replace(before, f"{before}\n{moved}")
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         read_campaign(campaign(text))
 
 

@@ -82,11 +82,11 @@ def test_validation_records_are_scored_and_never_fitted(linear: Identification) 
 
 
 def test_a_validation_amplitude_outside_what_was_identified_is_told(linear: Identification) -> None:
-    told = [warning for warning in linear.warnings if "outside the identified range" in warning]
-    assert len(told) == 1
-    assert "'beyond'" in told[0]
-    assert "1.5 A" in told[0]
-    assert "0.4 to 0.9 A" in told[0]
+    reported = [warning for warning in linear.warnings if "outside the identified range" in warning]
+    assert len(reported) == 1
+    assert "'beyond'" in reported[0]
+    assert "1.5 A" in reported[0]
+    assert "0.4 to 0.9 A" in reported[0]
 
 
 def test_a_linear_rig_does_not_change_with_the_amplitude(linear: Identification) -> None:

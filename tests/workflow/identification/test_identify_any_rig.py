@@ -38,15 +38,15 @@ def arm() -> Identification:
 
 
 def test_parameters_come_with_what_is_identifiable(arm: Identification) -> None:
-    told = arm.identifiability
-    assert told is not None
-    assert told.determined == ("I_2", "s_2", "d_1", "d_2")
-    assert told.sentence.endswith("I_1, m_2 and s_1 only as I_1 + 0.09 m_2 and s_1 + 0.3 m_2.")
+    reported = arm.identifiability
+    assert reported is not None
+    assert reported.determined == ("I_2", "s_2", "d_1", "d_2")
+    assert reported.sentence.endswith("I_1, m_2 and s_1 only as I_1 + 0.09 m_2 and s_1 + 0.3 m_2.")
     fit = arm.joint.fit.fit
-    for name in told.determined:
+    for name in reported.determined:
         assert abs(fit.values[name] - ARM[name]) < 4.0 * fit.standard_errors[name] < 0.1 * ARM[name]
     assert all(np.isinf(fit.standard_errors[name]) for name in ("I_1", "m_2", "s_1"))
-    sums = {c.text: c for c in told.combinations}
+    sums = {c.text: c for c in reported.combinations}
     for text, truth in (("I_1 + 0.09 m_2", 0.104), ("s_1 + 0.3 m_2", 0.3)):
         assert abs(sums[text].value - truth) < 4.0 * sums[text].std < 0.1 * truth
 

@@ -31,18 +31,18 @@ def test_a_record_that_never_drives_the_resonance_gives_its_numbers_by_its_free_
 def test_a_campaign_without_any_excitation_of_the_resonance_is_refused(tmp_path: Path) -> None:
     t = DT * np.arange(8000)
     slow = Run("slow", linear_sweep(t, 0.05, 0.1, 0.5), "sweep", "estimation", 0.05)
-    with pytest.raises(InputError, match="No estimation record shows the motion") as told:
+    with pytest.raises(InputError, match="No estimation record shows the motion") as reported:
         run_identify(write_campaign(tmp_path / "c", [slow]), tmp_path / "out")
-    assert "slow" in str(told.value)
+    assert "slow" in str(reported.value)
     assert not (tmp_path / "out").exists()
 
 
 def test_a_sweep_too_short_for_its_peak_is_told(tmp_path: Path) -> None:
     sharp = {**CONSTANTS, **TRUTH, "k_d": 0.05}
     found = run_identify(write_campaign(tmp_path, [sweep("short", 0.1, seconds=20.0)], values=sharp))
-    (told,) = [w for w in found.warnings if "wide (half power)" in w]
-    assert "'short'" in told
-    assert "record at least" in told
+    (reported,) = [w for w in found.warnings if "wide (half power)" in w]
+    assert "'short'" in reported
+    assert "record at least" in reported
 
 
 def test_a_resolution_that_a_record_is_too_short_for_is_refused(tmp_path: Path) -> None:

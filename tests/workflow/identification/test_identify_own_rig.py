@@ -134,10 +134,10 @@ def test_an_estimator_for_built_in_rigs_alone_is_refused_with_the_reason() -> No
     stage = rig_of_text(STAGE)
     t = np.linspace(0.0, 1.0, 50)
     record = Record("one", 0.02, {"current": np.sin(9.0 * t), "scale": np.cos(9.0 * t)}, {})
-    told = (
+    reported = (
         r"for the rig 'stage' .*h1 and thesis are for built-in rigs of one motion.* is 'h1'.*'local_rational'"
     )
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         identify_campaign(make_campaign(stage, [record]), checked_options("h1", None))
 
 
@@ -201,12 +201,14 @@ def test_a_sensor_that_nobody_recorded_is_named_if_it_would_help(
     truth = {"force_constant": 12.0, "carriage": 0.8, "friction": 3.0, "leaf": 400.0, "span": 1.1}
     whole = recorded("sweep", rig, truth, {"current": linear_sweep(T, 0.5, 2.0, 60.0)}, rng)
     kept = {name: whole[name] for name in ("current", "scale")}
-    told = identified(rig, [replace(whole, signals=kept)], {}, truth, monkeypatch).identifiability
-    assert told is not None
-    assert told.determined == ()
+    reported = identified(rig, [replace(whole, signals=kept)], {}, truth, monkeypatch).identifiability
+    assert reported is not None
+    assert reported.determined == ()
     # The tachometer scales as the scale does.
-    assert told.remedies == ("If 'laser' were also recorded, these inputs would determine all parameters.",)
-    assert told.sentence.endswith(told.remedies[0])
+    assert reported.remedies == (
+        "If 'laser' were also recorded, these inputs would determine all parameters.",
+    )
+    assert reported.sentence.endswith(reported.remedies[0])
 
 
 def _known_mass(also_a_parameter: str = "") -> str:

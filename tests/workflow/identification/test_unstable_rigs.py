@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.fitting.absent_spring import with_weighed_spring
-from rigsight.diagnose.search.horizon import brings_back, windowing_of
+from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.identify.identification import Identification
 from rigsight.identify.record_identification import EstimationOptions, identify_record
 from rigsight.records import Record
@@ -98,13 +98,13 @@ def test_no_sign_is_to_be_changed_where_the_stiffness_is_negative() -> None:
 def test_a_diagnosis_holds_an_unstable_rig(tmp_path: Path) -> None:
     records = {name: in_a_loop(2.0, 5.0, -30.0, seed=seed) for seed, name in enumerate("ab")}
     campaign = read_campaign(campaign_of(tmp_path, records, "m = 2.0\nd = 5.0\nk = -20.0"))
-    assert not brings_back(campaign)
+    assert not restores(campaign)
     windowing, _ = windowing_of(campaign, {"x": NOISE}, 1)
     fastest = np.max(np.abs(np.roots([2.0, 5.0, -30.0])))
     assert windowing.bandwidth is not None
     assert windowing.bandwidth > fastest
     stable = {name: in_a_loop(2.0, 5.0, 300.0, seed=seed) for seed, name in enumerate("ab")}
-    assert brings_back(read_campaign(campaign_of(tmp_path / "stable", stable, "m = 2.0\nd = 5.0\nk = 300.0")))
+    assert restores(read_campaign(campaign_of(tmp_path / "stable", stable, "m = 2.0\nd = 5.0\nk = 300.0")))
 
 
 @pytest.mark.parametrize(("k", "released"), [(-8.0, True), (0.0, False)])
@@ -157,7 +157,7 @@ def test_a_damping_of_the_other_sign_stops_at_its_bound(tmp_path: Path) -> None:
     (reached,) = found.reached
     assert (reached.name, reached.side) == ("d", "lower")
     assert reached.asked < -2.0 * reached.std
-    assert not any("no influence" in told for told in found.identifiability.statements)  # type: ignore[union-attr]
+    assert not any("no influence" in reported for reported in found.identifiability.statements)  # type: ignore[union-attr]
     assert not found.joint.statement.startswith("One parameter set fits")
     undamped = {name: free(0.0, 0.2, seed) for seed, name in enumerate("abc")}
     none = run_identify(campaign_of(tmp_path / "none", undamped, "m = 1.0\nd = 0.0\nk = 100.0"))

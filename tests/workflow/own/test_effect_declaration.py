@@ -143,6 +143,6 @@ def test_every_field_is_checked(declared):
         ),
     ],
 )
-def test_each_fault_is_told(changes, told):
+def test_each_fault_is_told(changes, reported):
     faults = declaration_faults(replace(SOUND, **changes))
-    assert any(told in fault for fault in faults), faults
+    assert any(reported in fault for fault in faults), faults

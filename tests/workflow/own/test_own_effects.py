@@ -138,8 +138,8 @@ def test_the_given_simulation_may_have_the_effect_already(campaign: Path, quinti
         ),
     ],
 )  # fmt: skip
-def test_a_file_that_cannot_be_used_is_told_with_its_line(tmp_path: Path, change, told: str):
-    with pytest.raises(InputError, match=told):
+def test_a_file_that_cannot_be_used_is_told_with_its_line(tmp_path: Path, change, reported: str):
+    with pytest.raises(InputError, match=reported):
         own_effects([written(tmp_path, change)], check=False)
 
 
@@ -185,9 +185,11 @@ def test_an_installed_package_offers_its_effects(monkeypatch: pytest.MonkeyPatch
         ("nowhere:EFFECT", r"offers-effects \(entry point mine\): cannot be loaded: ModuleNotFoundError"),
     ],
 )
-def test_a_package_with_another_thing_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, value, told):
+def test_a_package_with_another_thing_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, value, reported
+):
     entry_points(monkeypatch, tmp_path, value)
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         own_effects()
 
 

@@ -70,9 +70,9 @@ def test_it_is_said_once_that_a_diagnosis_goes_on(axis_campaign: Path, journals:
     count = len({json.loads(line)["key"] for line in journal.read_text().splitlines()})
     again: list[Step] = []
     diagnosed(axis_campaign, said=again)
-    told = [step for step in again if step.stage.startswith("Continuing")]
-    assert [(step.done, step.total) for step in told] == [(0, count), (count, count)]
-    assert told[0].stage == f"Continuing: {count} fits done before the interruption"
+    reported = [step for step in again if step.stage.startswith("Continuing")]
+    assert [(step.done, step.total) for step in reported] == [(0, count), (count, count)]
+    assert reported[0].stage == f"Continuing: {count} fits done before the interruption"
     fresh: list[Step] = []
     diagnosed(axis_campaign, said=fresh)
     assert not [step for step in fresh if step.stage.startswith("Continuing")]

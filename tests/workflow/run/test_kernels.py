@@ -54,12 +54,12 @@ def test_kernels_compiled_beforehand_are_those_that_a_fit_calls(tmp_path: Path) 
         env=environment, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert ran.returncode == 0, ran.stderr
-    told = json.loads(ran.stdout)
-    assert told["steps"][0] == [0, 2, ""]
-    assert {detail for _, _, detail in told["steps"][1:]} == {"element", "quadratic_damping"}
-    assert told["again"] == 0
-    assert told["prepared"] > 0
-    assert told["new"] == []
+    reported = json.loads(ran.stdout)
+    assert reported["steps"][0] == [0, 2, ""]
+    assert {detail for _, _, detail in reported["steps"][1:]} == {"element", "quadratic_damping"}
+    assert reported["again"] == 0
+    assert reported["prepared"] > 0
+    assert reported["new"] == []
 
 
 def test_jobs_default_to_the_processors_there_are() -> None:

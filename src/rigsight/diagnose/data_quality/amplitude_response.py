@@ -149,10 +149,10 @@ def _response(record: Record, source: str, response: str, rig: Rig) -> Frequency
         # A measured motion is smooth between its samples.
         hold = "band_limited" if source in prescribing else record.hold
         return local_rational_response(record, source, response, hold=hold)
-    told = responses_of_inputs([record], moving, [response], smooth=prescribing)
-    if (source, response) not in told.found:
-        raise InputError(f"{record.name}: {told.problems[source, response]}")
-    return told.found[source, response]
+    reported = responses_of_inputs([record], moving, [response], smooth=prescribing)
+    if (source, response) not in reported.found:
+        raise InputError(f"{record.name}: {reported.problems[source, response]}")
+    return reported.found[source, response]
 
 
 def _extremes(records: Sequence[Record], source: str, alone: bool) -> tuple[Record, Record] | None:

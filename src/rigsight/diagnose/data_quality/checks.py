@@ -10,12 +10,12 @@ from rigsight.diagnose.data_quality.finding import DataQuality, Finding
 from rigsight.diagnose.data_quality.input_timing import input_timing, without_short_delays
 from rigsight.diagnose.data_quality.offsets_by_record import levels_apart, means_of
 from rigsight.diagnose.data_quality.sensor_faults import sensor_faults
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.identify import OFFSETS_MEND
 from rigsight.records.record import Record
 
 
-def data_quality(context: FitContext, records: Sequence[Record], reidentified: Scored) -> DataQuality:
+def data_quality(context: FitContext, records: Sequence[Record], reidentified: FittedModel) -> DataQuality:
     """Check the records before an effect is tried.
 
     Notes
@@ -36,19 +36,25 @@ def data_quality(context: FitContext, records: Sequence[Record], reidentified: S
     )
 
 
-def with_offsets_told(quality: DataQuality, context: FitContext, model: Scored) -> DataQuality:
+def with_offsets_told(quality: DataQuality, context: FitContext, model: FittedModel) -> DataQuality:
     """Add the note if the mean residual of the best model differs between records, as with offsets that differ."""
     units = {signal.name: signal.unit for signal in context.rig.outputs}
     known = {finding.signal for finding in quality.findings if finding.kind == "offset"}
     found = [
-        Finding("offset", told.sentence(units[told.output]), OFFSETS_MEND, serious=False, signal=told.output)
-        for told in means_of(context, model)
-        if told.output not in known
+        Finding(
+            "offset",
+            reported.sentence(units[reported.output]),
+            OFFSETS_MEND,
+            serious=False,
+            signal=reported.output,
+        )
+        for reported in means_of(context, model)
+        if reported.output not in known
     ]
     return replace(quality, findings=(*found, *quality.findings)) if found else quality
 
 
-def with_best_model(quality: DataQuality, context: FitContext, model: Scored) -> DataQuality:
+def with_best_model(quality: DataQuality, context: FitContext, model: FittedModel) -> DataQuality:
     """Test the hold of the input again with the effects in the model that may have hidden its part of the gap.
 
     A delay that is shorter than a sample is left out for it: a wrong hold looks like half a sample of delay.

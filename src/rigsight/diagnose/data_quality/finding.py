@@ -15,7 +15,7 @@ class Finding:
 
     kind: FindingKind  # what it is
     sentence: str  # what was seen, with numbers
-    mend: str  # what to do about it
+    remedy: str  # what to do about it
     # True for a fault of the data that may cause the gap; False if an effect may explain it equally well.
     serious: bool = True
     # Where it was seen; None for all records.
@@ -30,7 +30,7 @@ class Finding:
         return {
             "kind": self.kind,
             "sentence": self.sentence,
-            "mend": self.mend,
+            "mend": self.remedy,
             "serious": self.serious,
             "record": self.record,
             "signal": self.signal,
@@ -43,7 +43,7 @@ class AmplitudeDependence:
     """Whether the frequency response changes with the amplitude."""
 
     # ``"yes"``: a nonlinear effect is involved; ``"no"``: only linear causes are left; or ``"cannot tell"``.
-    answer: Answer
+    response: Answer
     sentence: str  # the answer with numbers
     records: tuple[str, ...] = ()  # the two records that were compared
     path: str = ""  # input and sensor, as in ``"u -> x"``; empty where there is none
@@ -60,19 +60,19 @@ class DataQuality:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences with remedies, and the answers about the amplitude; clipping is reported when a record is read."""
-        told = [f"{f.sentence} {f.mend}" for f in self.findings if f.kind != "clipping"]
-        return (*told, *(answer.sentence for answer in self.amplitudes))
+        reported = [f"{f.sentence} {f.remedy}" for f in self.findings if f.kind != "clipping"]
+        return (*reported, *(response.sentence for response in self.amplitudes))
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return the list ``data_quality`` of ``diagnosis.json``; the last entries are the answers about the amplitude."""
-        answers = [
+        responses = [
             {
                 "kind": "amplitude_dependence",
                 "path": own.path,
-                "answer": own.answer,
+                "answer": own.response,
                 "sentence": own.sentence,
                 "records": list(own.records),
             }
             for own in self.amplitudes
         ]
-        return [*(finding.to_json() for finding in self.findings), *answers]
+        return [*(finding.to_json() for finding in self.findings), *responses]

@@ -14,7 +14,7 @@ from typing import get_args
 import numpy as np
 
 from rigsight.diagnose.data_quality.finding import Finding
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.identify import FitResult
@@ -64,16 +64,16 @@ class InputTiming:
         return []
 
     def _hold_finding(self, holds: Sequence[Hold], least: float, shifted: float) -> Finding:
-        told = " or ".join(f'"{hold}"' for hold in holds)
+        reported = " or ".join(f'"{hold}"' for hold in holds)
         rival = ""
         if self.shift is not None and shifted <= VERDICT.worthwhile * least:
             rival = f" So would a time offset of {1e3 * self.shift:.3g} ms"
             rival += ", or a delay in the rig." if self.shift > 0.0 else "."
         return Finding(
             "hold",
-            f'Between samples the input follows hold = {told} rather than "{self.given}": this alone explains '
+            f'Between samples the input follows hold = {reported} rather than "{self.given}": this alone explains '
             f"{self.explained(least):.0%} of the gap ({self.as_given:.3g} -> {least:.3g} times the noise floor).{rival}",
-            f"Set hold = {told} for the records in campaign.toml, if the drive works like this.",
+            f"Set hold = {reported} for the records in campaign.toml, if the drive works like this.",
             serious=not (rival and self.shift is not None and self.shift > 0.0),
             explained=self.explained(least),
         )
@@ -123,7 +123,7 @@ def input_timing(
     )
 
 
-def without_short_delays(context: FitContext, model: Scored) -> tuple[tuple[Effect, ...], FitResult]:
+def without_short_delays(context: FitContext, model: FittedModel) -> tuple[tuple[Effect, ...], FitResult]:
     """Return the effects of a model but the delays that are shorter than a sample, and its fit without them."""
     fit, dt = model.fit, max(record.dt for record in context.look)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import Finding
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
@@ -26,7 +26,7 @@ _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in 
 
 
 def asked_offsets(
-    context: FitContext, reidentified: Scored, singles: Sequence[Scored], allowed: float
+    context: FitContext, reidentified: FittedModel, singles: Sequence[FittedModel], allowed: float
 ) -> Finding | None:
     """Return the evidence for an offset in each record, None where there is none.
 
@@ -38,15 +38,15 @@ def asked_offsets(
     # With the means gone they come nearest.
     nearest = [min(some, key=lambda m: _cost_without_means(context, m)) for some in (forgetful, models)]
     for model in nearest[:1] if nearest[0] is nearest[1] else nearest:
-        told = means_of(context, model)
-        if not told:
+        reported = means_of(context, model)
+        if not reported:
             continue
         freed = _with_free_offsets(context, model)
         gained = model.error_over_noise**2 - freed.error_over_noise**2
         if freed.error_over_noise <= allowed and gained > VERDICT.larger_part * (
             model.error_over_noise**2 - 1.0
         ):
-            worst = max(told, key=lambda one: one.share)
+            worst = max(reported, key=lambda one: one.share)
             unit = next(signal.unit for signal in context.rig.outputs if signal.name == worst.output)
             return Finding(
                 "offset",
@@ -110,7 +110,7 @@ def _apart(records: Sequence[Record], name: str) -> tuple[float, str, str]:
     return apart / motion if motion > 0.0 else float("inf") if apart > 0.0 else 0.0, lowest, highest
 
 
-def means_of(context: FitContext, model: Scored) -> list[DifferingMeans]:
+def means_of(context: FitContext, model: FittedModel) -> list[DifferingMeans]:
     """Return the outputs whose mean residual differs between records."""
     records, residuals = list(context.estimation), list(model.fit.residuals)
     if context.scoring != context.estimation:
@@ -131,7 +131,7 @@ def _remembers(effects: Iterable[Effect]) -> bool:
     return any(effect.states and effect.place is Place.DYNAMICS for effect in effects)
 
 
-def _cost_without_means(context: FitContext, model: Scored) -> float:
+def _cost_without_means(context: FitContext, model: FittedModel) -> float:
     """Return the sum of squared weighted residuals about their mean in each record."""
     noise = np.array([context.noise.get(signal.name, np.inf) for signal in context.rig.outputs])
     parts = [residual / noise for residual in model.fit.residuals]
@@ -143,7 +143,7 @@ def _freed(rig: Rig, records: Iterable[Record]) -> tuple[Record, ...]:
     return tuple(record.with_free_offsets(outputs) for record in records)
 
 
-def _with_free_offsets(context: FitContext, model: Scored) -> Scored:
+def _with_free_offsets(context: FitContext, model: FittedModel) -> FittedModel:
     """Fit and score a model with free offsets, from where it ended without them."""
     own = replace(
         context,

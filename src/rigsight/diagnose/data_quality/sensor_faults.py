@@ -108,14 +108,15 @@ def _stuck(record: Record, name: str) -> list[Finding]:
     stuck = np.flatnonzero(long & (np.maximum(before, after) > broken_off))
     if stuck.size == 0:
         return []
-    told = [
+    reported = [
         written_span(float(record.t[starts[i]]), float(record.t[min(stops[i], record.n_samples - 1)]))
-        for i in stuck[: NOTES.first_told]
+        for i in stuck[: NOTES.first_reported]
     ]
     return [
         Finding(
             "stuck",
-            f"Record {record.name}: {name} is exactly constant from {', '.join(told)}{_more(stuck.size)} and jumps at its end.",
+            f"Record {record.name}: {name} is exactly constant from {', '.join(reported)}{_more(stuck.size)} "
+            "and jumps at its end.",
             "Check the sensor and its transmission; cut these stretches out.",
             record=record.name,
             signal=name,
@@ -149,15 +150,15 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
     if not kept:
         return []
     places, steps = [places[i] for i in kept], [steps[i] for i in kept]
-    told = ", ".join(
+    reported = ", ".join(
         f"{written_stamp(float(record.t[place + 1 + np.argmax(step)]), record.dt)} s"
-        for place, step in zip(places[: NOTES.first_told], steps, strict=False)
+        for place, step in zip(places[: NOTES.first_reported], steps, strict=False)
     )
     largest = max(float(np.max(step)) for step in steps)
     return [
         Finding(
             "jump",
-            f"Record {record.name}: {name} jumps by about {largest:.3g} {unit} at {told}"
+            f"Record {record.name}: {name} jumps by about {largest:.3g} {unit} at {reported}"
             f"{_more(len(places))}; no mass can move like that.",
             "Check for interference or lost counts; repair the samples or leave the record out.",
             record=record.name,
@@ -167,4 +168,4 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
 
 
 def _more(count: int) -> str:
-    return f" and {count - NOTES.first_told} more times" if count > NOTES.first_told else ""
+    return f" and {count - NOTES.first_reported} more times" if count > NOTES.first_reported else ""

@@ -25,7 +25,7 @@ _FINE_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
-class Scored:
+class FittedModel:
     """A fitted model with its residuals on the records that score it."""
 
     effects: tuple[Effect, ...]  # the effects added
@@ -50,7 +50,7 @@ class Scored:
         """Names of the effects."""
         return tuple(effect.name for effect in self.effects)
 
-    def not_simulated(self) -> Scored:
+    def not_simulated(self) -> FittedModel:
         """Return the same as a model that cannot be simulated on the scoring records."""
         return replace(self, held_out=replace(self.held_out, residuals=()), error_over_noise=float("inf"))
 
@@ -119,8 +119,8 @@ class FitContext:
         if len(fit.residuals) != len(self.estimation):
             return self
         weights = np.array([1.0 / self.noise[signal.name] for signal in self.rig.outputs])
-        left = [np.nansum((residual * weights) ** 2, axis=1) for residual in fit.residuals]
-        return replace(self, look=_strongest(self.estimation, left))
+        remainder = [np.nansum((residual * weights) ** 2, axis=1) for residual in fit.residuals]
+        return replace(self, look=_strongest(self.estimation, remainder))
 
     def problem(
         self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY
@@ -222,11 +222,11 @@ class FitContext:
             return True
         place = self.rig.acts_at(effect)
         drive = next(drive for drive in self.rig.mechanism.drives if drive.name == place)
-        told = {str(symbol) for symbol in drive.signal.free_symbols}
-        if not told <= {signal.name for signal in self.rig.inputs}:
+        reported = {str(symbol) for symbol in drive.signal.free_symbols}
+        if not reported <= {signal.name for signal in self.rig.inputs}:
             return True
         records = (*self.estimation, *self.scoring)
-        return any(not is_constant(record[name]) for record in records for name in told)
+        return any(not is_constant(record[name]) for record in records for name in reported)
 
     def score(
         self,
@@ -234,7 +234,7 @@ class FitContext:
         fit: FitResult,
         roughly: bool = False,
         tolerance: float = _FINE_TOLERANCE,
-    ) -> Scored:
+    ) -> FittedModel:
         """Simulate the scoring records with a fitted model; only their initial states are estimated.
 
         `roughly` is sufficient to rank a model that is far from the best. The tolerance is that of the initial states: those of a
@@ -248,9 +248,9 @@ class FitContext:
         else:
             result = self.problem(fit.structure, self.scoring).fit(fit.values, [], tolerance=tolerance)
         error_over_noise = result.weighted_rms if result.residuals else float("inf")
-        return Scored(effects, fit, result, error_over_noise)
+        return FittedModel(effects, fit, result, error_over_noise)
 
-    def on_all_records(self, model: Scored) -> FitResult:
+    def on_all_records(self, model: FittedModel) -> FitResult:
         """Return the residuals of a model on `records` with refitted initial states; parameters are not refitted."""
         if self.scoring == self.estimation:
             return model.held_out
@@ -286,7 +286,7 @@ def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
     return tuple(cut_off)
 
 
-def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = HORIZON.looked_at) -> tuple[Record, ...]:
+def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = HORIZON.examined) -> tuple[Record, ...]:
     """Return the most excited stretch of each record, together about `n_samples` long."""
     shown = zip(records, shown_by(rig, records), strict=True)
     return _strongest(
@@ -295,7 +295,7 @@ def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = HORIZON.look
 
 
 def _strongest(
-    records: Sequence[Record], powers: Sequence[NDArray[np.float64]], n_samples: int = HORIZON.looked_at
+    records: Sequence[Record], powers: Sequence[NDArray[np.float64]], n_samples: int = HORIZON.examined
 ) -> tuple[Record, ...]:
     """Return the stretch of each record with the largest sum of a power, shape (n_samples,), together about `n_samples` long."""
     share = max(500, n_samples // max(1, len(records)))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.state_plane import NOTHING, Plane, plane_parts, plane_units
 from rigsight.diagnose.location.trace import Trace
@@ -25,7 +25,9 @@ from rigsight.records.record import Record
 Signals = Mapping[str, NDArray[np.float64]]
 
 
-def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
+def joint_parts(
+    context: FitContext, reidentified: FittedModel, scored: Sequence[Trace]
+) -> tuple[StatePart, ...]:
     """Return the gap of each output over the plane of each joint's motion.
 
     First the joint at which a force agrees best with the sensors. If a large effect is missing, the re-identified parameters are
@@ -46,9 +48,9 @@ def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
     except (SimulationError, np.linalg.LinAlgError):
         # A diagnosis is still useful without this map.
         return ()
-    motions = tuple(motion for motion in motions if np.isfinite(motion.left))
+    motions = tuple(motion for motion in motions if np.isfinite(motion.remainder))
     parts: list[StatePart] = []
-    for motion in sorted(motions, key=lambda motion: motion.left):
+    for motion in sorted(motions, key=lambda motion: motion.remainder):
         parts += plane_parts(
             context, _plane(context, motion, reidentified.error_over_noise > VERDICT.at_floor), stretches
         )
@@ -59,8 +61,10 @@ def _stretch(context: FitContext, trace: Trace, n_samples: int) -> Trace:
     """Return the stretch of a record, at most so long, in which the gap is largest."""
     if trace.t.size <= n_samples:
         return trace
-    left = sum((trace.residual("reidentified", name) / context.noise[name]) ** 2 for name in trace.measured)
-    energy = np.append(0.0, np.cumsum(left))
+    remainder = sum(
+        (trace.residual("reidentified", name) / context.noise[name]) ** 2 for name in trace.measured
+    )
+    energy = np.append(0.0, np.cumsum(remainder))
     start = int(np.argmax(energy[n_samples:] - energy[:-n_samples]))
     kept = slice(start, start + n_samples)
 

@@ -79,9 +79,9 @@ def fit_lateral_leg(context: FitContext, given: Mapping[str, float]) -> LateralL
     curvature = np.linalg.pinv(slopes.T @ slopes)
     scatter = 2.0 * free.cost / max(1, free.fun.size - 2)
     return LateralLeg(
-        given=tuple(_left(r, names, start) for r in scored_on),
-        fitted=tuple(_left(r, names, best) for r in scored_on),
-        shifted=tuple(_left(r, names, moved) for r in scored_on),
+        given=tuple(_remainder(r, names, start) for r in scored_on),
+        fitted=tuple(_remainder(r, names, best) for r in scored_on),
+        shifted=tuple(_remainder(r, names, moved) for r in scored_on),
         shift=moved.shift,
         shift_std=float(np.sqrt(scatter * curvature[1, 1])) * fitted_to[0].dt,
         noise_gain=_noise_gain(best, scored_on[0].dt),
@@ -115,7 +115,7 @@ def _projected(
     for i, record in enumerate(records):
         rows = np.zeros((record.n_samples, 2 + len(records)))
         decay = _decay(record, rate)
-        rows[:, 0] = _answer(_moved(record, names[0], shift), record.dt, rate)
+        rows[:, 0] = _response(_moved(record, names[0], shift), record.dt, rate)
         rows[:, 1] = 1.0 - decay
         rows[:, 2 + i] = decay
         columns.append(rows)
@@ -127,12 +127,12 @@ def _projected(
     return target - matrix @ coefficients, coefficients
 
 
-def _left(record: Record, names: tuple[str, str], numbers: _Numbers) -> NDArray[np.float64]:
+def _remainder(record: Record, names: tuple[str, str], numbers: _Numbers) -> NDArray[np.float64]:
     """Return the residual of y with these parameters; only the initial value is fitted."""
     decay = _decay(record, numbers.rate)
-    follows = numbers.gain * _answer(_moved(record, names[0], numbers.shift), record.dt, numbers.rate)
-    left = record[names[1]] - follows - numbers.offset * (1.0 - decay)
-    return np.asarray(left - decay * (decay @ left) / (decay @ decay))
+    follows = numbers.gain * _response(_moved(record, names[0], numbers.shift), record.dt, numbers.rate)
+    remainder = record[names[1]] - follows - numbers.offset * (1.0 - decay)
+    return np.asarray(remainder - decay * (decay @ remainder) / (decay @ decay))
 
 
 def _moved(record: Record, name: str, shift: float) -> NDArray[np.float64]:
@@ -147,12 +147,12 @@ def _decay(record: Record, rate: float) -> NDArray[np.float64]:
     return np.asarray(np.exp(-rate * record.dt * np.arange(record.n_samples)))
 
 
-def _answer(motion: NDArray[np.float64], dt: float, rate: float) -> NDArray[np.float64]:
+def _response(motion: NDArray[np.float64], dt: float, rate: float) -> NDArray[np.float64]:
     """Return the answer from rest of ``y' = rate (x - y)`` to samples joined by straight lines, shape (n_samples,)."""
     ahead, behind, kept = _coefficients(rate * dt)
-    answer = scipy.signal.lfilter([ahead, behind], [1.0, -kept], motion)
+    response = scipy.signal.lfilter([ahead, behind], [1.0, -kept], motion)
     first = ahead * motion[0] * kept ** np.arange(motion.size)
-    return np.asarray(answer - first)
+    return np.asarray(response - first)
 
 
 def _coefficients(z: float) -> tuple[float, float, float]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.bands import band_edges, band_powers, dominant_frequency
 from rigsight.diagnose.location.gap_parts import (
     AmplitudePart,
@@ -32,9 +32,9 @@ def localize(
     context: FitContext,
     traces: Sequence[Trace],
     scored_on: str,
-    before: Scored,
-    reidentified: Scored,
-    after: Scored,
+    before: FittedModel,
+    reidentified: FittedModel,
+    after: FittedModel,
     rng: np.random.Generator,
     floors: Sequence[NoiseFloor] = (),
 ) -> Localization:

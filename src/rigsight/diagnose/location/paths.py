@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.gap_parts import PathPart
 from rigsight.diagnose.location.lateral_leg import LateralLeg, fit_lateral_leg
 from rigsight.diagnose.policy import NOTES, VERDICT
@@ -23,7 +23,7 @@ from rigsight.rigs import Rig
 
 
 def path_parts(
-    context: FitContext, before: Scored, reidentified: Scored, after: Scored
+    context: FitContext, before: FittedModel, reidentified: FittedModel, after: FittedModel
 ) -> tuple[PathPart, ...]:
     """Return the error of every section of the signal path when it is driven by its measured input."""
     rig = context.rig
@@ -89,7 +89,7 @@ def _words(rig: Rig) -> str:
     return rig.place_name(Place.DYNAMICS).replace("_", " ")
 
 
-def _motion_alone(context: FitContext, reidentified: Scored) -> Scored:
+def _motion_alone(context: FitContext, reidentified: FittedModel) -> FittedModel:
     """Re-identify the motion without what it drives, so that a gap there does not distort these parameters."""
     downstream = context.rig.downstream_parameters
     if not downstream or downstream <= context.held:
@@ -112,7 +112,7 @@ def _without(record: Record, names: set[str]) -> Record:
     return replace(record, signals={n: s for n, s in record.signals.items() if n not in names})
 
 
-def _column(model: Scored, index: int) -> list[NDArray[np.float64]]:
+def _column(model: FittedModel, index: int) -> list[NDArray[np.float64]]:
     return [residual[:, index] for residual in model.residuals]
 
 
@@ -133,16 +133,18 @@ def _part(
     noise: float,
 ) -> PathPart:
     spread = float(np.std(np.concatenate([record[output] for record in records]))) or 1.0
-    left = {stage: rms(np.concatenate(list(parts))) / spread for stage, parts in residuals.items()}
+    remainder = {stage: rms(np.concatenate(list(parts))) / spread for stage, parts in residuals.items()}
     floor = noise / spread
     return PathPart(
         output=output,
-        before=left["before"],
-        reidentified=left["reidentified"],
-        after=left.get("after", float("nan")),
+        before=remainder["before"],
+        reidentified=remainder["reidentified"],
+        after=remainder.get("after", float("nan")),
         noise_floor=floor,
         share=1.0,
-        noise_share=min(1.0, (floor / left["reidentified"]) ** 2) if left["reidentified"] > 0.0 else 1.0,
+        noise_share=min(1.0, (floor / remainder["reidentified"]) ** 2)
+        if remainder["reidentified"] > 0.0
+        else 1.0,
         path=f"{source} -> {output}",
         source=source,
         units={"shift": "s", "shift_std": "s"},

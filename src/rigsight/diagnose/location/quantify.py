@@ -62,7 +62,7 @@ def _limits(values: NDArray[np.float64]) -> Interval:
 
 
 def effect_shares(
-    effects: Sequence[str], left: Mapping[frozenset[str], Mapping[str, float]]
+    effects: Sequence[str], remainder: Mapping[frozenset[str], Mapping[str, float]]
 ) -> dict[str, dict[str, float]]:
     """Return the share of the closed gap that each of several effects explains, by effect and output.
 
@@ -74,16 +74,16 @@ def effect_shares(
     L. S. Shapley, "A value for n-person games", Contributions to the Theory of Games II (Princeton 1953).
     """
     subsets = [frozenset(c) for n in range(len(effects) + 1) for c in itertools.combinations(effects, n)]
-    if len(effects) < 2 or any(subset not in left for subset in subsets):
+    if len(effects) < 2 or any(subset not in remainder for subset in subsets):
         return {}
     orders = list(itertools.permutations(effects))
     shares: dict[str, dict[str, float]] = {effect: {} for effect in effects}
-    for output in left[frozenset(effects)]:
-        closed = left[frozenset()][output] - left[frozenset(effects)][output]
+    for output in remainder[frozenset(effects)]:
+        closed = remainder[frozenset()][output] - remainder[frozenset(effects)][output]
         for effect in effects:
             steps = []
             for order in orders:
                 earlier = frozenset(order[: order.index(effect)])
-                steps.append(left[earlier][output] - left[earlier | {effect}][output])
+                steps.append(remainder[earlier][output] - remainder[earlier | {effect}][output])
             shares[effect][output] = float(np.mean(steps)) / closed if closed > 0.0 else math.nan
     return shares

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.bands import spectrum
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.trace import STAGES, Trace
@@ -52,7 +52,9 @@ class Plane:
     joint: str = ""  # whose motion; empty on a rig with one
 
 
-def state_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
+def state_parts(
+    context: FitContext, reidentified: FittedModel, scored: Sequence[Trace]
+) -> tuple[StatePart, ...]:
     """Return the gap of each output over a coarse grid of the measured motion's displacement and velocity."""
     if not scored:
         return ()

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.windows import readings
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -46,7 +46,9 @@ class Trace:
         return np.asarray(self.measured[output] - simulated[output], dtype=np.float64)
 
 
-def traces_of(context: FitContext, before: Scored, reidentified: Scored, after: Scored) -> tuple[Trace, ...]:
+def traces_of(
+    context: FitContext, before: FittedModel, reidentified: FittedModel, after: FittedModel
+) -> tuple[Trace, ...]:
     """Return measured and simulated outputs of all records, those that score first, windows joined again."""
     scored = _joined(context.rig, context.scoring, before.residuals, reidentified.residuals, after.residuals)
     if context.scoring == context.estimation:

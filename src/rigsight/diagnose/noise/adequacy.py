@@ -29,12 +29,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.innovations import Innovations
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import alternatives, slopes
-from rigsight.diagnose.pushes.answers import Answers, Followed, orthonormal
 from rigsight.diagnose.pushes.probes import motion_columns, signal_columns
+from rigsight.diagnose.pushes.responses import Followed, Responses, orthonormal
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ class Adequacy:
 
 def adequacy(
     context: FitContext,
-    model: Scored,
+    model: FittedModel,
     rng: np.random.Generator,
     significance: float = VERDICT.significance,
     of_steady_size: bool = False,
@@ -103,31 +103,36 @@ def adequacy(
     distorted to compensate are free in the test, so that they do not hide it.
     """
     records = context.records
-    answers = Answers(context, records, context.on_all_records(model), model.effects, model.fit.free)
-    if not answers.can_be_compared:
+    responses = Responses(context, records, context.on_all_records(model), model.effects, model.fit.free)
+    if not responses.can_be_compared:
         return Adequacy(0.0, (Agreement(_TOO_FAST, "", 0.0, 1.0),), significance=significance)
-    innovations = Innovations(answers)
-    seen_left, new = answers.seen_left, innovations.without_free(innovations.of(answers.seen_left))
-    stretches = _stretches(answers, VERDICT.stretches)
+    innovations = Innovations(responses)
+    seen_remainder, new = (
+        responses.seen_remainder,
+        innovations.without_free(innovations.of(responses.seen_remainder)),
+    )
+    stretches = _stretches(responses, VERDICT.stretches)
     signs = rng.choice([-1.0, 1.0], size=(_TURNS, len(stretches)))
     found: list[tuple[Agreement, _Turned]] = []
-    for what, place, columns in alternatives(answers):
+    for what, place, columns in alternatives(responses):
         fresh = innovations.without_free(innovations.of(columns))
-        told = _turned(fresh, new, stretches, signs, innovations.followed)
-        if told is None:
+        reported = _turned(fresh, new, stretches, signs, innovations.followed)
+        if reported is None:
             continue
         # The size is computed in the readings themselves; innovations only decide whether it is significant.
-        seen = _turned(answers.without_free(columns), seen_left, stretches, signs)
+        seen = _turned(responses.without_free(columns), seen_remainder, stretches, signs)
         share = (
-            0.0 if seen is None else max(0.0, seen.reached - seen.mean) / float(answers.left @ answers.left)
+            0.0
+            if seen is None
+            else max(0.0, seen.reached - seen.mean) / float(responses.remainder @ responses.remainder)
         )
-        found.append((Agreement(what, place, told.p_value, share), told))
-    grown = _growth(answers, stretches) if of_steady_size else None
+        found.append((Agreement(what, place, reported.p_value, share), reported))
+    grown = _growth(responses, stretches) if of_steady_size else None
     agreements = [agreement for agreement, _ in found] + ([grown] if grown is not None else [])
-    p_values = [_smallest([told for _, told in found])] if found else [1.0]
+    p_values = [_smallest([reported for _, reported in found])] if found else [1.0]
     p_values += [grown.p_value] if grown is not None else []
     ordered = tuple(sorted(agreements, key=lambda a: (a.p_value >= significance, -a.share)))
-    return Adequacy(min(p_values), ordered, _is_spread(answers), significance)
+    return Adequacy(min(p_values), ordered, _is_spread(responses), significance)
 
 
 class Checks:
@@ -155,7 +160,7 @@ class Checks:
         self._rng = rng
         self._known: dict[tuple[tuple[str, ...], float], Adequacy] = {}
 
-    def of(self, model: Scored) -> Adequacy:
+    def of(self, model: FittedModel) -> Adequacy:
         """Return the adequacy of a model."""
         # A model may be fitted further and then has another residual.
         own = model.names, model.fit.cost
@@ -168,7 +173,7 @@ class Checks:
             self._known[own] = adequacy(self._context, model, self._rng, significance, steady)
         return self._known[own]
 
-    def is_adequate(self, model: Scored) -> bool:
+    def is_adequate(self, model: FittedModel) -> bool:
         """Return True if nothing contradicts that its residual is noise and disturbance."""
         return self.of(model).adequate
 
@@ -190,7 +195,11 @@ class _Turned:
 
 
 def _turned(
-    columns: Floats, left: Floats, stretches: Sequence[slice], signs: Floats, followed: Followed | None = None
+    columns: Floats,
+    remainder: Floats,
+    stretches: Sequence[slice],
+    signs: Floats,
+    followed: Followed | None = None,
 ) -> _Turned | None:
     """Return how much is explained by columns after projecting out the parameters; None if none remain.
 
@@ -201,7 +210,7 @@ def _turned(
     if basis.shape[1] == 0:
         return None
     # Their sum is that of what no parameter follows; each alone is whole, as chance would have it.
-    along = np.array([left[part] @ basis[part] for part in stretches])
+    along = np.array([remainder[part] @ basis[part] for part in stretches])
     turned = signs @ along
     sizes = np.sum(turned**2, axis=1)
     if followed is not None:
@@ -216,63 +225,63 @@ def _turned(
 
 def _smallest(found: Sequence[_Turned]) -> float:
     """Return the probability that chance makes any of several p-values as small as the smallest one here."""
-    table = np.array([told.by_chance for told in found])
+    table = np.array([reported.by_chance for reported in found])
     ranks = (table.shape[1] - np.argsort(np.argsort(table, axis=1), axis=1)) / (1.0 + table.shape[1])
-    seen = min(told.p_value for told in found)
+    seen = min(reported.p_value for reported in found)
     by_chance = np.min(ranks, axis=0)
     return float((1.0 + np.sum(by_chance <= seen)) / (1.0 + by_chance.size))
 
 
-def _is_spread(answers: Answers) -> bool:
-    stretches = _stretches(answers, VERDICT.stretches // 2)
-    powers = np.array([_power_left(answers, part) for part in _measured_in(answers, stretches)])
+def _is_spread(responses: Responses) -> bool:
+    stretches = _stretches(responses, VERDICT.stretches // 2)
+    powers = np.array([_power_left(responses, part) for part in _measured_in(responses, stretches)])
     return float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= VERDICT.least_spread * powers.size
 
 
-def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:
+def _growth(responses: Responses, stretches: Sequence[slice]) -> Agreement | None:
     """Return the dependence of the size of the residual on the size of the motion: the most significant of several."""
-    stretches = _measured_in(answers, stretches)
-    left = [_power_left(answers, part) for part in stretches]
-    rig = answers.context.rig
+    stretches = _measured_in(responses, stretches)
+    remainder = [_power_left(responses, part) for part in stretches]
+    rig = responses.context.rig
     moving: list[tuple[str, str, Sequence[Floats]]] = []
     for joint in motion_columns(rig):
-        moving.append((f"how far {joint} moves", joint, answers.simulated(joint)))
-        moving.append((f"how fast {joint} moves", joint, slopes(answers, joint)))
+        moving.append((f"how far {joint} moves", joint, responses.simulated(joint)))
+        moving.append((f"how fast {joint} moves", joint, slopes(responses, joint)))
     for drive in signal_columns(rig):
-        moving.append((f"how much {drive} drives", drive, answers.simulated(drive)))
-    told = [
-        (float(spearmanr(left, powers, alternative="greater").pvalue), what, place)
+        moving.append((f"how much {drive} drives", drive, responses.simulated(drive)))
+    reported = [
+        (float(spearmanr(remainder, powers, alternative="greater").pvalue), what, place)
         for what, place, signals in moving
-        if np.ptp(powers := _powers(answers, signals, stretches)) > 0.0
+        if np.ptp(powers := _powers(responses, signals, stretches)) > 0.0
     ]
-    if not told:
+    if not reported:
         return None
-    p_value, what, place = min(told)
-    return Agreement(what, place, min(1.0, len(told) * p_value), 1.0)
+    p_value, what, place = min(reported)
+    return Agreement(what, place, min(1.0, len(reported) * p_value), 1.0)
 
 
-def _measured_in(answers: Answers, stretches: Sequence[slice]) -> list[slice]:
+def _measured_in(responses: Responses, stretches: Sequence[slice]) -> list[slice]:
     """Return the stretches in which a sensor was recorded."""
-    return [part for part in stretches if np.any(answers.is_measured[part])]
+    return [part for part in stretches if np.any(responses.is_measured[part])]
 
 
-def _power_left(answers: Answers, part: slice) -> float:
+def _power_left(responses: Responses, part: slice) -> float:
     """Return the mean square of the residual of the readings that were measured."""
-    return float(np.mean(answers.seen_left[part][answers.is_measured[part]] ** 2))
+    return float(np.mean(responses.seen_remainder[part][responses.is_measured[part]] ** 2))
 
 
-def _powers(answers: Answers, signals: Sequence[Floats], stretches: Sequence[slice]) -> list[float]:
+def _powers(responses: Responses, signals: Sequence[Floats], stretches: Sequence[slice]) -> list[float]:
     """Return the mean square of a signal, counted from its median, in each stretch of the stacked readings."""
-    n_outputs, middle = len(answers.context.rig.outputs), float(np.median(np.concatenate(signals)))
+    n_outputs, middle = len(responses.context.rig.outputs), float(np.median(np.concatenate(signals)))
     stacked = np.concatenate([np.repeat((signal - middle) ** 2, n_outputs) for signal in signals])
     return [float(np.mean(stacked[part])) for part in stretches]
 
 
-def _stretches(answers: Answers, most: int) -> list[slice]:
+def _stretches(responses: Responses, most: int) -> list[slice]:
     """Return stretches of about equal length that cover all records, none of which reaches from one record into the next."""
-    length = max(1.0, answers.spans[-1].stop / most)
+    length = max(1.0, responses.spans[-1].stop / most)
     found = []
-    for part in answers.spans:
+    for part in responses.spans:
         count = max(1, round((part.stop - part.start) / length))
         edges = np.linspace(part.start, part.stop, count + 1).astype(int)
         found += [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]

@@ -85,11 +85,11 @@ def _noise_floor(
         repeated = [(group - np.mean(group, axis=1, keepdims=True), dt) for group, dt in repeated]
     if repeated:
         squares = [np.var(group, axis=0, ddof=1) for group, _ in repeated]
-        left = [(row - np.mean(group, axis=0), dt) for group, dt in repeated for row in group]
+        remainder = [(row - np.mean(group, axis=0), dt) for group, dt in repeated for row in group]
         scatter = float(np.sqrt(np.mean([float(np.mean(square)) for square in squares])))
         # n deviations from their mean are n - 1 independent ones.
         independent = [row for group, _ in repeated for row in helmert(len(group)) @ group]
-        return scatter, "repeated periods of the input", tuple(left), independent
+        return scatter, "repeated periods of the input", tuple(remainder), independent
     top = float(np.median([_top_of_spectrum(record[output]) for record in records]))
     if not rig.is_driven:
         # A measured force is not smoothed by a mass: jumps due to friction fill the whole spectrum.

@@ -36,7 +36,7 @@ def disturbance(
     rig: Rig,
     values: Mapping[str, float],
     records: Sequence[Record],
-    left: Sequence[Floats],
+    remainder: Sequence[Floats],
     noise: float,
     bandwidth: float | None,
 ) -> Disturbance | None:
@@ -45,7 +45,7 @@ def disturbance(
         return None
     motion, follows = rig.motion, bandwidth or 0.0
     variances, highest = [], 0.0
-    for record, residual in zip(records, left, strict=True):
+    for record, residual in zip(records, remainder, strict=True):
         own = {**values, **record.constants}
         inertia, damping, stiffness = (
             evaluated(part, own) for part in (motion.inertia, motion.damping, motion.stiffness)

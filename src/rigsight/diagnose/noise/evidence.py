@@ -23,9 +23,9 @@ from scipy.optimize import minimize
 from scipy.signal.windows import tukey
 from scipy.special import entr
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.pushes.answers import orthonormal
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.pushes.probes import PUSH_SIZE, push, with_probes
+from rigsight.diagnose.pushes.responses import orthonormal
 from rigsight.errors import SimulationError
 from rigsight.identify import answers_to_states
 from rigsight.simulate import compose
@@ -64,72 +64,76 @@ class Evidence:
         shape (n_outputs, 1 + n_joints).
     """
 
-    def __init__(self, context: FitContext, reidentified: Scored, reference: Scored) -> None:
+    def __init__(self, context: FitContext, reidentified: FittedModel, reference: FittedModel) -> None:
         self._context = context
         self._responses = self._of_forces(reidentified)
         self._known: dict[tuple[int, float], Floats] = {}
         # Models are stored with the results, so that no other object can have the same identity.
-        self._criteria: dict[int, tuple[Scored, float]] = {}
+        self._criteria: dict[int, tuple[FittedModel, float]] = {}
         self.powers = self._fitted_powers(self._remainders(reference))
 
-    def criterion(self, model: Scored) -> float:
+    def criterion(self, model: FittedModel) -> float:
         """Return minus twice the log-likelihood plus the penalty for all parameters and initial states: the lower, the better."""
         if id(model) not in self._criteria:
             self._criteria[id(model)] = (model, self._criterion(model))
         return self._criteria[id(model)][1]
 
-    def _criterion(self, model: Scored) -> float:
-        told, n_samples = 0.0, 0
-        for left, dt in self._remainders(model):
-            measured = np.all(np.isfinite(left), axis=0)
-            lines = _lines(left[:, measured]) / np.sqrt(self._spectra(left.shape[0], dt)[:, measured])
+    def _criterion(self, model: FittedModel) -> float:
+        reported, n_samples = 0.0, 0
+        for remainder, dt in self._remainders(model):
+            measured = np.all(np.isfinite(remainder), axis=0)
+            lines = _lines(remainder[:, measured]) / np.sqrt(
+                self._spectra(remainder.shape[0], dt)[:, measured]
+            )
             crossed = lines[:, :, None] * lines[:, None, :].conj()
             smooth = uniform_filter1d(crossed.real, _SMOOTHED, axis=0) + 1j * uniform_filter1d(
                 crossed.imag, _SMOOTHED, axis=0
             )
             # Two sensors may show the very same.
             smooth += _FAINT * np.mean(np.abs(lines) ** 2) * np.eye(lines.shape[1])
-            told += 2.0 * float(np.sum(np.linalg.slogdet(smooth)[1]))
-            n_samples += left[:, measured].size
+            reported += 2.0 * float(np.sum(np.linalg.slogdet(smooth)[1]))
+            n_samples += remainder[:, measured].size
         n_free = len(model.fit.free)
-        return told + n_free * float(np.log(max(n_samples, 1))) + self._price_of_states(model)
+        return reported + n_free * float(np.log(max(n_samples, 1))) + self._price_of_states(model)
 
-    def gain(self, model: Scored, simpler: Scored) -> float:
+    def gain(self, model: FittedModel, simpler: FittedModel) -> float:
         """Return the gain in log-likelihood of a model if the noise has the residual spectrum of a simpler one.
 
         An effect missing in the simpler model raises that spectrum. A model with this effect stays below it everywhere; a model
         that replaces a slow error by a fast one loses.
         """
         gained = 0.0
-        for (left, dt), (least, _) in zip(self._remainders(simpler), self._remainders(model), strict=True):
-            measured = np.all(np.isfinite(left), axis=0)
-            expected = np.sqrt(self._spectra(left.shape[0], dt)[:, measured])
-            before, after = (np.abs(_lines(own[:, measured]) / expected) ** 2 for own in (left, least))
+        for (remainder, dt), (least, _) in zip(
+            self._remainders(simpler), self._remainders(model), strict=True
+        ):
+            measured = np.all(np.isfinite(remainder), axis=0)
+            expected = np.sqrt(self._spectra(remainder.shape[0], dt)[:, measured])
+            before, after = (np.abs(_lines(own[:, measured]) / expected) ** 2 for own in (remainder, least))
             smooth = uniform_filter1d(before, _SMOOTHED, axis=0) + _FAINT * np.mean(before)
             gained += float(np.sum((before - after) / smooth))
         return gained
 
-    def _price_of_states(self, model: Scored) -> float:
+    def _price_of_states(self, model: FittedModel) -> float:
         """Return the penalty of a model's initial states: for each, the logarithm of the number of samples that inform it.
 
         This is the entropy of their leverages, the same for all states with the same effect on the readings.
         """
         found = self._context.on_all_records(model)
-        answers = answers_to_states(self._context.problem(found.structure, self._context.records), found)
-        leverages = [np.sum(orthonormal(own) ** 2, axis=1) for own in answers]
+        responses = answers_to_states(self._context.problem(found.structure, self._context.records), found)
+        leverages = [np.sum(orthonormal(own) ** 2, axis=1) for own in responses]
         return float(sum(np.sum(entr(own)) for own in leverages))
 
-    def _remainders(self, model: Scored) -> list[tuple[Floats, float]]:
+    def _remainders(self, model: FittedModel) -> list[tuple[Floats, float]]:
         """Return the residuals of a model on each record that is long enough, shape (n, n_outputs), with its sample time."""
         found = self._context.on_all_records(model).residuals
         records = self._context.records
         return [
-            (left, record.dt)
-            for left, record in zip(found, records, strict=True)
-            if left.shape[0] >= _FEWEST and np.any(np.all(np.isfinite(left), axis=0))
+            (remainder, record.dt)
+            for remainder, record in zip(found, records, strict=True)
+            if remainder.shape[0] >= _FEWEST and np.any(np.all(np.isfinite(remainder), axis=0))
         ]
 
-    def _of_forces(self, reidentified: Scored) -> Linearization | None:
+    def _of_forces(self, reidentified: FittedModel) -> Linearization | None:
         """Return the responses of the sensors to forces at the joints; None where the equations cannot be linearized."""
         structure = compose(with_probes(self._context.rig), self._context.modelled)
         values = {**reidentified.fit.values, **dict(reidentified.fit.structure.fixed), PUSH_SIZE: 1.0}
@@ -160,13 +164,13 @@ class Evidence:
     def _fitted_powers(self, remainders: Sequence[tuple[Floats, float]]) -> Floats:
         """Return the power of the noise and of the forces that moves each output most likely, shape (outputs, 1 + joints)."""
         n_outputs = len(self._context.rig.outputs)
-        gains = [self._gains(left.shape[0], dt) for left, dt in remainders]
+        gains = [self._gains(remainder.shape[0], dt) for remainder, dt in remainders]
         powers = []
         for output in range(n_outputs):
             seen = [
-                (np.abs(_lines(left[:, [output]])[:, 0]) ** 2, own[:, output])
-                for (left, _), own in zip(remainders, gains, strict=True)
-                if np.all(np.isfinite(left[:, output]))
+                (np.abs(_lines(remainder[:, [output]])[:, 0]) ** 2, own[:, output])
+                for (remainder, _), own in zip(remainders, gains, strict=True)
+                if np.all(np.isfinite(remainder[:, output]))
             ]
             powers.append(_most_likely(seen) if seen else np.eye(1, self._n_sources)[0])
         return np.array(powers)
@@ -176,10 +180,10 @@ class Evidence:
         return 1 + (0 if self._responses is None else len(self._context.rig.mechanism.joints))
 
 
-def _lines(left: Floats) -> NDArray[np.complex128]:
+def _lines(remainder: Floats) -> NDArray[np.complex128]:
     """Return the lines of a spectrum but the mean, shape (lines, outputs)."""
-    n = left.shape[0]
-    return np.asarray(np.fft.rfft(left * tukey(n, _TAPER)[:, None], axis=0)[1:] / np.sqrt(n))
+    n = remainder.shape[0]
+    return np.asarray(np.fft.rfft(remainder * tukey(n, _TAPER)[:, None], axis=0)[1:] / np.sqrt(n))
 
 
 def _most_likely(seen: Sequence[tuple[Floats, Floats]]) -> Floats:

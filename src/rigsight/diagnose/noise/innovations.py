@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import correlate, lfilter
 
-from rigsight.diagnose.pushes.answers import Answers, Followed
+from rigsight.diagnose.pushes.responses import Followed, Responses
 
 Floats = NDArray[np.float64]
 
@@ -42,10 +42,10 @@ def whitening_filter(parts: Sequence[Floats]) -> Floats:
     found, least = np.ones(1), np.log(covariance[0])
     for order in (order for order in _ORDERS[1:] if order <= most):
         own = solve_toeplitz(covariance[:order], covariance[1 : order + 1])
-        left = covariance[0] - float(own @ covariance[1 : order + 1])
-        told = np.log(left) + order * np.log(n_samples) / n_samples
-        if told < least:
-            found, least = np.append(1.0, -own), told
+        remainder = covariance[0] - float(own @ covariance[1 : order + 1])
+        reported = np.log(remainder) + order * np.log(n_samples) / n_samples
+        if reported < least:
+            found, least = np.append(1.0, -own), reported
     return found
 
 
@@ -63,13 +63,13 @@ class Innovations:
         Subspace of innovations that parameters and initial states could compensate.
     """
 
-    def __init__(self, answers: Answers) -> None:
-        n_outputs = len(answers.context.rig.outputs)
-        self._spans = answers.spans
-        left = [answers.seen_left[span].reshape(-1, n_outputs) for span in answers.spans]
-        self._filters = [whitening_filter([own[:, i] for own in left]) for i in range(n_outputs)]
-        by_state = [self._of_record(own) for own in answers.by_state]
-        self.followed = Followed.of(answers.spans, by_state, self.of(answers.by_parameter))
+    def __init__(self, responses: Responses) -> None:
+        n_outputs = len(responses.context.rig.outputs)
+        self._spans = responses.spans
+        remainder = [responses.seen_remainder[span].reshape(-1, n_outputs) for span in responses.spans]
+        self._filters = [whitening_filter([own[:, i] for own in remainder]) for i in range(n_outputs)]
+        by_state = [self._of_record(own) for own in responses.by_state]
+        self.followed = Followed.of(responses.spans, by_state, self.of(responses.by_parameter))
 
     def of(self, columns: Floats) -> Floats:
         """Return the innovations of weighted and stacked readings, shape (n,) or (n, m).

@@ -56,7 +56,7 @@ class HorizonNumbers:
         ),
         set_by="simulated random rigs with play of several widths: pieces of half to two periods were worse",
     )
-    looked_at: int = number(
+    examined: int = number(
         8000,
         "budget",
         (

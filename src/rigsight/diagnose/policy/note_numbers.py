@@ -152,7 +152,7 @@ class NoteNumbers:
         "convention",
         "Number of samples around a jump that it is compared with.",
     )
-    first_told: int = number(
+    first_reported: int = number(
         3,
         "convention",
         "Number of faults of one kind listed in a sentence.",

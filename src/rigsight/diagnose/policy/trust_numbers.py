@@ -106,7 +106,7 @@ class TrustNumbers:
         "convention",
         "Standard errors from zero below which a relative error is meaningless.",
     )
-    told: int = number(
+    reported: int = number(
         3,
         "convention",
         "Number of differing parameters listed one by one in the statement; the report lists all.",

@@ -47,14 +47,14 @@ class VerdictNumbers:
             "by less count as equal."
         ),
     )
-    least_left: float = number(
+    least_remainder: float = number(
         1.15,
         "assumption",
         "Error, in units of a measured floor, that a named cause may leave of the smallest gaps.",
         set_by="141 simulated random rigs: for gaps below 5 floors, true causes left up to 1.08 floors, effects similar to "
         "unknown ones 1.2 and more",
     )
-    most_left: float = number(
+    most_remainder: float = number(
         1.6,
         "assumption",
         (
@@ -63,7 +63,7 @@ class VerdictNumbers:
         set_by="141 simulated random rigs: for a gap of 50 floors, true causes left up to 1.44 floors, effects similar to "
         "unknown ones 4 and more",
     )
-    left_of_gap: float = number(
+    remainder_of_gap: float = number(
         0.025,
         "assumption",
         (

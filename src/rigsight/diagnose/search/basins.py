@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import LOOK_ACCURACY
 from rigsight.identify import FitResult
@@ -26,7 +26,7 @@ _SEED = 0
 """Starts are the same for equal models: a diagnosis depends on its records alone."""
 
 
-def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+def in_lowest_basins(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the models, the best of them in the lowest minimum that was found.
 
     Each also starts from the parameters that it has in common with the best one, and the best one from those of the next, because
@@ -41,7 +41,7 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
     is_explained = leader.error_over_noise <= VERDICT.exact
     nearest = ranked[: SEARCH.basin_models]
 
-    def lowest(own: Scored) -> Scored:
+    def lowest(own: FittedModel) -> FittedModel:
         starts = [] if is_explained else _starts(own)
         others = nearest[1:2] if own is leader else [leader]
         return in_lowest_basin(context, own, [*starts, *(values_in(other, own) for other in others)])
@@ -50,7 +50,7 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
     return [found.get(id(model), model) for model in models]
 
 
-def values_in(leader: Scored, model: Scored) -> dict[str, float]:
+def values_in(leader: FittedModel, model: FittedModel) -> dict[str, float]:
     """Return the parameters of a model with the values that another one has for those of both.
 
     An effect that is a special case of one of the other's has its parameters, too: a friction those of a friction that also
@@ -67,7 +67,9 @@ def values_in(leader: Scored, model: Scored) -> dict[str, float]:
     return {**fit.values, **{name: value for name, value in common.items() if name in fit.free}}
 
 
-def in_lowest_basin(context: FitContext, model: Scored, starts: Sequence[dict[str, float]]) -> Scored:
+def in_lowest_basin(
+    context: FitContext, model: FittedModel, starts: Sequence[dict[str, float]]
+) -> FittedModel:
     """Return a model in the lowest minimum that is reached from where it is and from other starts."""
     fit = model.fit
     rough = context.problem(fit.structure, context.estimation, LOOK_ACCURACY)
@@ -88,7 +90,7 @@ def in_lowest_basin(context: FitContext, model: Scored, starts: Sequence[dict[st
     return context.score(model.effects, finished)
 
 
-def _starts(model: Scored) -> list[dict[str, float]]:
+def _starts(model: FittedModel) -> list[dict[str, float]]:
     fit, rng = model.fit, np.random.default_rng(_SEED)
     own = {fit.structure.parameter_name(e, p.name) for e in model.effects for p in e.parameters}
     names = [name for name in fit.free if name in own]

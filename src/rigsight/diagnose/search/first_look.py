@@ -80,7 +80,7 @@ def look_at(
     return FirstLook(effects, structure, free, nearest, mean_square(nearest[0]))
 
 
-def looked_from(
+def started_from(
     context: FitContext,
     effects: tuple[Effect, ...],
     structure: Structure,
@@ -146,7 +146,7 @@ def widened(
     return list(context.threads.side_by_side(one, near))
 
 
-def looked_again(
+def examined_again(
     context: FitContext, settled: FitResult, starts: Sequence[Mapping[str, float]]
 ) -> tuple[FitResult, ...]:
     """Fit from other starts than those of a candidate: to the most excited stretches, then roughly to all records."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing, leading_output
 from rigsight.diagnose.noise.adequacy import Checks
@@ -34,9 +34,9 @@ class SingleModels:
     windowing: Windowing  # how records were cut
     context: FitContext  # records, scales and noise
     # The given simulation, and its equations with refitted parameters.
-    before: Scored
-    reidentified: Scored
-    singles: list[Scored]  # every effect by itself
+    before: FittedModel
+    reidentified: FittedModel
+    singles: list[FittedModel]  # every effect by itself
     search: Search  # where and for which effects was searched
 
 
@@ -45,7 +45,7 @@ class AllModels:
     """Models with any number of effects, fitted and scored on the same records."""
 
     alone: SingleModels  # those with at most one effect
-    several: list[Scored]  # those with two and three effects
+    several: list[FittedModel]  # those with two and three effects
     # Whether they are fitted and scored in windows of a few cycles, because the motion is sensitive to small
     # disturbances.
     are_in_windows: bool
@@ -86,7 +86,7 @@ def single_models(
     return SingleModels(windowing, context, before, reidentified, singles, search)
 
 
-def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: Scored) -> FitContext:
+def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:
     """Return the context with scales from the motion and the forces between the sensors.
 
     These are known once the equations fit, or from the given simulation.
@@ -100,11 +100,11 @@ def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: Sc
 
 def _singles(
     context: FitContext,
-    reidentified: Scored,
+    reidentified: FittedModel,
     effects: Sequence[Effect],
     say: Callable[[str], None],
     prepare: Prepare | None,
-) -> tuple[Search, list[Scored]]:
+) -> tuple[Search, list[FittedModel]]:
     """Return where was searched, and every effect by itself."""
     search = search_places(context, reidentified, context.offered(effects))
     say("suspects")
@@ -136,15 +136,15 @@ def with_several_effects(
     """Fit and score several effects together where one does not explain the records; in windows where only these can decide."""
     context, whole = models.context, models.windowing.whole
     at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
-    most_left = np.inf if lower_bound else VERDICT.most_left
+    most_remainder = np.inf if lower_bound else VERDICT.most_remainder
     forms = OtherForms(context, lower_bound)
     cut: SingleModels | None = None
     if whole and not is_predictable(context, models.reidentified, models.singles, at_floor, rng):
         cut = _in_windows(campaign, noise, models)
         say("in windows")
         if _explained(cut, cut.singles, at_floor):
-            return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_left), forms)
-    checks = Checks(context, rng, VERDICT.at_floor, most_left)
+            return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms)
+    checks = Checks(context, rng, VERDICT.at_floor, most_remainder)
     found = several_effects(
         context, models.reidentified, models.singles, effects, forms, checks, lower_bound, prepare
     )
@@ -154,7 +154,9 @@ def with_several_effects(
         pairs = pairs_in_windows(context, cut.context, models.reidentified, found)
         say("pairs in windows")
         if _explained(cut, pairs, VERDICT.at_floor):
-            return AllModels(cut, pairs, True, Checks(cut.context, rng, VERDICT.at_floor, most_left), forms)
+            return AllModels(
+                cut, pairs, True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms
+            )
     return AllModels(models, found, False, checks, forms)
 
 
@@ -170,13 +172,13 @@ def _in_windows(campaign: Campaign, noise: Mapping[str, float], models: SingleMo
     return SingleModels(windowing, context, before, reidentified, singles, models.search)
 
 
-def _explained(cut: SingleModels, models: Sequence[Scored], at_floor: float) -> bool:
+def _explained(cut: SingleModels, models: Sequence[FittedModel], at_floor: float) -> bool:
     """Return True if one of the models explains the records in windows and the equations without an effect do not."""
     best = min((model.error_over_noise for model in models), default=float("inf"))
     return bool(cut.reidentified.residuals) and best <= at_floor < cut.reidentified.error_over_noise
 
 
-def _before(campaign: Campaign, context: FitContext, reidentified: Scored) -> Scored:
+def _before(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FittedModel:
     """Score the given simulation; parameters that were not given are identified with the given ones held."""
     if not campaign.given:
         return reidentified
@@ -193,8 +195,8 @@ def _before(campaign: Campaign, context: FitContext, reidentified: Scored) -> Sc
 def _why_not_run(context: FitContext, structure: Structure, values: Mapping[str, float]) -> str:
     """Name the records that the given simulation cannot follow, with what decides it."""
     failing = [r for r in context.records if not context.problem(structure, [r]).fit(values, ()).residuals]
-    told = ", ".join(f"'{record.name}' (sample time {record.dt:.3g} s)" for record in failing[:5])
-    where = f" in {told}" if told else ""
+    reported = ", ".join(f"'{record.name}' (sample time {record.dt:.3g} s)" for record in failing[:5])
+    where = f" in {reported}" if reported else ""
     return (
         f"The given simulation cannot be run: with the given parameters the motion{where} diverges or is too fast for the sample "
         f"time. Check the units of time and input, and the given parameters."

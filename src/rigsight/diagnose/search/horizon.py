@@ -22,7 +22,7 @@ from rigsight.rigs import evaluated
 from rigsight.simulate import compose, parameter_vector, simulate_outputs, structure_of_fit
 
 
-def brings_back(campaign: Campaign) -> bool:
+def restores(campaign: Campaign) -> bool:
     """Return True if records can be run free: else errors of forces or of initial states accumulate.
 
     The spring of one mass must be stiffer than the slowest observer, and no rig may be unstable near its rest.
@@ -106,7 +106,7 @@ def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
     noisy = record.with_signals(**{name: record[name] + noise for name, noise in added.items()})
     data = context.problem(fit.structure, [record, noisy], DEFAULT_ACCURACY).data
 
-    def left(values: Mapping[str, float]) -> dict[str, float]:
+    def remainder(values: Mapping[str, float]) -> dict[str, float]:
         p = parameter_vector(data.structure, values)
         state = fit.initial_states[0]
         try:
@@ -121,7 +121,7 @@ def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
         shown = dict(zip(sensors, (moved - quiet).T, strict=True))
         return {name: float(np.std(own - shown[name])) / context.noise[name] for name, own in added.items()}
 
-    fitted, given = left(fit.values), left({**fit.values, **context.given})
+    fitted, given = remainder(fit.values), remainder({**fit.values, **context.given})
     return {name: max(fitted[name], given[name]) for name in added}
 
 

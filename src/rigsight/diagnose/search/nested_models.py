@@ -13,7 +13,7 @@ from graphlib import TopologicalSorter
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.basins import in_lowest_basin, is_lower, values_in
 from rigsight.diagnose.search.starts import sized, start_values
@@ -27,7 +27,9 @@ _FAINT = 1e-3
 _TOLERANCE = 1e-4
 
 
-def ordered_by_inclusion(context: FitContext, without: Scored, singles: Sequence[Scored]) -> list[Scored]:
+def ordered_by_inclusion(
+    context: FitContext, without: FittedModel, singles: Sequence[FittedModel]
+) -> list[FittedModel]:
     """Return models of one effect with a chi square that does not rise with generality."""
     found = {model.names[0]: model for model in singles}
     parents = {
@@ -44,7 +46,9 @@ def ordered_by_inclusion(context: FitContext, without: Scored, singles: Sequence
     return list(found.values())
 
 
-def lowered_by_extensions(context: FitContext, model: Scored, extensions: Sequence[Scored]) -> Scored:
+def lowered_by_extensions(
+    context: FitContext, model: FittedModel, extensions: Sequence[FittedModel]
+) -> FittedModel:
     """Return a model in the lowest minimum that is reached from better models which contain it."""
     better = [larger for larger in extensions if is_lower(larger.fit, model.fit)]
     if not better:
@@ -52,7 +56,7 @@ def lowered_by_extensions(context: FitContext, model: Scored, extensions: Sequen
     return in_lowest_basin(context, model, [values_in(larger, model) for larger in better])
 
 
-def at_least_as_good(context: FitContext, model: Scored, without: Scored) -> Scored:
+def at_least_as_good(context: FitContext, model: FittedModel, without: FittedModel) -> FittedModel:
     """Return a model of one effect with a chi square that is not above that of the equations without it.
 
     If no fit from the equations without the effect is better, the result equals them: the effect has its null value.
@@ -81,7 +85,7 @@ def at_least_as_good(context: FitContext, model: Scored, without: Scored) -> Sco
     return _at_null(model, without, {**start, **sizes})
 
 
-def _from_simpler_effect(context: FitContext, model: Scored, simpler: Scored) -> Scored:
+def _from_simpler_effect(context: FitContext, model: FittedModel, simpler: FittedModel) -> FittedModel:
     """Return a model in the lowest minimum that is reached from a simpler effect that is better."""
     if not _is_worse(model.fit, simpler.fit):
         return model
@@ -125,7 +129,7 @@ def _is_worse(larger: FitResult, smaller: FitResult) -> bool:
     return larger.cost > (1.0 + _EQUAL) * smaller.cost
 
 
-def _at_null(model: Scored, without: Scored, values: Mapping[str, float]) -> Scored:
+def _at_null(model: FittedModel, without: FittedModel, values: Mapping[str, float]) -> FittedModel:
     """Return a model at the null value of its effect: it moves as the equations without it, its parameters are not determined."""
     structure, free = model.fit.structure, model.fit.free
     unknown = np.full((len(free), len(free)), np.inf)

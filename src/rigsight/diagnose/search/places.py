@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.screening import Lineup, Suspect
+from rigsight.diagnose.search.screening import Shortlist, Suspect
 from rigsight.effects import Effect
 
 
@@ -17,7 +17,7 @@ class SuspectedPlace:
 
     name: str
     share: float
-    looked_at: bool
+    examined: bool
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class Search:
         return max(self.shares.values(), default=0.0)
 
 
-def search_places(context: FitContext, model: Scored, effects: Sequence[Effect]) -> Search:
+def search_places(context: FitContext, model: FittedModel, effects: Sequence[Effect]) -> Search:
     """Return the places at which the residual of a model may arise, on a rig with one motion the effects that may cause it."""
     # A periodic disturbance is independent of the motion, so that no push represents it; a position-periodic effect has another
     # form at every wave number.
     pushing = [effect for effect in effects if not _stands_for_itself(effect)]
     # For one mass a few seconds of motion are sufficient; for several joints, the evidence may be in only one of the records.
-    suspects = Lineup(context, model, liveliest=context.rig.has_one_motion).suspects(pushing)
+    suspects = Shortlist(context, model, liveliest=context.rig.has_one_motion).suspects(pushing)
     own_shares = {suspect.effect.name: suspect.share for suspect in suspects}
     most = max(own_shares.values(), default=0.0)
     starts = {suspect.effect.name: suspect.values for suspect in suspects if suspect.values}
@@ -60,8 +60,8 @@ def search_places(context: FitContext, model: Scored, effects: Sequence[Effect])
         (SuspectedPlace(name, share, share >= VERDICT.larger_part * most) for name, share in shares.items()),
         key=lambda place: -place.share,
     )
-    looked_at = {place.name for place in places if place.looked_at}
-    first = [e for e in effects if _stands_for_itself(e) or context.rig.acts_at(e) in looked_at]
+    examined = {place.name for place in places if place.examined}
+    first = [e for e in effects if _stands_for_itself(e) or context.rig.acts_at(e) in examined]
     return Search(
         tuple(places),
         tuple(first),

@@ -28,7 +28,7 @@ class Run:
     """Position along a record and the residual of a model there, shape (n_samples,) each; `dt` is its sample time [s]."""
 
     way: Floats
-    left: Floats
+    remainder: Floats
     dt: float
 
 
@@ -41,7 +41,7 @@ class Line:
     share: float
 
 
-def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2) -> list[Line]:
+def position_lines(law: Law, runs: Sequence[Run], response: Answer, count: int = 2) -> list[Line]:
     """Return the lines that explain most, best first."""
     share = max(SEARCH.most_wave_samples // max(len(runs), 1), 64)
     runs = [_liveliest(run, share) for run in runs]
@@ -55,7 +55,7 @@ def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2
     waves = np.arange(
         1.0, max(span / shortest, 1.0) + 1.0 / SEARCH.waves_per_line, 1.0 / SEARCH.waves_per_line
     )
-    spectra = [_Spectrum(run, answer) for run in runs]
+    spectra = [_Spectrum(run, response) for run in runs]
     lines = [_line(law, spectra, float(wave)) for wave in 2.0 * np.pi * waves / span]
     shares = np.array([line.share for line in lines])
     around = np.pad(shares, 1, constant_values=-1.0)
@@ -66,18 +66,20 @@ def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2
 class _Spectrum:
     """Spectrum of the residual of a run, and that of a force along its position."""
 
-    def __init__(self, run: Run, answer: Answer) -> None:
+    def __init__(self, run: Run, response: Answer) -> None:
         n = run.way.size
         self._window = np.hanning(n)
         omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(n, run.dt), dtype=np.float64)
         self._used = slice(SEARCH.lowest_line, None)
         self.way = run.way
-        left = self._over_frequency(run.left)
+        remainder = self._over_frequency(run.remainder)
         # Without weights the few lowest lines, of drift and of forces that are wrong elsewhere, would decide alone.
-        size = np.asarray(np.sqrt(uniform_filter1d(np.abs(left) ** 2, SEARCH.wave_smoothing, mode="nearest")))
+        size = np.asarray(
+            np.sqrt(uniform_filter1d(np.abs(remainder) ** 2, SEARCH.wave_smoothing, mode="nearest"))
+        )
         self._weight = 1.0 / np.maximum(size, 1e-12 * np.max(size, initial=1e-300))
-        self._answer = answer(np.asarray(omega[self._used], dtype=np.float64)) * self._weight
-        self.left = left * self._weight
+        self._response = response(np.asarray(omega[self._used], dtype=np.float64)) * self._weight
+        self.remainder = remainder * self._weight
 
     def _over_frequency(self, samples: Floats) -> NDArray[np.complex128]:
         tapered = self._window * (samples - np.mean(samples))
@@ -85,7 +87,7 @@ class _Spectrum:
 
     def of(self, force: Floats) -> NDArray[np.complex128]:
         """Return the answer to a force."""
-        return np.asarray(self._over_frequency(force) * self._answer)
+        return np.asarray(self._over_frequency(force) * self._response)
 
 
 def _line(law: Law, spectra: Sequence[_Spectrum], wave_number: float) -> Line:
@@ -93,8 +95,8 @@ def _line(law: Law, spectra: Sequence[_Spectrum], wave_number: float) -> Line:
     for spectrum in spectra:
         columns = np.array([spectrum.of(part) for part in law(spectrum.way, wave_number)])
         normal = normal + np.real(columns.conj() @ columns.T)
-        gradient = gradient + np.real(columns.conj() @ spectrum.left)
-        total += float(np.sum(np.abs(spectrum.left) ** 2))
+        gradient = gradient + np.real(columns.conj() @ spectrum.remainder)
+        total += float(np.sum(np.abs(spectrum.remainder) ** 2))
     found = np.linalg.lstsq(np.atleast_2d(normal), np.atleast_1d(gradient), rcond=None)[0]
     share = float(found @ np.atleast_1d(gradient)) / total if total > 0.0 else 0.0
     return Line(wave_number, tuple(map(float, found)), share)
@@ -103,7 +105,7 @@ def _line(law: Law, spectra: Sequence[_Spectrum], wave_number: float) -> Line:
 def _liveliest(run: Run, n_samples: int) -> Run:
     if run.way.size <= n_samples:
         return run
-    energy = np.cumsum(np.r_[0.0, (run.left - np.mean(run.left)) ** 2])
+    energy = np.cumsum(np.r_[0.0, (run.remainder - np.mean(run.remainder)) ** 2])
     start = int(np.argmax(energy[n_samples:] - energy[:-n_samples]))
     stop = start + n_samples
-    return Run(run.way[start:stop], run.left[start:stop], run.dt)
+    return Run(run.way[start:stop], run.remainder[start:stop], run.dt)

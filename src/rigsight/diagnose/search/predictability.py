@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.windows import leading_output
 from rigsight.diagnose.policy import SEARCH
 from rigsight.errors import SimulationError
@@ -20,7 +20,7 @@ _ACCURACY = 1e-5
 
 
 def growth_of_disturbances(
-    context: FitContext, reidentified: Scored, model: Scored, rng: np.random.Generator
+    context: FitContext, reidentified: FittedModel, model: FittedModel, rng: np.random.Generator
 ) -> float:
     """Return the effect on a model of disturbances that would change the motion of the linear equations by the noise floor.
 
@@ -51,8 +51,8 @@ def _sizes_of_inputs(context: FitContext) -> dict[str, float]:
 
 def _growth(
     context: FitContext,
-    reidentified: Scored,
-    model: Scored,
+    reidentified: FittedModel,
+    model: FittedModel,
     index: int,
     source: str,
     size: float,
@@ -73,7 +73,7 @@ def _growth(
 
 
 def _change(
-    model: Scored,
+    model: FittedModel,
     index: int,
     record: Record,
     source: str,

@@ -6,18 +6,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
 
 
-def without_repeated_equations(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+def without_repeated_equations(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the models without those that are equivalent to a simpler one among them."""
     return _without_late_shifts(_without_needless_means(context, models))
 
 
-def _without_needless_means(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+def _without_needless_means(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the models without those whose mean force is not needed.
 
     An effect with a mean force and a simpler one with a constant force obey the same equation. If the simpler one, with the same
@@ -25,7 +25,7 @@ def _without_needless_means(context: FitContext, models: Sequence[Scored]) -> li
     """
     fits = {frozenset(model.names): model.fit for model in models}
 
-    def is_needed(model: Scored) -> bool:
+    def is_needed(model: FittedModel) -> bool:
         held = context.constant_forces_beside(model.effects)
         plainer = [
             fit
@@ -60,7 +60,7 @@ def _moves_of(fit: FitResult, known: Mapping[str, float]) -> dict[str, float]:
     }
 
 
-def _without_late_shifts(models: Sequence[Scored]) -> list[Scored]:
+def _without_late_shifts(models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the models without late time shifts if the same model with a sensor delay instead is among them.
 
     A late time base and a sensor delay obey the same equation; only an early reading is certainly a time shift.
@@ -69,7 +69,7 @@ def _without_late_shifts(models: Sequence[Scored]) -> list[Scored]:
         _but(model, effect) for model in models for effect in model.effects if _is_late(effect)
     }
 
-    def says_the_same(model: Scored) -> bool:
+    def says_the_same(model: FittedModel) -> bool:
         return any(
             _shift(model, effect) > 0.0 and _but(model, effect) in with_late_sensor
             for effect in model.effects
@@ -83,11 +83,11 @@ def _is_late(effect: Effect) -> bool:
     return effect.reading_delay is not None and not effect.shifts_the_record
 
 
-def _but(model: Scored, effect: Effect) -> tuple[frozenset[str], str | None]:
+def _but(model: FittedModel, effect: Effect) -> tuple[frozenset[str], str | None]:
     """Return the names of the other effects, and where this one acts."""
     return frozenset(model.names) - {effect.name}, effect.at
 
 
-def _shift(model: Scored, effect: Effect) -> float:
+def _shift(model: FittedModel, effect: Effect) -> float:
     """Return the time by which an effect shifts the record [s]."""
     return sum(model.fit.structure.values_of(effect, model.fit.values).values())

@@ -20,9 +20,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH
-from rigsight.diagnose.pushes.answers import Answers
 from rigsight.diagnose.pushes.probes import (
     PUSH_SIZE,
     STIFFNESS,
@@ -33,6 +32,7 @@ from rigsight.diagnose.pushes.probes import (
     way_columns,
     with_probes,
 )
+from rigsight.diagnose.pushes.responses import Responses
 from rigsight.diagnose.search.starts import sized, start_values
 from rigsight.effects import Effect, Place, kind_of, placed_dimension
 from rigsight.effects import symbols as canonical
@@ -71,7 +71,7 @@ class Response:
     column: Floats
 
 
-class Lineup:
+class Shortlist:
     """The re-identified equations along the records, and their responses to pushes at every place.
 
     Parameters
@@ -84,31 +84,31 @@ class Lineup:
         Use only the most excited stretches of the records.
     """
 
-    def __init__(self, context: FitContext, model: Scored, liveliest: bool = False) -> None:
+    def __init__(self, context: FitContext, model: FittedModel, liveliest: bool = False) -> None:
         records, fit = context.estimation, model.fit
         if liveliest:
             in_stretches = context.problem(fit.structure, context.look).fit(fit.values, [])
             if in_stretches.residuals:
                 records, fit = context.look, in_stretches
         self._free = model.fit.free
-        self._answers = Answers(context, records, fit, model.effects, self._free)
-        self._context = replace(self._answers.context, scales=self._answers.scales)
+        self._responses = Responses(context, records, fit, model.effects, self._free)
+        self._context = replace(self._responses.context, scales=self._responses.scales)
         self._fit = fit
         self._cost = fit.cost
         if liveliest:
             # Parameters fitted to all records need not fit stretches of them: the gain of refitting must not count for a push.
-            self._cost = min(self._cost, self._pushed(self._answers.records, self._free, 0.0).cost)
+            self._cost = min(self._cost, self._pushed(self._responses.records, self._free, 0.0).cost)
         # Known before threads ask for them side by side.
-        _ = self._answers.left, self._answers.motions
+        _ = self._responses.remainder, self._responses.motions
 
     def suspects(self, effects: Sequence[Effect]) -> list[Suspect]:
         """Return the share that each effect explains, in their order."""
         return list(self._context.threads.side_by_side(self._suspect, list(effects)))
 
     @property
-    def left(self) -> Floats:
+    def remainder(self) -> Floats:
         """Residual of the equations, weighted and stacked, after projecting out parameters and initial states, shape (n,)."""
-        return self._answers.left
+        return self._responses.remainder
 
     def responses(self, effects: Sequence[Effect]) -> list[Response]:
         """Return the response to each effect from each of its starts; those that are not finite or zero are left out."""
@@ -130,14 +130,14 @@ class Lineup:
 
     def _in_the_equations(self, effect: Effect) -> Floats:
         """Return the response to an effect that no push represents, from each of its starts, shape (n, n_starts)."""
-        answers = []
+        columns = []
         for own in self._starts(effect):
             small = {
                 p.name: own[p.name] if p.null is None else sized(own[p.name], p.null, _SMALL)
                 for p in effect.parameters
             }
-            answers.append(self._answers.to_effect(effect, small) / _SMALL)
-        return self._answers.without_free(np.column_stack(answers))
+            columns.append(self._responses.to_effect(effect, small) / _SMALL)
+        return self._responses.without_free(np.column_stack(columns))
 
     def _pushed_columns(self, effect: Effect) -> tuple[list[tuple[dict[str, float], list[Floats]]], Floats]:
         """Return the pushes of an effect from its starts, and the responses to them, shape (n, n_starts)."""
@@ -146,15 +146,15 @@ class Lineup:
             (own, [self._signed(place, signal) for signal in signals])
             for own, signals in self._signals(effect)
         ]
-        answers = [self._answers.to_push(place, signals, _SMALL) for _, signals in formed]
-        return formed, self._answers.without_free(np.column_stack(answers)) if answers else np.zeros((1, 0))
+        columns = [self._responses.to_push(place, signals, _SMALL) for _, signals in formed]
+        return formed, self._responses.without_free(np.column_stack(columns)) if columns else np.zeros((1, 0))
 
     def _suspect(self, effect: Effect) -> Suspect:
         place = self._context.rig.acts_at(effect)
         formed, columns = self._pushed_columns(effect)
         size = np.einsum("ij,ij->j", columns, columns)
         usable = np.flatnonzero(np.isfinite(size) & (size > 0.0))
-        along = {int(i): float(columns[:, i] @ self._answers.left) for i in usable}
+        along = {int(i): float(columns[:, i] @ self._responses.remainder) for i in usable}
         best = sorted(along, key=lambda i: -(along[i] ** 2) / size[i])[: SEARCH.fitted_pushes]
         found = [(*self._fitted_share(place, formed[i][1], along[i] / size[i]), formed[i][0]) for i in best]
         share, factor, own = max(found, key=lambda one: one[0], default=(0.0, 0.0, {}))
@@ -167,17 +167,17 @@ class Lineup:
         """
         records = [
             record.with_signals(**{push(place): signal})
-            for record, signal in zip(self._answers.records, signals, strict=True)
+            for record, signal in zip(self._responses.records, signals, strict=True)
         ]
         fit = self._pushed(records, [*self._free, PUSH_SIZE], push_size)
         share = max(0.0, 1.0 - fit.cost / self._cost) if np.isfinite(fit.cost) else 0.0
         return share, fit.values[PUSH_SIZE]
 
     def _pushed(self, records: Sequence[Record], free: Sequence[str], push_size: float) -> FitResult:
-        return self._context.problem(self._answers.structure, records).fit(
-            {**self._answers.values, PUSH_SIZE: push_size},
+        return self._context.problem(self._responses.structure, records).fit(
+            {**self._responses.values, PUSH_SIZE: push_size},
             free,
-            self._answers.fitted_states,
+            self._responses.fitted_states,
             SEARCH.push_evaluations,
             _TOLERANCE,
             False,
@@ -197,7 +197,7 @@ class Lineup:
         x0 = np.zeros((max(1, len(structure.states)), p.shape[1]))
         found: list[list[Floats]] = [[] for _ in starts]
         for i, (record, seen) in enumerate(
-            zip(self._answers.records, self._answers.seen(place), strict=True)
+            zip(self._responses.records, self._responses.seen(place), strict=True)
         ):
             signals = (seen, *self._beside(place, effect, i))
             named = dict(zip((source.name for source in structure.rig.inputs), signals, strict=True))
@@ -222,7 +222,7 @@ class Lineup:
 
     def _beside(self, place: str, effect: Effect, index: int) -> list[Floats]:
         """Return what else an effect sees: the load of its joint, the way along which its drive pushes."""
-        rig, out = self._context.rig, self._answers.calm_outputs[index]
+        rig, out = self._context.rig, self._responses.calm_outputs[index]
         if effect.place is Place.ACTUATOR and effect.reads(canonical.v):
             return [out[:, way_columns(rig)[place]]]
         return [out[:, load_columns(rig)[place]]] if effect.reads(canonical.load) else []
@@ -235,7 +235,7 @@ class Lineup:
             composed.values_of(effect, start)
             for start in start_values(context, composed, effect, self._fit, {})
         ]
-        stiffness = evaluated(joint_of(context.rig, effect).stiffness, self._answers.values)
+        stiffness = evaluated(joint_of(context.rig, effect).stiffness, self._responses.values)
         inner = [p.name for p in effect.parameters if p.fitted and p.null is None]
         return [
             {
@@ -255,7 +255,7 @@ class Lineup:
 
     def _late(self, place: str, time: float) -> list[Floats]:
         found = []
-        for record, seen in zip(self._answers.records, self._answers.seen(place), strict=True):
+        for record, seen in zip(self._responses.records, self._responses.seen(place), strict=True):
             t = record.dt * np.arange(record.n_samples)
             found.append(np.interp(t - time, t, seen) - seen)
         return found
@@ -285,7 +285,7 @@ def _fitted_values(effect: Effect, own: Mapping[str, float]) -> dict[str, float]
     return {p.name: own[p.name] for p in effect.parameters if p.fitted and p.name in own}
 
 
-def structures_of_lineup(
+def structures_of_shortlist(
     rig: Rig, effects: Iterable[Effect], modelled: tuple[Effect, ...] = ()
 ) -> list[Structure]:
     """Return the structures that are simulated to find the place of an effect, each once.

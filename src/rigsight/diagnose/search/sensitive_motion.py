@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.diagnose.search.starts import start_values
@@ -19,8 +19,8 @@ from rigsight.diagnose.search.starts import start_values
 
 def is_predictable(
     context: FitContext,
-    reidentified: Scored,
-    models: Sequence[Scored],
+    reidentified: FittedModel,
+    models: Sequence[FittedModel],
     at_floor: float,
     rng: np.random.Generator,
 ) -> bool:
@@ -39,11 +39,13 @@ def is_predictable(
     )
 
 
-def fitted_in_windows(context: FitContext, reidentified: Scored, singles: Sequence[Scored]) -> list[Scored]:
+def fitted_in_windows(
+    context: FitContext, reidentified: FittedModel, singles: Sequence[FittedModel]
+) -> list[FittedModel]:
     """Fit the best models in windows; the others are only scored there, with the parameters that they have."""
     nearest = {model.names for model in _nearest(singles)[: SEARCH.most_asked]}
 
-    def one(model: Scored) -> Scored:
+    def one(model: FittedModel) -> FittedModel:
         if not model.residuals:
             return model
         return _fitted(context, reidentified, model) if model.names in nearest else _scored(context, model)
@@ -51,12 +53,12 @@ def fitted_in_windows(context: FitContext, reidentified: Scored, singles: Sequen
     return list(context.threads.side_by_side(one, singles))
 
 
-def _nearest(singles: Sequence[Scored]) -> list[Scored]:
+def _nearest(singles: Sequence[FittedModel]) -> list[FittedModel]:
     usable = (model for model in singles if model.residuals and np.isfinite(model.error_over_noise))
     return sorted(usable, key=lambda model: model.error_over_noise)
 
 
-def _fitted(context: FitContext, reidentified: Scored, model: Scored) -> Scored:
+def _fitted(context: FitContext, reidentified: FittedModel, model: FittedModel) -> FittedModel:
     structure, free = model.fit.structure, model.fit.free
     (effect,) = model.effects
     own = [structure.parameter_name(effect, p.name) for p in effect.parameters if p.null == 0.0]
@@ -79,7 +81,7 @@ def _fitted(context: FitContext, reidentified: Scored, model: Scored) -> Scored:
     return scored_in_windows(context, replace(model, fit=best), best.values)
 
 
-def _scored(context: FitContext, model: Scored) -> Scored:
+def _scored(context: FitContext, model: FittedModel) -> FittedModel:
     structure = model.fit.structure
     there = context.problem(structure, context.estimation).fit_windows(model.fit.values, ())
     fit = replace(
@@ -92,7 +94,7 @@ def _scored(context: FitContext, model: Scored) -> Scored:
     return scored_in_windows(context, replace(model, fit=fit), fit.values)
 
 
-def scored_in_windows(context: FitContext, model: Scored, values: Mapping[str, float]) -> Scored:
+def scored_in_windows(context: FitContext, model: FittedModel, values: Mapping[str, float]) -> FittedModel:
     """Return a model scored on the windows that judge, with these numbers and the initial states that suit them."""
     result = context.problem(model.fit.structure, context.scoring).fit_windows(values, ())
     error_over_noise = result.weighted_rms if result.residuals else float("inf")

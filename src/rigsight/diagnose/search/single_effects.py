@@ -11,14 +11,14 @@ from functools import partial
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.first_look import (
     LOOK_ACCURACY,
     FirstLook,
+    examined_again,
     look_at,
-    looked_again,
     mean_square,
     widened,
 )
@@ -33,7 +33,7 @@ _ROUGH_TOLERANCE = 1e-4
 _HOPELESS_TOLERANCE = 1e-2
 
 
-def reidentify(context: FitContext, start: Mapping[str, float]) -> Scored:
+def reidentify(context: FitContext, start: Mapping[str, float]) -> FittedModel:
     """Re-identify the equations without an effect.
 
     Starts from the parameters of a regression, or from those of the given simulation if the rig cannot be simulated with the
@@ -53,11 +53,11 @@ def reidentify(context: FitContext, start: Mapping[str, float]) -> Scored:
 
 def fit_candidates(
     context: FitContext,
-    reidentified: Scored,
+    reidentified: FittedModel,
     effects: Iterable[Effect],
     progress: Callable[[str], None] | None = None,
-    known: Sequence[Scored] = (),
-) -> list[Scored]:
+    known: Sequence[FittedModel] = (),
+) -> list[FittedModel]:
     """Return every effect alone, fitted and scored, with those that were before."""
     regression = None
     if context.rig.has_one_motion and context.rig.is_driven and context.driven:
@@ -68,7 +68,7 @@ def fit_candidates(
     costs = [*(look.cost for look in wide.values()), *(fit.cost for fit in before.values())]
     lowest = min(costs, default=float("inf"))
 
-    def one(found: FirstLook) -> Scored:
+    def one(found: FirstLook) -> FittedModel:
         found = wide.get(found.newest, found)
         promising = found.newest in wide and found.cost <= SEARCH.promising * lowest
         scored = followed(context, found, promising)
@@ -84,7 +84,7 @@ def fit_candidates(
 
 def _looks(
     context: FitContext,
-    reidentified: Scored,
+    reidentified: FittedModel,
     effects: Sequence[Effect],
     regression: EffectRegression | None,
     known: Mapping[str, FitResult],
@@ -116,17 +116,17 @@ def fit_candidate(
     effects: tuple[Effect, ...],
     base: FitResult,
     hold: frozenset[str] = frozenset(),
-) -> Scored:
+) -> FittedModel:
     """Fit and score one set of effects to full precision."""
     (found,) = widened(context, [look_at(context, effects, base, {}, hold=hold)])
     return refine(context, [followed(context, found, promising=True)])[0]
 
 
-def refine(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+def refine(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
     """Fit models with a held-out error close to the best to full precision, the best of them to convergence."""
     best = min((m.error_over_noise for m in models), default=float("inf"))
 
-    def one(model: Scored) -> Scored:
+    def one(model: FittedModel) -> FittedModel:
         if not (np.isfinite(model.error_over_noise) and model.error_over_noise <= VERDICT.comparable * best):
             return model
         steps = max(substeps.mean for substeps in model.fit.substeps)
@@ -145,14 +145,14 @@ def refine(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
     return refined
 
 
-def contenders(models: Sequence[Scored]) -> list[Scored]:
+def contenders(models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the models that are close enough to the best one to have been fitted to full precision."""
     usable = [model for model in models if model.residuals and np.isfinite(model.error_over_noise)]
     best = min((model.error_over_noise for model in usable), default=float("inf"))
     return [model for model in usable if model.error_over_noise <= VERDICT.comparable * best]
 
 
-def _refined(context: FitContext, model: Scored, max_evaluations: int) -> Scored:
+def _refined(context: FitContext, model: FittedModel, max_evaluations: int) -> FittedModel:
     fit = context.problem(model.fit.structure, context.estimation)
     result = fit.fit(
         model.fit.values,
@@ -165,7 +165,7 @@ def _refined(context: FitContext, model: Scored, max_evaluations: int) -> Scored
     return context.score(model.effects, result)
 
 
-def followed(context: FitContext, look: FirstLook, promising: bool, finish: bool = True) -> Scored:
+def followed(context: FitContext, look: FirstLook, promising: bool, finish: bool = True) -> FittedModel:
     """Fit a candidate to all records after its first look: carefully if it is promising, else only to rank it.
 
     `finish` is False where many are followed of which only the best are worth fits from elsewhere and more free numbers.
@@ -174,7 +174,7 @@ def followed(context: FitContext, look: FirstLook, promising: bool, finish: bool
     return finished(context, scored) if promising and finish else scored
 
 
-def finished(context: FitContext, scored: Scored) -> Scored:
+def finished(context: FitContext, scored: FittedModel) -> FittedModel:
     """Continue the fit from other starts, and with exponents and constant forces freed, where that helps."""
     scored = restarted(context, scored)
     fixed = scored.fit.structure.fixed
@@ -191,7 +191,7 @@ def finished(context: FitContext, scored: Scored) -> Scored:
     return _released(context, scored, structure, context.releasable_parameters(structure))
 
 
-def restarted(context: FitContext, settled: Scored) -> Scored:
+def restarted(context: FitContext, settled: FittedModel) -> FittedModel:
     """Restart the fit from values suggested by its effects, as long as that lowers the cost."""
     structure, free = settled.fit.structure, settled.fit.free
     for _ in range(SEARCH.most_restarts):
@@ -201,7 +201,7 @@ def restarted(context: FitContext, settled: Scored) -> Scored:
         if not starts:
             break
         enough = (1.0 - SEARCH.worth_restarting) * settled.fit.cost
-        better = [found for found in looked_again(context, settled.fit, starts) if found.cost < enough]
+        better = [found for found in examined_again(context, settled.fit, starts) if found.cost < enough]
         if not better:
             break
         again = _fitted(context, settled.effects, structure, free, better, True)
@@ -211,7 +211,9 @@ def restarted(context: FitContext, settled: Scored) -> Scored:
     return settled
 
 
-def _released(context: FitContext, settled: Scored, structure: Structure, released: Sequence[str]) -> Scored:
+def _released(
+    context: FitContext, settled: FittedModel, structure: Structure, released: Sequence[str]
+) -> FittedModel:
     """Fit on with further parameters free; keep them only if the held-out error falls."""
     if not released or not np.isfinite(settled.error_over_noise) or settled.error_over_noise <= VERDICT.exact:
         return settled
@@ -229,7 +231,7 @@ def _fitted(
     starts: Sequence[FitResult],
     promising: bool,
     nearest: float = float("inf"),
-) -> Scored:
+) -> FittedModel:
     fit = context.problem(structure, context.estimation, DEFAULT_ACCURACY if promising else LOOK_ACCURACY)
     evaluations = SEARCH.rough_evaluations if promising else SEARCH.hopeless_evaluations
     tolerance = _ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE
@@ -246,6 +248,6 @@ def _fitted(
         results.append(whole(near.values))
     usable = [result for result in results if result.residuals]
     if not usable:
-        return Scored(effects, results[0], results[0], float("inf"))
+        return FittedModel(effects, results[0], results[0], float("inf"))
     best = min(usable, key=lambda result: result.cost)
     return context.score(effects, best, roughly=not promising, tolerance=_ROUGH_TOLERANCE)

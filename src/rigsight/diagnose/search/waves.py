@@ -28,7 +28,7 @@ def wave_starts(context: FitContext, effect: Effect, base: FitResult) -> Iterato
         return
     names, law = _law(effect)
     runs, sign = _runs(context, effect, base)
-    for line in position_lines(law, runs, _answer(context, effect, base)):
+    for line in position_lines(law, runs, _response(context, effect, base)):
         own = {name: sign * value for name, value in zip(names, line.coefficients, strict=True)}
         yield {**own, str(effect.wave_number): line.wave_number}
 
@@ -69,15 +69,15 @@ def _runs(context: FitContext, effect: Effect, base: FitResult) -> tuple[list[Ru
             [record[name] if name in measured else np.zeros(record.n_samples) for name in outputs]
         )
         own = joint_of(rig, effect).name
-        way, left = (
+        way, remainder = (
             corrections.of_joint(own, part, measured) for part in (readings, np.nan_to_num(residual))
         )
-        if way is not None and left is not None:
-            runs.append(Run(way, left, record.dt))
+        if way is not None and remainder is not None:
+            runs.append(Run(way, remainder, record.dt))
     return runs, -1.0
 
 
-def _answer(context: FitContext, effect: Effect, base: FitResult) -> Answer:
+def _response(context: FitContext, effect: Effect, base: FitResult) -> Answer:
     """Return the response of the residual to a force at the effect's joint; 1 for a sensor error or a measured force."""
     rig = context.rig
     if effect.place is Place.SENSOR or not rig.is_driven:
@@ -92,7 +92,7 @@ def _answer(context: FitContext, effect: Effect, base: FitResult) -> Answer:
         natural = 1.0 / characteristic_value(placed_dimension(effect, "time"), context.scales)
         stiffness, damping = mass * natural**2, 2.0 * _DAMPING_RATIO * mass * natural
 
-    def answer(omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def response(omega: NDArray[np.float64]) -> NDArray[np.complex128]:
         return np.asarray(1.0 / (stiffness - mass * omega**2 + 1j * damping * omega), dtype=np.complex128)
 
-    return answer
+    return response

@@ -62,8 +62,8 @@ def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: ND
     for whole in of.whole:
         own = [piece for piece in windows if piece.record == whole.record]
         rows = _joined([piece.rows for piece in own], whole.n_measured)
-        left = _joined([piece.residuals[:, None] for piece in own], whole.n_measured)[:, 0]
-        shifts -= inverse @ (rows.T @ left)
+        remainder = _joined([piece.residuals[:, None] for piece in own], whole.n_measured)[:, 0]
+        shifts -= inverse @ (rows.T @ remainder)
         # Windows are counted from the record's own numbers, which hang on the same noise.
         centered = np.zeros_like(rows)
         centered[:, kept] = pseudo_inverse(whole.rows[:, kept]).T
@@ -161,10 +161,10 @@ class _Variance:
         # A line has two degrees of freedom: its variance is its squared mean, half of the mean of its square.
         spread = np.sum(shares**2, axis=(0, 1)) / 2.0
         freedom = 2.0 * smoothed**2 / np.maximum(spread, np.finfo(float).tiny)
-        left = np.maximum(freedom - piece.n_own, TRUST.least_freedom)
+        remainder = np.maximum(freedom - piece.n_own, TRUST.least_freedom)
         # What was fitted has taken its part of the noise with it, in the band that the estimate reads.
-        size = np.maximum(smoothed * np.maximum(freedom / left, 1.0), spectra.variances(piece, columns))
-        return cls(size, 2.0 * size**2 / left)
+        size = np.maximum(smoothed * np.maximum(freedom / remainder, 1.0), spectra.variances(piece, columns))
+        return cls(size, 2.0 * size**2 / remainder)
 
 
 def _together(parts: Sequence[_Variance]) -> tuple[Floats, Floats]:

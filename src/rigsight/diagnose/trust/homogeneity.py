@@ -67,7 +67,7 @@ class Course:
     """Trend of a parameter with a quantity."""
 
     direction: int  # 1 if it rises, -1 if it falls, 0 otherwise
-    left: float  # weighted sum of squares about the best monotonic trend
+    remainder: float  # weighted sum of squares about the best monotonic trend
 
 
 def course(values: Floats, variances: Floats, along: Floats) -> Course:
@@ -80,9 +80,9 @@ def course(values: Floats, variances: Floats, along: Floats) -> Course:
     found = Course(0, whole)
     for direction in (1, -1) if levels.size > 1 else ():
         best = direction * isotonic_regression(direction * means, weights=total).x
-        left = float(weights @ (values - best[place]) ** 2)
+        remainder = float(weights @ (values - best[place]) ** 2)
         freedom = max(1, values.size - np.unique(best).size)
-        in_order = left <= (1.0 - TRUST.in_order) * whole or chi2.sf(left, freedom) > TRUST.level
-        if np.ptp(best) > 0.0 and in_order and left < found.left:
-            found = Course(direction, left)
+        in_order = remainder <= (1.0 - TRUST.in_order) * whole or chi2.sf(remainder, freedom) > TRUST.level
+        if np.ptp(best) > 0.0 and in_order and remainder < found.remainder:
+            found = Course(direction, remainder)
     return found

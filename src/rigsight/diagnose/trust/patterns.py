@@ -173,7 +173,7 @@ class Order:
 def orders(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) -> tuple[Order, ...]:
     """Return the quantities by which records differ; set values first, the order of the records last."""
     found = []
-    units = {p.name: _told(p.unit) for p in rig.constants}
+    units = {p.name: _reported(p.unit) for p in rig.constants}
     for name in dict.fromkeys(name for record in records for name in record.constants):
         levels = {r.name: r.constants.get(name, constants.get(name, np.nan)) for r in records}
         if len(set(levels.values())) > 1 and all(map(np.isfinite, levels.values())):
@@ -196,17 +196,17 @@ def _amplitudes(rig: Rig, records: Sequence[Record]) -> Order:
     known = [amplitude for amplitude in stated if amplitude is not None]
     if moving and len(known) == len(records):
         levels = dict(zip((r.name for r in records), map(float, known), strict=True))
-        return Order(Pattern.AMPLITUDE, "amplitude", _told(signal.unit), levels)
+        return Order(Pattern.AMPLITUDE, "amplitude", _reported(signal.unit), levels)
     sizes = {r.name: float(np.sqrt(2.0) * np.std(r[signal.name])) for r in records if signal.name in r}
     if len(sizes) < len(records):
-        return Order(Pattern.AMPLITUDE, "amplitude", _told(signal.unit), {})
+        return Order(Pattern.AMPLITUDE, "amplitude", _reported(signal.unit), {})
     level, measured = 0.0, {}
     for name, size in sorted(sizes.items(), key=lambda item: item[1]):
         level = level if size <= TRUST.one_level * level else size
         measured[name] = level
-    return Order(Pattern.AMPLITUDE, "amplitude", _told(signal.unit), measured)
+    return Order(Pattern.AMPLITUDE, "amplitude", _reported(signal.unit), measured)
 
 
-def _told(unit: str) -> str:
+def _reported(unit: str) -> str:
     """Return a unit as written behind a number; the unit of an axis' input is called "input"."""
     return "" if unit in ("input", "1") else unit

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import TRUST
 from rigsight.identify import Coordinates, FitResult, RecordDerivatives, derivatives, own_derivatives
 from rigsight.records.record import Record
@@ -64,7 +64,7 @@ class Pieces:
     portions: int = 1
 
 
-def pieces(context: FitContext, model: Scored) -> Pieces | None:
+def pieces(context: FitContext, model: FittedModel) -> Pieces | None:
     """Return the information of records and their windows; None where the model cannot be simulated in one of them."""
     free, records, fit = model.fit.free, context.records, context.on_all_records(model)
     found = derivatives(context.problem(fit.structure, records), fit, free)
@@ -116,8 +116,8 @@ def pseudo_inverse(rows: Floats) -> Floats:
 
 
 def _asks_for_other_numbers(piece: Piece) -> bool:
-    left, here = float(piece.noise @ piece.noise), float(piece.residuals @ piece.residuals)
-    return left < (1.0 - TRUST.worth_a_step) * here
+    remainder, here = float(piece.noise @ piece.noise), float(piece.residuals @ piece.residuals)
+    return remainder < (1.0 - TRUST.worth_a_step) * here
 
 
 def _windows(context: FitContext, record: Record, count: int) -> list[Record]:

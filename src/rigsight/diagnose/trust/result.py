@@ -56,7 +56,7 @@ class ParameterTrust:
 
 
 @dataclass(frozen=True)
-class Entangled:
+class CorrelatedParameters:
     """Two strongly correlated parameters."""
 
     names: tuple[str, str]  # of both
@@ -70,7 +70,7 @@ class Trust:
 
     statement: str  # in a few sentences
     parameters: tuple[ParameterTrust, ...] = ()  # one each, those that differ first
-    entangled: tuple[Entangled, ...] = field(default=())  # pairs that can hardly be separated
+    entangled: tuple[CorrelatedParameters, ...] = field(default=())  # pairs that can hardly be separated
 
     @property
     def stable(self) -> bool:
@@ -91,7 +91,7 @@ class Trust:
 
 
 def _parameter(parameter: ParameterTrust) -> dict[str, Any]:
-    told = parameter.points_to
+    reported = parameter.points_to
     return {
         "name": parameter.name,
         "unit": parameter.unit,
@@ -109,8 +109,8 @@ def _parameter(parameter: ParameterTrust) -> dict[str, Any]:
         "pattern": str(parameter.pattern),
         "direction": parameter.moves if parameter.direction else None,
         "goes_with": list(parameter.goes_with),
-        "points_to": None if told is None else told.cause,
-        "next_experiment": None if told is None else told.experiment,
+        "points_to": None if reported is None else reported.cause,
+        "next_experiment": None if reported is None else reported.experiment,
     }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.patterns import Pattern
-from rigsight.diagnose.trust.result import Entangled, GroupValue, ParameterTrust
+from rigsight.diagnose.trust.result import CorrelatedParameters, GroupValue, ParameterTrust
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
 
 _ONE_RECORD = "A single record cannot show whether they hold at another amplitude."
@@ -17,16 +17,16 @@ _ONE_RECORD = "A single record cannot show whether they hold at another amplitud
 
 def statement(
     numbers: Sequence[ParameterTrust],
-    pairs: Sequence[Entangled],
+    pairs: Sequence[CorrelatedParameters],
     n_records: int,
     asked: Sequence[str],
     left_open: Sequence[str] = (),
 ) -> str:
     """Return the statement on the parameters, in a few sentences."""
     differing = [number for number in numbers if not number.stable]
-    sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.told]]
-    if len(_alike(differing)) > TRUST.told:
-        rest = [number.name for alike in _alike(differing)[TRUST.told :] for number in alike]
+    sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.reported]]
+    if len(_alike(differing)) > TRUST.reported:
+        rest = [number.name for alike in _alike(differing)[TRUST.reported :] for number in alike]
         sentences.append(f"{_listed(rest)} also {'differs' if len(rest) == 1 else 'differ'}.")
     compared = [number for number in numbers if number.pattern is Pattern.STABLE]
     if compared:
@@ -60,11 +60,11 @@ def _alike(numbers: Sequence[ParameterTrust]) -> list[list[ParameterTrust]]:
 
 
 def _differs(alike: Sequence[ParameterTrust]) -> str:
-    told = [_course(number) for number in alike[: TRUST.told]]
-    if len(alike) > TRUST.told:
-        told.append(f"{_listed([number.name for number in alike[TRUST.told :]])} likewise")
+    reported = [_course(number) for number in alike[: TRUST.reported]]
+    if len(alike) > TRUST.reported:
+        reported.append(f"{_listed([number.name for number in alike[TRUST.reported :]])} likewise")
     cause = alike[0].points_to.cause if alike[0].points_to else ""
-    text = f"{'; '.join(told)}: {cause}." if cause else f"{'; '.join(told)}."
+    text = f"{'; '.join(reported)}: {cause}." if cause else f"{'; '.join(reported)}."
     first, *others = alike[0].goes_with or ("",)
     if others:
         text += f" In these records {first} and {_listed(others)} change together, so their influences cannot be separated."

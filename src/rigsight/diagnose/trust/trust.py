@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as t_distribution
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.homogeneity import Spread, adjusted, course, spread, standard_errors
 from rigsight.diagnose.trust.patterns import Order, Pattern, Role, meaning, orders, roles
 from rigsight.diagnose.trust.pieces import pieces
-from rigsight.diagnose.trust.result import Entangled, GroupValue, ParameterTrust, Trust
+from rigsight.diagnose.trust.result import CorrelatedParameters, GroupValue, ParameterTrust, Trust
 from rigsight.diagnose.trust.statement import statement
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, views
 from rigsight.identify import FitResult
@@ -35,7 +35,7 @@ class _Asked:
     """How one number differs in one view."""
 
     view: View
-    told: Spread
+    reported: Spread
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class _Way:
 
 def trust(
     context: FitContext,
-    model: Scored,
+    model: FittedModel,
     records: Sequence[Record],
     constants: Mapping[str, float],
     std: Mapping[str, float] | None = None,
@@ -71,10 +71,10 @@ def trust(
     asked = [
         []
         if name in open_numbers
-        else [_Asked(view, told) for view in seen.values() if (told := _told(view, i))]
+        else [_Asked(view, reported) for view in seen.values() if (reported := _reported(view, i))]
         for i, name in enumerate(found.free)
     ]
-    p_values = iter(adjusted([one.told.p_value for of_number in asked for one in of_number]))
+    p_values = iter(adjusted([one.reported.p_value for of_number in asked for one in of_number]))
     allowed = [[next(p_values) for _ in of_number] for of_number in asked]
     own = roles(context.rig, _effect_parameters(model))
     numbers = tuple(
@@ -101,11 +101,13 @@ def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) 
         or 0 in directions
     ):
         return numbers
-    told = meaning(Pattern.AMPLITUDE, Role.DRIVE, -directions.pop())
-    return tuple(replace(n, points_to=told) if told and n in moved and not n.stable else n for n in numbers)
+    reported = meaning(Pattern.AMPLITUDE, Role.DRIVE, -directions.pop())
+    return tuple(
+        replace(n, points_to=reported) if reported and n in moved and not n.stable else n for n in numbers
+    )
 
 
-def _wider(model: Scored, std: Mapping[str, float]) -> NDArray[np.float64]:
+def _wider(model: FittedModel, std: Mapping[str, float]) -> NDArray[np.float64]:
     """Return the factor by which bootstrap standard errors exceed those of the formula, at least 1, shape (n_free,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         formula = np.array([model.fit.standard_errors[name] for name in model.fit.free])
@@ -113,7 +115,7 @@ def _wider(model: Scored, std: Mapping[str, float]) -> NDArray[np.float64]:
     return np.where((ratios > 1.0) & np.isfinite(ratios), ratios, 1.0)
 
 
-def _left_open(model: Scored) -> tuple[str, ...]:
+def _left_open(model: FittedModel) -> tuple[str, ...]:
     """Return the positive parameters that all records together do not determine."""
     fit, lower = model.fit, {p.name: p.lower for p in model.fit.structure.parameters}
     return tuple(
@@ -123,14 +125,14 @@ def _left_open(model: Scored) -> tuple[str, ...]:
     )
 
 
-def _effect_parameters(model: Scored) -> set[str]:
+def _effect_parameters(model: FittedModel) -> set[str]:
     structure = model.fit.structure
     return {
         structure.parameter_name(effect, p.name) for effect in structure.effects for p in effect.parameters
     }
 
 
-def _told(view: View, index: int) -> Spread | None:
+def _reported(view: View, index: int) -> Spread | None:
     """Return how a parameter differs in a view; None if nothing can be compared or another view has the same groups."""
     known = view.known(index)
     if not view.is_tested or known.size < 2:
@@ -147,7 +149,7 @@ def _told(view: View, index: int) -> Spread | None:
 
 
 def _number(
-    model: Scored,
+    model: FittedModel,
     index: int,
     std: float,
     seen: Mapping[str, View],
@@ -179,7 +181,7 @@ def _number(
         of_effect=role is Role.EFFECT,
         groups=groups,
         p_value=min(p_values, default=1.0),
-        largest=max((one.told.largest for one in asked), default=0.0),
+        largest=max((one.reported.largest for one in asked), default=0.0),
         pattern=found.pattern,
         direction=found.direction,
         goes_with=found.goes_with,
@@ -217,8 +219,8 @@ def _between_records(
         if found.direction:
             courses.append((order, found))
     if courses:
-        least = min(found.left for _, found in courses)
-        best = [(order, found) for order, found in courses if found.left <= least]
+        least = min(found.remainder for _, found in courses)
+        best = [(order, found) for order, found in courses if found.remainder <= least]
         return _Way(best[0][0].pattern, best[0][1].direction, tuple(order.name for order, _ in best))
     # Levels of several records each that agree within and differ between need no order.
     for order in along:
@@ -227,7 +229,7 @@ def _between_records(
     return _Way(Pattern.RECORD)
 
 
-def entangled(fit: FitResult) -> tuple[Entangled, ...]:
+def entangled(fit: FitResult) -> tuple[CorrelatedParameters, ...]:
     """Return the pairs of parameters with correlated errors, the highest correlation first."""
     found = []
     for i, j in itertools.combinations(range(len(fit.free)), 2):
@@ -237,7 +239,7 @@ def entangled(fit: FitResult) -> tuple[Entangled, ...]:
         correlation = float(block[0, 1] / np.sqrt(block[0, 0] * block[1, 1]))
         if abs(correlation) > TRUST.correlated:
             names = fit.free[i], fit.free[j]
-            found.append(Entangled(names, correlation, _text(fit, names, block, correlation)))
+            found.append(CorrelatedParameters(names, correlation, _text(fit, names, block, correlation)))
     return tuple(sorted(found, key=lambda pair: -abs(pair.correlation)))
 
 

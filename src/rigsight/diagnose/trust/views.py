@@ -37,12 +37,12 @@ class View:
     def known(self, index: int) -> NDArray[np.intp]:
         """Return which groups determine a parameter alone."""
         errors = np.sqrt([estimate.variances[index] for estimate in self.found])
-        told = np.isfinite(errors) & (errors > 0.0)
-        if np.any(told):
-            told &= (errors <= TRUST.unsure * np.min(errors[told])) | (
+        reported = np.isfinite(errors) & (errors > 0.0)
+        if np.any(reported):
+            reported &= (errors <= TRUST.unsure * np.min(errors[reported])) | (
                 errors < POORLY_KNOWN * self.sizes[index]
             )
-        return np.flatnonzero(told)
+        return np.flatnonzero(reported)
 
     def of(self, index: int) -> tuple[Floats, Floats, Floats]:
         """Return shifts, variances and degrees of freedom of a number in all groups, shape (n_groups,) each."""

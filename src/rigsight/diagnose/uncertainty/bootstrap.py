@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import BOOTSTRAP
 from rigsight.diagnose.result import Candidate, Diagnosis, StdMethod
 from rigsight.diagnose.uncertainty.replicates import Replicates
@@ -113,7 +113,7 @@ def _sources(
     # Outputs in no record have no floor; their residuals are left out.
     noise = np.array([context.noise.get(name, 1.0) for name in names])
     records = context.estimation
-    left = [np.nan_to_num(own) / noise for own in fit.residuals]
+    remainder = [np.nan_to_num(own) / noise for own in fit.residuals]
     n_joints = len(fit.structure.rig.mechanism.joints)
     typical = 1.0 / context.scales["time"]
     corners = np.array([np.inf, *(slower * typical for slower in SLOWER)])
@@ -123,27 +123,27 @@ def _sources(
         forces = [np.zeros((r.n_samples, n_joints, n_draws)) for r in records]
         for own in forces:
             own[:, joint] = size * rng.standard_normal((own.shape[0], n_draws))
-        left = step.left(replicates.responses(forces))
-        return [(force[:, joint], rest) for force, rest in zip(forces, left, strict=True)]
+        remainder = step.remainder(replicates.responses(forces))
+        return [(force[:, joint], rest) for force, rest in zip(forces, remainder, strict=True)]
 
-    def heard(sensor: int) -> _Shown:
+    def excited(sensor: int) -> _Shown:
         """Return white noise of a sensor, in units of its size, and its effect on the residual, by record."""
         unit = [np.zeros((r.n_samples, noise.size, _UNIT_DRAWS)) for r in records]
         for own in unit:
             own[:, sensor] = rng.standard_normal((own.shape[0], _UNIT_DRAWS))
-        rests = step.left(replicates.with_noise([own * noise[:, None] for own in unit]))
+        rests = step.remainder(replicates.with_noise([own * noise[:, None] for own in unit]))
         return [(own[:, sensor], rest) for own, rest in zip(unit, rests, strict=True)]
 
-    whole = _mean_square(left)
+    whole = _mean_square(remainder)
     responses = []
     for joint in range(n_joints):
         size = _size_at(joint, context, shown, whole)
         if size == 0.0:
-            responses.append([(np.ones((own.shape[0], 1)), np.zeros((*own.shape, 1))) for own in left])
+            responses.append([(np.ones((own.shape[0], 1)), np.zeros((*own.shape, 1))) for own in remainder])
         else:
             responses.append(shown(joint, size, _UNIT_DRAWS))
     found = likeliest_sources(
-        left, [heard(i) for i in range(noise.size)], responses, [r.dt for r in records], corners
+        remainder, [excited(i) for i in range(noise.size)], responses, [r.dt for r in records], corners
     )
     found = Sources(found.noise_std * noise, found.force_std, corners)
     return found.with_forces_times(_set_right(found, whole, step, replicates, rng))
@@ -159,7 +159,7 @@ def _size_at(
     name = context.rig.mechanism.joints[joint].name
     size = _FIRST * context.scales[f"force@{name}"]
     for _ in range(_SIZING_ROUNDS):
-        reached = _mean_square([left for _, left in shown(joint, size, 1)])
+        reached = _mean_square([remainder for _, remainder in shown(joint, size, 1)])
         if not reached > 0.0:
             return 0.0
         factor = float(np.sqrt(whole / reached))
@@ -177,26 +177,26 @@ def _set_right(
     rng: np.random.Generator,
 ) -> float:
     """Return the factor of the forces with which draws have the same residual as the model."""
-    drawn = _mean_square(step.left(replicates.drawn(found, _SETTING_DRAWS, rng)))
-    heard = [found.noise(r.n_samples, _SETTING_DRAWS, rng) for r in replicates.context.estimation]
-    own = _mean_square(step.left(replicates.with_noise(heard)))
+    drawn = _mean_square(step.remainder(replicates.drawn(found, _SETTING_DRAWS, rng)))
+    excited = [found.noise(r.n_samples, _SETTING_DRAWS, rng) for r in replicates.context.estimation]
+    own = _mean_square(step.remainder(replicates.with_noise(excited)))
     wanted, reached = whole - own, drawn - own
     if min(wanted, reached) <= _SHOWS * whole:
         return 1.0
     return float(np.clip(np.sqrt(wanted / reached), 1.0 / _MOST_CHANGED, _MOST_CHANGED))
 
 
-def _mean_square(left: Sequence[Floats]) -> float:
+def _mean_square(remainder: Sequence[Floats]) -> float:
     """Return the mean square residual where it was measured; unmeasured outputs are 0 throughout."""
     total, count = 0.0, 0
-    for own in left:
+    for own in remainder:
         seen = np.any(own != 0.0, axis=tuple(i for i in range(own.ndim) if i != 1))
         total += float(np.sum(own**2))
         count += int(np.count_nonzero(seen)) * own.size // own.shape[1]
     return total / max(count, 1)
 
 
-def with_own_errors(diagnosis: Diagnosis, context: FitContext, model: Scored, seed: int) -> Diagnosis:
+def with_own_errors(diagnosis: Diagnosis, context: FitContext, model: FittedModel, seed: int) -> Diagnosis:
     """Return a diagnosis whose named candidate has standard errors of the bootstrap."""
     found = uncertainty_of(context, model.fit, np.random.default_rng([seed, _STREAM]))
 

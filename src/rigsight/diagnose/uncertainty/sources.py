@@ -77,22 +77,22 @@ def colored(shape: tuple[int, ...], corner: float, rng: np.random.Generator) -> 
 
 
 def likeliest_sources(
-    left: Sequence[Floats],
+    remainder: Sequence[Floats],
     of_noise: Sequence[Sequence[tuple[Floats, Floats]]],
     of_forces: Sequence[Sequence[tuple[Floats, Floats]]],
     dts: Sequence[float],
     corners: Floats,
 ) -> Sources:
     """Return the maximum likelihood sizes of sources from the spectra of a residual."""
-    long = [i for i, own in enumerate(left) if own.shape[0] >= FEWEST]
+    long = [i for i, own in enumerate(remainder) if own.shape[0] >= FEWEST]
     if not long:
         raise ValueError("No record is long enough for a spectrum.")
-    n_outputs, n_joints = left[0].shape[1], len(of_forces)
+    n_outputs, n_joints = remainder[0].shape[1], len(of_forces)
     powers, gains, weights = [], [], []
     for i in long:
-        seen = np.any(left[i] != 0.0, axis=0)
-        power = _power(left[i][:, :, None])
-        omega = 2.0 * np.pi * np.arange(power.shape[0]) / (left[i].shape[0] * dts[i])
+        seen = np.any(remainder[i] != 0.0, axis=0)
+        power = _power(remainder[i][:, :, None])
+        omega = 2.0 * np.pi * np.arange(power.shape[0]) / (remainder[i].shape[0] * dts[i])
         colors = np.column_stack([_color(omega, corner, dts[i]) for corner in corners])
         own = np.zeros((*power.shape, n_outputs + n_joints * corners.size))
         for sensor in range(n_outputs):
@@ -139,9 +139,9 @@ def _power(columns: Floats) -> Floats:
     return np.asarray(np.mean(lines, axis=2))
 
 
-def _gain(drawn: Floats, left: Floats) -> Floats:
+def _gain(drawn: Floats, remainder: Floats) -> Floats:
     """Return the power of each line over that which was drawn and not the expected one: a linear response then has no scatter."""
-    seen, whole = _power(left), _power(drawn[:, None, :])
+    seen, whole = _power(remainder), _power(drawn[:, None, :])
     # A force that no sensor shows has no gain, also at a line that was not drawn.
     return np.divide(seen, whole, out=np.zeros_like(seen), where=seen > 0.0)
 

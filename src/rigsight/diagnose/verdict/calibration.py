@@ -56,7 +56,7 @@ class Situation:
 
     verdict: Verdict
     first_share: float
-    left: float
+    remainder: float
     gap: float
     n_effects: int
     adequate: bool
@@ -68,17 +68,21 @@ class Situation:
         if not self.gap > largest_gap:
             return self
         smaller = _above_floor(largest_gap) / _above_floor(self.gap)
-        return replace(self, left=math.hypot(1.0, smaller * _above_floor(self.left)), gap=largest_gap)
+        return replace(
+            self, remainder=math.hypot(1.0, smaller * _above_floor(self.remainder)), gap=largest_gap
+        )
 
     def figures(self) -> dict[str, float]:
         """Return the inputs of the logistic models by name."""
         has_effect = self.verdict in ("effect", "unknown")
         share = min(max(self.first_share, 0.0), 1.0)
         log_odds = math.log((share + 1e-12) / (1.0 - share + 1e-12))
-        left, gap = max(self.left, 1.0), max(self.gap, 1.0)
+        remainder, gap = max(self.remainder, 1.0), max(self.gap, 1.0)
         return {
             "log_odds_of_first": max(-_STEEPEST, min(_STEEPEST, log_odds)) if has_effect else 0.0,
-            "log_left": math.log(left / VERDICT.at_floor) if has_effect and left > VERDICT.at_floor else 0.0,
+            "log_left": math.log(remainder / VERDICT.at_floor)
+            if has_effect and remainder > VERDICT.at_floor
+            else 0.0,
             "log_gap": math.log(gap) if has_effect else 0.0,
             "more_effects": float(max(self.n_effects - 1, 0)) if self.verdict == "effect" else 0.0,
             "inadequate": float(not self.adequate),
@@ -176,10 +180,10 @@ def _above_floor(error: float) -> float:
 
 
 def _logistic(coefficients: Mapping[str, float], figures: Mapping[str, float]) -> float:
-    told = sum(
+    reported = sum(
         value * (1.0 if name == "intercept" else figures[name]) for name, value in coefficients.items()
     )
-    return float(expit(told))
+    return float(expit(reported))
 
 
 def _in_proportion(total: float, shares: Sequence[float]) -> list[float]:

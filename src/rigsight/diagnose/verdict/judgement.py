@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.verdict.main_cause import MainCause
 
@@ -18,20 +18,22 @@ class Judgement:
     """A verdict with the model that stands for it and the reason in words."""
 
     verdict: Verdict
-    model: Scored
+    model: FittedModel
     reason: str
 
 
-def most_left(gap: float) -> float:
+def most_remainder(gap: float) -> float:
     """Return the error that a named cause may leave, in units of a measured noise floor, for a gap in the same units."""
-    return min(max(VERDICT.least_left, 1.0 + VERDICT.left_of_gap * (gap - 1.0)), VERDICT.most_left)
+    return min(
+        max(VERDICT.least_remainder, 1.0 + VERDICT.remainder_of_gap * (gap - 1.0)), VERDICT.most_remainder
+    )
 
 
 def judge(
     error_before: float,
-    reidentified: Scored,
-    best: Scored,
-    is_adequate: Callable[[Scored], bool],
+    reidentified: FittedModel,
+    best: FittedModel,
+    is_adequate: Callable[[FittedModel], bool],
     cause: Callable[[], MainCause],
     lower_bound: bool = False,
 ) -> Judgement:
@@ -69,7 +71,7 @@ def judge(
         return Judgement("none", reidentified, noisy)
     closed = (reidentified.error_over_noise - best.error_over_noise) / (reidentified.error_over_noise - 1.0)
     floor = "the lower bound of the noise floor" if lower_bound else "the noise floor"
-    allowed = VERDICT.at_lower_bound if lower_bound else most_left(reidentified.error_over_noise)
+    allowed = VERDICT.at_lower_bound if lower_bound else most_remainder(reidentified.error_over_noise)
     nearest = f"{', '.join(best.names)} closes {closed:.0%} of the re-identified gap"
     if best.error_over_noise <= VERDICT.at_floor:
         return Judgement("effect", best, "With the effect the simulation reaches the noise floor.")
@@ -108,5 +110,5 @@ def judge(
     )
 
 
-def _listed(models: Sequence[Scored]) -> str:
+def _listed(models: Sequence[FittedModel]) -> str:
     return "; ".join(", ".join(model.names) for model in models[:3])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, liveliest
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.discover import JointForce, MissingForce, missing_force, missing_forces, not_contradicted
@@ -28,9 +28,9 @@ class MainCause:
     share: float  # of the squared gap above the noise floor
     at_least: float  # lower limit of the share in 95 % of the resamplings of the records' stretches
     # Equally good models that act at other places and explain another part of the gap.
-    contradicted_by: tuple[Scored, ...] = ()
+    contradicted_by: tuple[FittedModel, ...] = ()
     # Equally good models that act at other places but explain the same part.
-    equalled_by: tuple[Scored, ...] = ()
+    equalled_by: tuple[FittedModel, ...] = ()
 
     @property
     def clear(self) -> bool:
@@ -40,17 +40,17 @@ class MainCause:
 
 def main_cause(
     rig: Rig,
-    reidentified: Scored,
-    best: Scored,
-    tied: Sequence[Scored],
+    reidentified: FittedModel,
+    best: FittedModel,
+    tied: Sequence[FittedModel],
     noise: NDArray[np.float64],
     rng: np.random.Generator,
 ) -> MainCause:
     """Determine the share of the residual of the equations that a model explains."""
     squares = squared_errors([model.residuals for model in (reidentified, best)], noise)
-    gap, left = squares.resampled(squares.draws(rng)).T
+    gap, remainder = squares.resampled(squares.draws(rng)).T
     share = _share(*squares.mean)
-    lowest = float(np.quantile([_share(g, r) for g, r in zip(gap, left, strict=True)], VERDICT.surely))
+    lowest = float(np.quantile([_share(g, r) for g, r in zip(gap, remainder, strict=True)], VERDICT.surely))
     places = {rig.acts_at(effect) for effect in best.effects}
     elsewhere = [m for m in tied if places.isdisjoint(rig.acts_at(effect) for effect in m.effects)]
     same = [m for m in elsewhere if _common_part(reidentified, best, m, noise) > VERDICT.larger_part]
@@ -58,21 +58,25 @@ def main_cause(
     return MainCause(share, lowest, tuple(other), tuple(same))
 
 
-def _common_part(reidentified: Scored, one: Scored, other: Scored, noise: NDArray[np.float64]) -> float:
+def _common_part(
+    reidentified: FittedModel, one: FittedModel, other: FittedModel, noise: NDArray[np.float64]
+) -> float:
     """Return the share of the squared gap explained by one model that another explains too."""
     explained = differing = 0.0
-    for gap, left, others_left in zip(reidentified.residuals, one.residuals, other.residuals, strict=True):
-        explained += float(np.nansum(((gap - left) / noise) ** 2))
-        differing += float(np.nansum(((others_left - left) / noise) ** 2))
+    for gap, remainder, others_left in zip(
+        reidentified.residuals, one.residuals, other.residuals, strict=True
+    ):
+        explained += float(np.nansum(((gap - remainder) / noise) ** 2))
+        differing += float(np.nansum(((others_left - remainder) / noise) ** 2))
     return 1.0 - differing / explained if explained > 0.0 else 0.0
 
 
-def _share(gap: float, left: float) -> float:
-    return float((gap - left) / (gap - 1.0)) if gap > 1.0 else 0.0
+def _share(gap: float, remainder: float) -> float:
+    return float((gap - remainder) / (gap - 1.0)) if gap > 1.0 else 0.0
 
 
 def force_of_one_motion(
-    context: FitContext, reidentified: Scored, has_stiffness: bool, rng: np.random.Generator
+    context: FitContext, reidentified: FittedModel, has_stiffness: bool, rng: np.random.Generator
 ) -> MissingForce | None:
     """Return the shape of the force missing on a rig with one motion; None for any other rig.
 
@@ -90,7 +94,7 @@ def force_of_one_motion(
         return None
 
 
-def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointForce, ...]:
+def forces_at_joints(context: FitContext, reidentified: FittedModel) -> tuple[JointForce, ...]:
     """Return the force that would have to be missing at each joint, the most likely first; none for a rig with one motion.
 
     There are none beside effects that are modelled already either.

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2, norm
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.policy import NOTES, VERDICT
 from rigsight.diagnose.search.basins import is_lower
 from rigsight.diagnose.search.starts import ENDLESS
@@ -28,7 +28,7 @@ class Doubt:
     grave: bool
 
 
-def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
+def doubts(model: FittedModel, reidentified: FittedModel) -> tuple[Doubt, ...]:
     """Return the implausible parameters of a model."""
     fit = model.fit
     parameters = {p.name: p for p in fit.structure.parameters}
@@ -64,7 +64,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
     return tuple(found)
 
 
-def has_size_of_zero(model: Scored, others: Sequence[Scored]) -> bool:
+def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named.
 
     It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
@@ -79,7 +79,7 @@ def has_size_of_zero(model: Scored, others: Sequence[Scored]) -> bool:
     return any(map(is_zero, model.effects))
 
 
-def _is_within_errors(model: Scored, effect: Effect) -> bool:
+def _is_within_errors(model: FittedModel, effect: Effect) -> bool:
     """Return True if the size of an effect is determined and does not differ from zero, an infinite one in the reciprocal."""
     fit = model.fit
     sizes = {
@@ -95,7 +95,7 @@ def _is_within_errors(model: Scored, effect: Effect) -> bool:
     return bool(chi2.sf(square, len(sizes)) > 2.0 * norm.sf(VERDICT.standard_errors))
 
 
-def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str, str]) -> Ranking:
+def plausible_first(ranking: Ranking, reidentified: FittedModel, places: Mapping[str, str]) -> Ranking:
     """Return the ranking with a plausible model before an implausible one that is hardly better and at the same place."""
     best = ranking.order[0]
     if not any(doubt.grave for doubt in doubts(best, reidentified)):
@@ -116,7 +116,7 @@ def _with_first(ranking: Ranking, index: int) -> Ranking:
     shares = list(ranking.probabilities)
     shares[0], shares[index] = shares[index], shares[0]
     chosen = ranking.order[index]
-    rivals: Sequence[Scored] = [m for m in ranking.tied if m is not chosen]
+    rivals: Sequence[FittedModel] = [m for m in ranking.tied if m is not chosen]
     grounds = [replace(own, share=share) for own, share in zip(ranking.grounds, shares, strict=True)]
     first = [index, *(i for i in range(len(shares)) if i != index)]
     return replace(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import Blocks, squared_errors
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several.one_law import is_linear
@@ -31,10 +31,10 @@ class Grounds:
 class Ranking:
     """Scored models in order with their probabilities."""
 
-    order: tuple[Scored, ...]  # models, the chosen one first, then by held-out error
+    order: tuple[FittedModel, ...]  # models, the chosen one first, then by held-out error
     probabilities: tuple[float, ...]  # probability of each to be the cause among those tried
     # Models whose held-out error does not differ significantly from that of the chosen one.
-    tied: tuple[Scored, ...]
+    tied: tuple[FittedModel, ...]
     grounds: tuple[Grounds, ...]  # basis of each probability, in the same order
     # Error, on the stretches not drawn in a resampling, of the model with the best held-out errors in it, in
     # units of the noise floor; RMS over all resamplings. Evidence, which uses all records, does not affect
@@ -43,11 +43,11 @@ class Ranking:
 
 
 def rank(
-    models: Sequence[Scored],
+    models: Sequence[FittedModel],
     noise: NDArray[np.float64],
     rng: np.random.Generator,
     gap: float = 1.0,
-    criterion: Callable[[Scored], float] | None = None,
+    criterion: Callable[[FittedModel], float] | None = None,
     evidence_counts: bool = True,
 ) -> Ranking:
     """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen.
@@ -121,7 +121,7 @@ def rank(
     return with_last(ranking, failed)
 
 
-def with_last(ranking: Ranking, models: Sequence[Scored]) -> Ranking:
+def with_last(ranking: Ranking, models: Sequence[FittedModel]) -> Ranking:
     """Return a ranking with models at its end that cannot be the cause."""
     return replace(
         ranking,
@@ -141,17 +141,19 @@ def _error_of_choice(squares: Blocks, draws: NDArray[np.int64], winners: NDArray
 
 
 def _evidence_of(
-    models: Sequence[Scored], errors: NDArray[np.float64], criterion: Callable[[Scored], float] | None
+    models: Sequence[FittedModel],
+    errors: NDArray[np.float64],
+    criterion: Callable[[FittedModel], float] | None,
 ) -> list[float | None]:
     """Return the log evidence of each model relative to the most probable one; None if not fitted to convergence."""
     if criterion is None:
         return [None] * len(models)
-    told = [
+    reported = [
         -0.5 * criterion(m) if error <= VERDICT.comparable else None
         for m, error in zip(models, errors, strict=True)
     ]
-    most = max(value for value in told if value is not None)
-    return [None if value is None else value - most for value in told]
+    most = max(value for value in reported if value is not None)
+    return [None if value is None else value - most for value in reported]
 
 
 def _tempered(evidence: Sequence[float | None]) -> NDArray[np.float64]:
@@ -166,7 +168,7 @@ def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[n
     return np.asarray(shares / np.sum(shares, axis=1, keepdims=True))
 
 
-def _likened(model: Scored, others: Sequence[Scored]) -> bool:
+def _likened(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     """Return True if an effect of this model is only another form of one in a model with equally many parameters."""
     return any(
         other.n_free == model.n_free
@@ -177,7 +179,7 @@ def _likened(model: Scored, others: Sequence[Scored]) -> bool:
     )
 
 
-def _beside_a_new_force(model: Scored, others: Sequence[Scored]) -> bool:
+def _beside_a_new_force(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     """Return True if a model needs an unknown constant force that another model explains.
 
     Models whose mean force is not needed have been removed before, see `same_equation`.
@@ -192,7 +194,7 @@ def _beside_a_new_force(model: Scored, others: Sequence[Scored]) -> bool:
     )
 
 
-def _unidentifiable_sensor_effect(model: Scored) -> bool:
+def _unidentifiable_sensor_effect(model: FittedModel) -> bool:
     """Return True for a linear effect of the sensor of a rig with one output: it is equivalent to one of the drive."""
     one_output = len(model.fit.structure.rig.outputs) == 1
     return one_output and any(effect.place is Place.SENSOR and is_linear(effect) for effect in model.effects)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.noise.adequacy import CONCENTRATED, Adequacy
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import BY_RECORD
@@ -42,17 +42,17 @@ class Remainder:
                 f"{self.p_value:.2g}): parameters may be off by more than their standard errors."
             )
         percent = float(f"{100.0 * self.share:.2g}")
-        told = f"The remaining error, {percent:g} % of the squared gap,"
-        left = (
-            f"{told} is concentrated in {CONCENTRATED}, unlike noise"
+        reported = f"The remaining error, {percent:g} % of the squared gap,"
+        remainder = (
+            f"{reported} is concentrated in {CONCENTRATED}, unlike noise"
             if self.goes_with == CONCENTRATED
-            else f"{told} still correlates with {_in_words(self.goes_with)} (p = {self.p_value:.2g})"
+            else f"{reported} still correlates with {_in_words(self.goes_with)} (p = {self.p_value:.2g})"
         )
         if self.share > VERDICT.larger_part:
-            return f"{left}: more than half of the gap is not explained."
+            return f"{remainder}: more than half of the gap is not explained."
         if not self.beside_a_cause:
-            return f"{left}."
-        return f"{left}: a smaller effect is missing too, or the equation does not quite fit the rig."
+            return f"{remainder}."
+        return f"{remainder}: a smaller effect is missing too, or the equation does not quite fit the rig."
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry ``remainder`` of ``diagnosis.json``."""
@@ -72,7 +72,7 @@ def _in_words(goes_with: str) -> str:
 
 
 def remainder_of(
-    reidentified: Scored, model: Scored, found: Adequacy, lower_bound: bool, beside_a_cause: bool
+    reidentified: FittedModel, model: FittedModel, found: Adequacy, lower_bound: bool, beside_a_cause: bool
 ) -> Remainder:
     """Return the remaining error of a model."""
     if found.adequate:

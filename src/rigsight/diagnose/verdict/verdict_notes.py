@@ -14,7 +14,7 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import DataQuality
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.predictability import growth_of_disturbances
@@ -35,13 +35,13 @@ class _Found(Protocol):
     @property
     def windowing(self) -> Windowing: ...
     @property
-    def reidentified(self) -> Scored: ...
+    def reidentified(self) -> FittedModel: ...
     @property
     def judgement(self) -> Judgement: ...
     @property
     def quality(self) -> DataQuality: ...
     @property
-    def imitations(self) -> Sequence[Scored]: ...
+    def imitations(self) -> Sequence[FittedModel]: ...
     @property
     def doubts(self) -> Sequence[str]: ...
 
@@ -68,15 +68,15 @@ def verdict_notes(basis: Basis) -> tuple[str, ...]:
         *campaign.notes,
         *(note for record in campaign.records for note in record.notes),
         *closed_loop_notes(campaign.records, campaign.rig, _REFERENCE_USED),
-        *_told(ON_THE_COMPARISON, basis),
+        *_reported(ON_THE_COMPARISON, basis),
         *found.quality.notes,
         found.judgement.reason,
         *found.doubts,
-        *_told(ON_WHAT_STAYS_OPEN, basis),
+        *_reported(ON_WHAT_STAYS_OPEN, basis),
     )
 
 
-def _told(rules: Sequence[Rule], basis: Basis) -> list[str]:
+def _reported(rules: Sequence[Rule], basis: Basis) -> list[str]:
     return [sentence for rule in rules if (sentence := rule(basis)) is not None]
 
 
@@ -147,7 +147,7 @@ def imitations_note(basis: Basis) -> str | None:
 
 def clocks_note(basis: Basis) -> str | None:
     """Tell that a delay is shorter than the clocks of the records can tell."""
-    model, told = basis.found.judgement.model, []
+    model, reported = basis.found.judgement.model, []
     least = max((record.clock_uncertainty for record in basis.campaign.records), default=0.0)
     for effect in model.effects if model is not None and least > 0.0 else ():
         late = [expression for expression in (effect.delay, effect.reading_delay) if expression is not None]
@@ -155,13 +155,13 @@ def clocks_note(basis: Basis) -> str | None:
         for parameter in effect.parameters:
             value = model.fit.values[model.fit.structure.parameter_name(effect, parameter.name)]
             if parameter.name in symbols and abs(value) < least:
-                told.append(f"{effect.name} of {abs(value):.2g} s")
-    if not told:
+                reported.append(f"{effect.name} of {abs(value):.2g} s")
+    if not reported:
         return None
     return (
-        f"{' and '.join(told)}: shorter than the {least:.2g} s by which time stamps of the records may be wrong (they jitter, or "
-        "signals have clocks of their own), so it may come from the clocks, not from the rig. Record all signals with one clock "
-        "to find out."
+        f"{' and '.join(reported)}: shorter than the {least:.2g} s by which time stamps of the records may be wrong (they "
+        "jitter, or signals have clocks of their own), so it may come from the clocks, not from the rig. Record all signals "
+        "with one clock to find out."
     )
 
 

@@ -70,7 +70,7 @@ class FollowedMotion:
             for record, motion in zip(records, self.motions, strict=True)
         ]
 
-    def left(self, records: Sequence[Record], noise: Floats) -> float:
+    def remainder(self, records: Sequence[Record], noise: Floats) -> float:
         """Return the weighted sum of squares of the sensor residuals of this motion."""
         return float(sum(np.nansum((m.residual / noise) ** 2) for m in self.linearized(records)))
 

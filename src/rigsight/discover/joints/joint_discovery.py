@@ -266,9 +266,9 @@ def _independent(rig: Rig, one: _Polished) -> float:
     """Return the number of independent samples in the held-out errors of all sensors."""
     return sum(
         independent_samples(shown)
-        for left in one.residuals
+        for remainder in one.residuals
         for i in range(len(rig.outputs))
-        if (shown := left[np.isfinite(left[:, i]), i]).size > 1
+        if (shown := remainder[np.isfinite(remainder[:, i]), i]).size > 1
     )
 
 
@@ -282,8 +282,8 @@ def _relative(
         if not shown:
             continue
         spread = float(np.std(np.concatenate(shown))) or 1.0
-        left = np.concatenate([residual[:, i] for residual in chosen.residuals])
-        errors.append(float(np.nanmean(left**2)) / spread**2)
+        remainder = np.concatenate([residual[:, i] for residual in chosen.residuals])
+        errors.append(float(np.nanmean(remainder**2)) / spread**2)
         floors.append((noise[signal.name] / spread) ** 2)
     return float(np.sqrt(np.mean(errors))), float(np.sqrt(np.mean(floors)))
 
@@ -291,8 +291,8 @@ def _relative(
 def _runs(rig: Rig, held_out: Sequence[Record], chosen: _Polished) -> list[Run]:
     """Return the free runs of the completed model on the held-out records, one for each sensor."""
     return [
-        Run(r.name, r.role, r.t, r[signal.name], r[signal.name] - left[:, i], signal.name, signal.unit)
-        for r, left in zip(held_out, chosen.residuals, strict=True)
+        Run(r.name, r.role, r.t, r[signal.name], r[signal.name] - remainder[:, i], signal.name, signal.unit)
+        for r, remainder in zip(held_out, chosen.residuals, strict=True)
         for i, signal in enumerate(rig.outputs)
         if signal.name in r
     ]

@@ -125,9 +125,9 @@ class JointForce:
         """The finding in words."""
         if not self.law.terms:
             return f"No function of the motion of {self.joint} describes the force missing there."
-        told = " and ".join(term.text for term in self.law.terms)
+        reported = " and ".join(term.text for term in self.law.terms)
         return (
-            f"The force missing at {self.joint} is best described by {told}, which explains {self.law.share:.0%} (x and v of "
+            f"The force missing at {self.joint} is best described by {reported}, which explains {self.law.share:.0%} (x and v of "
             f"the joint)."
         )
 
@@ -186,8 +186,8 @@ def missing_forces(
         open_joints, change = _improved(rig, open_joints, records, noise, laws)
         found = tuple(next((new for new in open_joints if new.joint is old.joint), old) for old in found)
         if number + 1 >= _FOR_ALL:
-            least = min(one.left for one in open_joints)
-            open_joints = tuple(one for one in open_joints if one.left <= _RULED_OUT**2 * least)
+            least = min(one.remainder for one in open_joints)
+            open_joints = tuple(one for one in open_joints if one.remainder <= _RULED_OUT**2 * least)
             if change < _SETTLED:
                 break
     first = min(open_joints, key=lambda one: laws[one.joint.name].criterion)
@@ -309,14 +309,14 @@ def _joint_force(
     n_measured: int,
     included: Mapping[str, float],
 ) -> JointForce:
-    told = [
+    reported = [
         sum((force_along(t, one, i, law.parameters) for t in law.terms), start=np.zeros(record.n_samples))
         for i, record in enumerate(records)
     ]
     traces = tuple(
         ForceTrace(r.name, r.t, x, v, force, error, own)
         for r, x, v, force, error, own in zip(
-            records, one.displacement, one.velocity, one.force, one.error, told, strict=True
+            records, one.displacement, one.velocity, one.force, one.error, reported, strict=True
         )
     )
     whole = sum(float(np.sum(trace.force**2)) for trace in traces)
@@ -329,8 +329,8 @@ def _joint_force(
         x_unit=units["x"],
         unit=units["force"],
         traces=traces,
-        share=max(0.0, 1.0 - one.left / before) if before > 0.0 else 0.0,
-        error_over_noise=float(np.sqrt(one.left / n_measured)),
+        share=max(0.0, 1.0 - one.remainder / before) if before > 0.0 else 0.0,
+        error_over_noise=float(np.sqrt(one.remainder / n_measured)),
         standard_error=float(np.sqrt(np.mean(errors**2))),
         law=JointLaw(law.terms, max(0.0, 1.0 - rest / whole) if law.terms and whole > 0.0 else 0.0, included),
         parameters={name: value for name, value in law.parameters.items() if name in own},

@@ -263,10 +263,10 @@ def _law(
     matrix = np.column_stack([base, *(c.column for c in chosen)])
     size = np.linalg.norm(matrix, axis=0)
     solution, *_ = np.linalg.lstsq(matrix / size, projected.target, rcond=1e-12)
-    left = projected.target - (matrix / size) @ solution
+    remainder = projected.target - (matrix / size) @ solution
     inverse = np.linalg.pinv((matrix / size).T @ (matrix / size), rcond=1e-14, hermitian=True)
     # A residual above the noise makes the standard errors larger than the noise alone would.
-    excess = max(1.0, float(left @ left) / projected.independent)
+    excess = max(1.0, float(remainder @ remainder) / projected.independent)
     errors = np.sqrt(np.diag(inverse) * excess) / size
     solution = solution / size
     coefficients = solution[base.shape[1] :]
@@ -294,6 +294,6 @@ def _law(
     return RegressedLaw(
         tuple(term for _, term in terms),
         parameters,
-        regression.criterion(float(left @ left), n_numbers),
+        regression.criterion(float(remainder @ remainder), n_numbers),
         regression.decade,
     )

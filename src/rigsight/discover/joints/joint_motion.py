@@ -63,7 +63,7 @@ class JointMotion:
     velocity: tuple[Floats, ...]
     force: tuple[Floats, ...]
     error: tuple[Floats, ...]
-    left: float
+    remainder: float
 
 
 def noise_of(rig: Rig, noise: Mapping[str, float]) -> Floats:
@@ -229,5 +229,5 @@ def _found(joint: Joint, one: FollowedMotion, records: Sequence[Record], noise: 
         velocity=tuple(v for _, v in moved),
         force=tuple(motion[:, force] for motion in one.motions),
         error=tuple(error[:, force] for error in one.errors),
-        left=one.left(records, noise),
+        remainder=one.remainder(records, noise),
     )

@@ -33,9 +33,9 @@ class SensorRegression:
     logarithms: float  # sum of the logarithms of the variances that the rows were divided by
     decade: float  # common logarithm of that intensity
 
-    def criterion(self, left: float, n_terms: int) -> float:
+    def criterion(self, remainder: float, n_terms: int) -> float:
         """Return the Bayesian information criterion of an equation with a residual sum of squares and a number of terms."""
-        return self.logarithms + left + n_terms * float(np.log(self.projected.independent))
+        return self.logarithms + remainder + n_terms * float(np.log(self.projected.independent))
 
 
 def sensor_regressions(

@@ -179,7 +179,7 @@ def best_loop(
 
     rest = projected.rest
 
-    def left(column: NDArray[np.float64]) -> NDArray[np.float64]:
+    def remainder(column: NDArray[np.float64]) -> NDArray[np.float64]:
         if not np.all(np.isfinite(column)):
             return rest
         column = projected.rest_of(column)
@@ -197,7 +197,7 @@ def best_loop(
                 steps = np.vstack([np.zeros(n_refined), _STEP * np.eye(n_refined)])
                 points = [(*map(float, theta + step), *kept) for step in steps]
                 near = columns_at(points)
-                seen[key] = np.column_stack([left(near[:, i]) for i in range(len(points))])
+                seen[key] = np.column_stack([remainder(near[:, i]) for i in range(len(points))])
             return seen[key]
 
         def here(theta: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -329,9 +329,9 @@ def linear_filter(effect_states: tuple[tuple[sp.Symbol, sp.Expr], ...]) -> Filte
     own = [symbol for symbol, _ in effect_states]
     rates = sp.Matrix([rate for _, rate in effect_states])
     of_states, of_signals = rates.jacobian(own), rates.jacobian(_SIGNALS)
-    left = (rates - of_states * sp.Matrix(own) - of_signals * sp.Matrix(_SIGNALS)).applyfunc(sp.simplify)
+    remainder = (rates - of_states * sp.Matrix(own) - of_signals * sp.Matrix(_SIGNALS)).applyfunc(sp.simplify)
     varying = (of_states.free_symbols | of_signals.free_symbols) & {*own, *_SIGNALS, canonical.t}
-    return None if varying or any(left) else (of_states, of_signals)
+    return None if varying or any(remainder) else (of_states, of_signals)
 
 
 def is_filter(effect: Effect) -> bool:

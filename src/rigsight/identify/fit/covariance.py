@@ -97,9 +97,9 @@ def _interval_factors(
             spread = spread + 2.0 * shares[0] ** 2 + np.sum(shares[1:] ** 2, axis=0)
     freedom = 2.0 * size**2 / np.maximum(spread, np.finfo(np.float64).tiny)
     # The estimate itself took one.
-    left = np.maximum(freedom - 1.0, 1.0)
+    remainder = np.maximum(freedom - 1.0, 1.0)
     quantile = 0.5 + 0.5 * LEVEL
-    return np.asarray((left + 1.0) / left * (t.ppf(quantile, left) / norm.ppf(quantile)) ** 2)
+    return np.asarray((remainder + 1.0) / remainder * (t.ppf(quantile, remainder) / norm.ppf(quantile)) ** 2)
 
 
 def sandwich_covariance(

@@ -113,7 +113,7 @@ def _rig_state(
             state[n : 2 * n] = 0.0
         return state
 
-    def left(moved: Floats) -> Floats:
+    def remainder(moved: Floats) -> Floats:
         z = full(moved)[:, None]
         level = (equations.readings(z, u, p)[seen, 0] - shown[:, 0]) / sizes[:, 0]
         if still:
@@ -121,7 +121,7 @@ def _rig_state(
         slope = (equations.reading_slopes(z, u, p)[seen, 0] - shown[:, 1]) / sizes[:, 1]
         return _finite(np.concatenate([level, slope[sloping], _PULL * moved]))
 
-    return full(least_squares(left, np.zeros(begin.size), max_nfev=_MOST_EVALUATIONS).x)
+    return full(least_squares(remainder, np.zeros(begin.size), max_nfev=_MOST_EVALUATIONS).x)
 
 
 def _of_one_motion(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:

@@ -101,11 +101,11 @@ class FitMemory(Protocol):
 def record_digest(record: Record) -> str:
     """Return a hash of everything that a fit uses of a record."""
     digest = hashlib.blake2b(digest_size=16)
-    told: list[Any] = [record.n_samples, record.dt, record.hold, sorted(record.signals)]
+    reported: list[Any] = [record.n_samples, record.dt, record.hold, sorted(record.signals)]
     # Added only if present, so that outcomes stored before such constants existed remain valid.
-    told += [sorted(record.constants.items())] if record.constants else []
-    told += [sorted(record.observed.items())] if record.observed else []
-    digest.update(json.dumps(told).encode())
+    reported += [sorted(record.constants.items())] if record.constants else []
+    reported += [sorted(record.observed.items())] if record.observed else []
+    digest.update(json.dumps(reported).encode())
     for name in sorted(record.signals):
         digest.update(np.ascontiguousarray(record[name]).tobytes())
     return digest.hexdigest()

@@ -316,7 +316,7 @@ class GreyBoxFit:
         covariance = np.full((n_free, n_free), np.nan)
         if finish:
             try:
-                residuals = tuple(self.data.of_each_record(lambda i: self._left(i, p, states[i])))
+                residuals = tuple(self.data.of_each_record(lambda i: self._remainder(i, p, states[i])))
             except SimulationError as error:
                 return self._failed(problem, theta, str(error))
             cost = float(
@@ -352,7 +352,9 @@ class GreyBoxFit:
         # The bandwidths of an observer come after all other parameters.
         return dict(zip(self.structure.names, map(float, p), strict=False))
 
-    def _left(self, index: int, p: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _remainder(
+        self, index: int, p: NDArray[np.float64], state: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         """Return measured minus accurately simulated outputs of a record."""
         d = self.data.records[index]
         return d.measured - simulate_outputs(

@@ -149,13 +149,13 @@ def _fitted(
         with np.errstate(all="ignore"):
             out = simulate_sets(data.structure, beginning.held, sets, lanes, n_samples, _SUBSTEPS)
             used = np.flatnonzero(beginning.weights > 0.0)
-            left = (beginning.measured[:, used, None] - out[:, used]) * beginning.weights[used, None]
-        left = left.swapaxes(0, 1).reshape(-1, lanes.shape[1])
-        left = np.clip(np.nan_to_num(left, nan=_LARGEST), -_LARGEST, _LARGEST)
+            remainder = (beginning.measured[:, used, None] - out[:, used]) * beginning.weights[used, None]
+        remainder = remainder.swapaxes(0, 1).reshape(-1, lanes.shape[1])
+        remainder = np.clip(np.nan_to_num(remainder, nan=_LARGEST), -_LARGEST, _LARGEST)
         ends = np.cumsum([places.shape[1] for places in asked.values()])[:-1]
         return {
             i: np.vstack([own, _PULL * asked[i]])
-            for i, own in zip(asked, np.split(left, ends, axis=1), strict=True)
+            for i, own in zip(asked, np.split(remainder, ends, axis=1), strict=True)
         }
 
     descents = [_descent(start.size) for start in starts]

@@ -193,11 +193,13 @@ class _Rough:
         if count > 1:
             pieces = pieces[:: max(1, -(-len(pieces) // _MOST_PIECES))]
         problem = GreyBoxFit(compose(self._rig), pieces, scales, self._noise)
-        told = _told(problem.information(start, self._free), self._free)
-        return problem.fit(start, told, None, _ROUGH_EVALUATIONS, tolerance=_ROUGH_TOLERANCE, finish=False)
+        reported = _reported(problem.information(start, self._free), self._free)
+        return problem.fit(
+            start, reported, None, _ROUGH_EVALUATIONS, tolerance=_ROUGH_TOLERANCE, finish=False
+        )
 
 
-def _told(information: Floats, free: Sequence[str]) -> list[str]:
+def _reported(information: Floats, free: Sequence[str]) -> list[str]:
     """Return as many parameters as combinations are determined by the records; they are determined if the others are held."""
     if not np.all(np.isfinite(information)):
         return list(free)
@@ -217,10 +219,10 @@ def _noise(name: str, records: Sequence[Record]) -> float:
     if not held:
         return 1.0
     rough = [record[name] - smooth_motion(record[name], record.dt)[0] for record in held]
-    left = float(np.sqrt(np.mean(np.concatenate(rough) ** 2)))
+    remainder = float(np.sqrt(np.mean(np.concatenate(rough) ** 2)))
     ends = [_end_of_spectrum(record[name]) for record in held]
     size = size_of_signal([record[name] for record in held])
-    return max(left, float(np.median(ends)), _LEAST_NOISE * size) or 1.0
+    return max(remainder, float(np.median(ends)), _LEAST_NOISE * size) or 1.0
 
 
 def _end_of_spectrum(signal: Floats) -> float:

@@ -90,10 +90,10 @@ class LinearizedResponses:
             p = record.p.copy()
             p[self._columns] = values
             with np.errstate(all="ignore"):
-                found.append(self._left(record, middle, p))
+                found.append(self._remainder(record, middle, p))
         return np.nan_to_num(np.concatenate(found), nan=1e6, posinf=1e6, neginf=-1e6)
 
-    def _left(self, record: _Lines, middle: Floats, p: Floats) -> Floats:
+    def _remainder(self, record: _Lines, middle: Floats, p: Floats) -> Floats:
         a, b, c, d = self._matrices(middle, record.mean_inputs, p)
         n = a.shape[0]
         try:
@@ -103,13 +103,13 @@ class LinearizedResponses:
         through = c[record.seen] @ inverse
         driven = (through @ (b @ record.inputs).T[:, :, None])[:, :, 0].T
         answer = driven + d[record.seen] @ record.inputs
-        left = (record.shown - answer) * record.weights
+        remainder = (record.shown - answer) * record.weights
         # End terms: one column for each state, and a constant for each sensor for their aliasing.
         ends = np.moveaxis(through, 0, 1) * record.weights[:, :, None]
         own = np.eye(len(record.seen))[:, None, :] * record.weights[:, :, None]
         columns = np.concatenate([ends, own], axis=2).reshape(-1, n + len(record.seen))
         stacked = np.vstack([columns.real, columns.imag])
-        target = np.concatenate([left.real.ravel(), left.imag.ravel()])
+        target = np.concatenate([remainder.real.ravel(), remainder.imag.ravel()])
         size = np.linalg.norm(stacked, axis=0)
         size[(size == 0.0) | ~np.isfinite(size)] = 1.0
         base, _ = np.linalg.qr(stacked / size)

@@ -65,13 +65,13 @@ def driven_offsets(
     for own, fit, hold in parts:
         held = replace(record, hold=hold)
         found = np.array([fit.values[parameter] for parameter in fit.form.names])
-        left = _unexplained(held, fit, found)
+        remainder = _unexplained(held, fit, found)
         design = np.column_stack(
             [np.ones(record.n_samples), _fading(fit, record.n_samples, record.dt), _errors(held, fit, found)]
         )
-        solved = np.linalg.lstsq(design, left, rcond=None)[0]
+        solved = np.linalg.lstsq(design, remainder, rcond=None)[0]
         values[own] = float(solved[0])
-        residuals.append(left - design @ solved)
+        residuals.append(remainder - design @ solved)
         designs.append(design)
     places = np.cumsum([0, *(design.shape[1] for design in designs)])[:-1]
     stacked = block_diag(*designs)

@@ -140,8 +140,8 @@ class _Problem:
     def errors(self, theta: NDArray[np.float64]) -> NDArray[np.complex128] | NDArray[np.float64]:
         if self.magnitude_only:
             return np.asarray(np.abs(self.values) - np.abs(self.form.response(self.omega, theta)))
-        left = self.values - self.fitted(theta)
-        return left - self.free_motions(theta) @ self._free(theta, left)
+        remainder = self.values - self.fitted(theta)
+        return remainder - self.free_motions(theta) @ self._free(theta, remainder)
 
     def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         return _components(self.errors(theta) * self.weights)
@@ -163,10 +163,10 @@ class _Problem:
             return np.zeros((self.omega.size, 0), dtype=np.complex128)
         return self.measured.free_motions(self.form.poles(theta))
 
-    def _free(self, theta: NDArray[np.float64], left: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def _free(self, theta: NDArray[np.float64], remainder: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return the best weights of the basis of the free motion in what the form leaves, shape (n_motions,)."""
-        basis, left = self.free_motions(theta) * self.weights[:, None], left * self.weights
-        return np.asarray(np.linalg.lstsq(_components(basis), _components(left), rcond=None)[0])
+        basis, remainder = self.free_motions(theta) * self.weights[:, None], remainder * self.weights
+        return np.asarray(np.linalg.lstsq(_components(basis), _components(remainder), rcond=None)[0])
 
     def _with_moving_poles(
         self, theta: NDArray[np.float64], slopes: NDArray[np.complex128]
@@ -281,14 +281,14 @@ class _Problem:
         for omega_b, zeta in itertools.product(np.geomspace(low, high, _GRID_FREQUENCIES), dampings):
             theta = self.form.vector(float(omega_b), float(zeta), 0.0)
             shape = weights * self.form.response(omega, theta)
-            told = (weights * goal).astype(np.complex128)
+            reported = (weights * goal).astype(np.complex128)
             if self.magnitude_only:
                 shape = np.abs(shape).astype(np.complex128)
             else:
                 basis = np.linalg.qr(_components(self.free_motions(theta) * weights[:, None]))[0]
-                shape, told = (_projected(vector, basis) for vector in (shape, told))
+                shape, reported = (_projected(vector, basis) for vector in (shape, reported))
             energy = float(np.sum(np.abs(shape) ** 2))
-            crossed = shape.conj() * told
+            crossed = shape.conj() * reported
             projections = np.real(forward @ crossed)
             if self.magnitude_only:
                 projections = np.maximum(projections, 0.0)
@@ -398,8 +398,8 @@ def _projected(values: NDArray[np.complex128], basis: NDArray[np.float64]) -> ND
     if not basis.size:
         return values
     parts = _components(values)
-    left = (parts - basis @ (basis.T @ parts)).reshape(-1, 2)
-    return np.asarray(left[:, 0] + 1j * left[:, 1])
+    remainder = (parts - basis @ (basis.T @ parts)).reshape(-1, 2)
+    return np.asarray(remainder[:, 0] + 1j * remainder[:, 1])
 
 
 def _scattered_weights(freedom: float) -> float:

@@ -65,7 +65,7 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
         )
     with contextlib.ExitStack() as stack:
         stack.enter_context(_silence())
-        with _told(path, name):
+        with _reported(path, name):
             file = stack.enter_context(_reader(known.key)(path))
             check_count(path.name, len(file.channels))
             check_total(path.name, sum(channel.n_samples for channel in file.channels))
@@ -87,7 +87,7 @@ def _guarded(path: Path, name: str, channel: Channel) -> Channel:
     def guarded(load: Load, n_samples: int, what: str, stored: Stored = AS_STORED) -> Load:
         def checked() -> np.ndarray:
             check_size(path.name, channel.name, n_samples)
-            with _told(path, name):
+            with _reported(path, name):
                 samples = np.asarray(load())
                 if samples.dtype.kind not in "fiub" or samples.ndim != 1:
                     raise ValueError(f"{what} is of type {samples.dtype}, shape {samples.shape}")
@@ -108,7 +108,7 @@ def _guarded(path: Path, name: str, channel: Channel) -> Channel:
 
 
 @contextlib.contextmanager
-def _told(path: Path, name: str) -> Iterator[None]:
+def _reported(path: Path, name: str) -> Iterator[None]:
     """Turn whatever a library raises over a damaged file into one message."""
     try:
         yield
@@ -125,8 +125,8 @@ def _told(path: Path, name: str) -> Iterator[None]:
             "Split it into several records."
         ) from None
     except Exception as error:
-        told = str(error) if isinstance(error, ReadingError) else f"{type(error).__name__}: {error}"
-        reason = " ".join(told.split())[:200].removesuffix(":")
+        reported = str(error) if isinstance(error, ReadingError) else f"{type(error).__name__}: {error}"
+        reason = " ".join(reported.split())[:200].removesuffix(":")
         raise InputError(
             f"{path.name} cannot be read as {name}: the file is truncated or damaged ({reason}). {MEND}"
         ) from None

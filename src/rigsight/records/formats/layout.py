@@ -76,11 +76,11 @@ def find_layout(
     wanted: Collection[str] = (),
 ) -> Layout:
     """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out."""
-    looked_at = [lines[number - 1] for number in kept[:MOST_HEAD]]
+    examined = [lines[number - 1] for number in kept[:MOST_HEAD]]
     last = [lines[number - 1] for number in kept[MOST_HEAD:][-LAST_LINES:]]
-    dialect = sniff([*looked_at, *last], separator, decimal)
+    dialect = sniff([*examined, *last], separator, decimal)
     try:
-        head = find_head(dialect, [*looked_at, *last], wanted, header, lambda i: kept[i])
+        head = find_head(dialect, [*examined, *last], wanted, header, lambda i: kept[i])
     except UnclearHeadError as error:
         raise InputError(f"{path.name}: {error}") from None
     first_row = kept[min(head.first_row, len(kept) - 1)]

@@ -216,12 +216,12 @@ def _check_widths(path: Path, texts: Sequence[str], rows: Sequence[int], layout:
         n_cells = len(text.split()) if separator == " " else text.count(separator) + 1
         if n_cells != width and (n_cells := len(layout.dialect.cells(text))) != width:
             ends = number == rows[-1]
-            mend = (
+            remedy = (
                 "The file ends there: delete the incomplete line."
                 if ends
                 else "Correct the line, or specify separator and decimal sign."
             )
-            raise InputError(f"{path.name}, line {number}: {n_cells} columns, but {width} above it. {mend}")
+            raise InputError(f"{path.name}, line {number}: {n_cells} columns, but {width} above it. {remedy}")
 
 
 def _report_culprit(

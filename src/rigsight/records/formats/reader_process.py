@@ -54,7 +54,7 @@ def main(kind: str, path: Path) -> None:
                 what, index = line.split()
                 load = file.channels[int(index)].load if what == "channel" else axes[int(index)].stamps
                 # One channel that cannot be read says nothing of the others.
-                with _told(answers):
+                with _reported(answers):
                     samples = np.ascontiguousarray(load())
                     data = samples.tobytes()
                     _answer(answers, {"type": samples.dtype.str, "n_bytes": len(data)}, data)
@@ -76,7 +76,7 @@ def limit_memory(more: int) -> None:
 
 
 @contextlib.contextmanager
-def _told(answers: IO[bytes]) -> Iterator[None]:
+def _reported(answers: IO[bytes]) -> Iterator[None]:
     try:
         yield
     except Exception as error:

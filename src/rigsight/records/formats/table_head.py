@@ -108,7 +108,7 @@ def find_head(
 ) -> Head:
     """Return what stands above the rows of numbers of a text."""
     if isinstance(header, int) and not isinstance(header, bool):
-        return _told(dialect, lines, header, number_of)
+        return _reported(dialect, lines, header, number_of)
     shape = RowShape.of(dialect, lines)
     rows = shape.first_rows(lines)
     if not rows:
@@ -137,7 +137,7 @@ def without_comment(names: Sequence[str], width: int) -> Sequence[str]:
     return names[:-1] if len(names) == width + 1 and names[-1] == _REMARKS else names
 
 
-def _told(dialect: Dialect, lines: Sequence[str], header: int, number_of: Callable[[int], int]) -> Head:
+def _reported(dialect: Dialect, lines: Sequence[str], header: int, number_of: Callable[[int], int]) -> Head:
     numbers = [number_of(i) for i in range(min(len(lines), MOST_HEAD))]
     if header not in numbers:
         raise UnclearHeadError(f"header = {header}: that line is blank, a comment, or not there.")

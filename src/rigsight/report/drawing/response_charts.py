@@ -15,7 +15,7 @@ from rigsight.report.drawing.charts import Chart, ChartPanel, Curve, chart_data,
 from rigsight.report.drawing.figures import PageFigure
 from rigsight.report.drawing.record_drawings import overlaid_drawing, response_drawing
 from rigsight.report.responses import PathResponse
-from rigsight.report.wording import sentence_case, told_unit
+from rigsight.report.wording import sentence_case, unit_text
 
 _BELOW = 3.0
 """Decibel below the lowest measured line that are still shown, and above the highest."""
@@ -92,12 +92,12 @@ def amplitude_figures(
 def _overlaid(
     labeled: list[tuple[str, PathResponse]], stage: Stage, name: str, arrow: str, key: str
 ) -> PageFigure:
-    told = ", ".join(f"{response.decibel[stage]:.2g} dB at {label}" for label, response in labeled)
-    alt = f"Magnitude of {arrow} at each amplitude, measured against {name}. RMS distance: {told}."
+    reported = ", ".join(f"{response.decibel[stage]:.2g} dB at {label}" for label, response in labeled)
+    alt = f"Magnitude of {arrow} at each amplitude, measured against {name}. RMS distance: {reported}."
     return PageFigure(
         key,
         overlaid_drawing(sentence_case(name), labeled, stage, key, alt),
-        f"Measured (solid) against {name} (dashed). RMS distance: {told}.",
+        f"Measured (solid) against {name} (dashed). RMS distance: {reported}.",
     )
 
 
@@ -114,7 +114,7 @@ def _by_amplitude(
     for amplitude, record in known:
         for response in responses.get(record, ()):
             if response.path == path:
-                label = f"{amplitude:.4g} {told_unit(unit)}".strip()
+                label = f"{amplitude:.4g} {unit_text(unit)}".strip()
                 again = sum(own.split(" (")[0] == label for own in labels) + 1
                 labels.append(label if again == 1 else f"{label} ({again})")
                 found.append((labels[-1], response))

@@ -69,16 +69,16 @@ def _named(rig: Rig, where: str) -> list[tuple[str, bool]]:
 
 
 def _caption(marks: Mapping[str, plot.PlaceMark], rig: Rig) -> str:
-    told = "The rig: drives and sensors on the left, what moves in the middle, joints to the ground on the right."
+    reported = "The rig: drives and sensors on the left, what moves in the middle, joints to the ground on the right."
     laws = [*(drive.signal for drive in rig.mechanism.drives), *rig.mechanism.signals.values()]
     if any(
         reading_symbol(sensor.name) in law.free_symbols for sensor in rig.mechanism.sensors for law in laws
     ):
-        told += " Dashed: read by a control law."
+        reported += " Dashed: read by a control law."
     named = [name for name, mark in marks.items() if mark.label]
     others = [name for name, mark in marks.items() if not mark.label]
     if named:
-        told += f" Marked: {listed(named)}."
+        reported += f" Marked: {listed(named)}."
     if others:
-        told += f" Paler, also possible: {listed(others)}."
-    return told
+        reported += f" Paler, also possible: {listed(others)}."
+    return reported

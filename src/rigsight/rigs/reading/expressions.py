@@ -122,7 +122,7 @@ def parsed(text: str) -> Expression:
     try:
         tree = _parser().parse(text)
     except UnexpectedInput as error:
-        raise _told(error, text) from None
+        raise _reported(error, text) from None
     if not isinstance(tree, Tree):
         raise ExpressionError("this is not an expression")
     if _depth(tree) > _DEEPEST_TREE:
@@ -163,7 +163,7 @@ def _parser() -> Lark:
     return Lark(_GRAMMAR, start="sum", parser="lalr", maybe_placeholders=False)
 
 
-def _told(error: UnexpectedInput, text: str) -> ExpressionError:
+def _reported(error: UnexpectedInput, text: str) -> ExpressionError:
     place = len(text.rstrip())
     if (isinstance(error, UnexpectedToken) and error.token.type == "$END") or isinstance(
         error, UnexpectedEOF
@@ -180,13 +180,14 @@ def _told(error: UnexpectedInput, text: str) -> ExpressionError:
     if text[max(place - 1, 0) : place + 1] == "**":
         return ExpressionError("powers are written with ^", place - 1)
     before = text[:place].rstrip()[-1:]
-    mend = (
+    remedy = (
         " (a product needs *)"
         if found and (found.isalnum() or found in "(_") and (before.isalnum() or before in ")_")
         else ""
     )
     return ExpressionError(
-        f"'{error.token if isinstance(error, UnexpectedToken) else found}' is not expected here{mend}", place
+        f"'{error.token if isinstance(error, UnexpectedToken) else found}' is not expected here{remedy}",
+        place,
     )
 
 

@@ -59,7 +59,7 @@ def _within_lists(keys: Path, lists: Mapping[Path, int]) -> Path:
     return (*path, *keys[-1:])
 
 
-_MENDS = {
+_REMEDIES = {
     "Invalid value": "put text and expressions in quotes",
     "Illegal character '\\n'": "a quotation mark is missing at the end of the line",
     "Cannot overwrite a value": "the key occurs twice in its table",
@@ -75,8 +75,8 @@ def toml_error(error: tomllib.TOMLDecodeError) -> str:
     found = _POSITION.fullmatch(str(error))
     if found is None:
         return f": is not valid TOML: {error}."
-    mend = next((mend for start, mend in _MENDS.items() if found["what"].startswith(start)), "")
-    return f", {found['place']}: is not valid TOML: {found['what']}{f'; {mend}' if mend else ''}."
+    remedy = next((remedy for start, remedy in _REMEDIES.items() if found["what"].startswith(start)), "")
+    return f", {found['place']}: is not valid TOML: {found['what']}{f'; {remedy}' if remedy else ''}."
 
 
 def _keys(written: str) -> Path:

@@ -148,7 +148,7 @@ def draft_rig(
     tables: dict[str, Any] = {
         "name": rig_name,
         "summary": "From a MuJoCo model.",
-        "inputs": {drive.told: drive.control for drive in drives},
+        "inputs": {drive.reported: drive.control for drive in drives},
         "constants": {},
         "parameters": numbers.parameters,
         "coordinates": {q: {"unit": way_unit(joint)} for joint, q in zip(joints, coordinates, strict=True)},
@@ -172,7 +172,7 @@ def draft_rig(
             if joint.index in plays
         },
         {drive.name: drive.index for drive in drives},
-        {drive.told: drive.control_index for drive in drives},
+        {drive.reported: drive.control_index for drive in drives},
         {name: sensor.index for name, sensor, _ in shown},
         numbers.fields,
         numbers.values,

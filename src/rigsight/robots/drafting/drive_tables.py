@@ -20,7 +20,7 @@ class DriveTables:
     name: str
     table: Mapping[str, Any]
     # ``[inputs.NAME]``, its command.
-    told: str
+    reported: str
     control: Mapping[str, Any]
     # Numbers of the actuator and of its control; -1 for a drive that was added.
     index: int = -1
@@ -31,11 +31,11 @@ class DriveTables:
 def plain_drive(joint: TreeJoint, coordinate: str, names: Names) -> DriveTables:
     """Return a force or torque at a joint."""
     name = names.free(f"{coordinate}_motor")
-    told = names.free(f"{coordinate}_{'force' if joint.slides else 'torque'}")
+    reported = names.free(f"{coordinate}_{'force' if joint.slides else 'torque'}")
     return DriveTables(
         name,
-        {"signal": told, "force": name, "along": coordinate},
-        told,
+        {"signal": reported, "force": name, "along": coordinate},
+        reported,
         {"unit": force_unit(joint), "about": f"drives {coordinate}"},
     )
 
@@ -51,20 +51,20 @@ def drive_of(
     # Actuators are mostly called as their joints are.
     wished = f"{coordinate}_motor" if actuator.name in ("", coordinate) else actuator.name
     name = names.free(wished, "actuator")
-    told = names.free(f"{name}_ctrl")
+    reported = names.free(f"{name}_ctrl")
 
     def own(attribute: str, entry: int = 0, sign: float = 1.0) -> Field:
         return Field("actuator", actuator.index, attribute, entry, sign)
 
     gear = numbers.factor(f"{name}_gear", actuator.gear, f"gear of {name}", own("gear"))
     unit, terms = _law(actuator, joint, name, f"{gear}{coordinate}", f"{gear}d({coordinate})", numbers)
-    signal = told
+    signal = reported
     if actuator.control_range is not None:
         low, high = (
             numbers.constant(f"{name}_{what}", end, unit, f"{what} control of {name}", own("ctrlrange", i))
             for i, (what, end) in enumerate(zip(("lowest", "highest"), actuator.control_range, strict=True))
         )
-        signal = f"clip({told}, {low}, {high})"
+        signal = f"clip({reported}, {low}, {high})"
     states: dict[str, Any] = {}
     acting = name
     if actuator.time_constant > 0.0:
@@ -89,7 +89,7 @@ def drive_of(
     geared = f"{gear}({force})" if gear and not force.isidentifier() else f"{gear}{force}"
     table = {"signal": signal, "force": geared, "along": coordinate}
     control = {"unit": unit, "about": f"control of {name}"}
-    return DriveTables(name, table, told, control, actuator.index, actuator.control, states)
+    return DriveTables(name, table, reported, control, actuator.index, actuator.control, states)
 
 
 def _law(

@@ -127,7 +127,7 @@ def _effects(
     for effect in model.effects:
         place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
         values = structure.values_of(effect, model.values)
-        told = f"{kind} at {place} ({', '.join(f'{own} = {value:.4g}' for own, value in values.items())})"
+        reported = f"{kind} at {place} ({', '.join(f'{own} = {value:.4g}' for own, value in values.items())})"
         joint = draft.joints.get(place, joints_of_drives.get(place, -1))
         match kind:
             case "coulomb_friction" if joint >= 0:
@@ -141,6 +141,6 @@ def _effects(
                 steps = round(values["T_d"] / step)
                 settings.by_joint[joint] |= {"min_delay": steps, "max_delay": steps}
             case _:
-                settings.without_field.append(told)
+                settings.without_field.append(reported)
                 continue
-        settings.written.append(told)
+        settings.written.append(reported)

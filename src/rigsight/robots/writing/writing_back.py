@@ -235,9 +235,9 @@ class _Writer:
         ]
         play = structure.values_of(loose[0], model.values)["g"] if loose else 0.0
         name = add_second_joint(self._spec, first, stiffness, damping, play)
-        told = f", range +-{play:.4g} (free_play at {place})" if play > 0.0 else ""
+        reported = f", range +-{play:.4g} (free_play at {place})" if play > 0.0 else ""
         self._written.append(
-            f"joint '{name}' behind '{first.name}': stiffness {stiffness:.4g}, damping {damping:.4g}{told}"
+            f"joint '{name}' behind '{first.name}': stiffness {stiffness:.4g}, damping {damping:.4g}{reported}"
         )
 
     def write_effect(self, effect: Effect, model: Model) -> None:
@@ -247,18 +247,18 @@ class _Writer:
         place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
         values = structure.values_of(effect, model.values)
         numbers = ", ".join(f"{own} = {value:.4g}" for own, value in values.items())
-        told = f"{kind} at {place} ({numbers})"
+        reported = f"{kind} at {place} ({numbers})"
         field = EFFECT_FIELDS.get(kind)
         places = {"joint": self._draft.joints, "actuator": self._draft.drives, "sensor": self._draft.sensors}
         index = -1 if field is None else places[field.element].get(place, -1)
         if field is None or index < 0:
-            self._without_field.append(told)
+            self._without_field.append(reported)
             return
         refused = field.write(self._elements[field.element][index], values, self._compiled.opt)
         if refused is None:
-            self._written.append(f"{self._called(field.element, index)} {field.attribute}: {told}")
+            self._written.append(f"{self._called(field.element, index)} {field.attribute}: {reported}")
         else:
-            self._without_field.append(f"{told}: {refused}")
+            self._without_field.append(f"{reported}: {refused}")
 
     def _called(self, element: str, index: int) -> str:
         return f"{element} '{self._elements[element][index].name or index}'"

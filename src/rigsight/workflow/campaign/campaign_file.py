@@ -100,12 +100,12 @@ def locate(campaign: Path) -> Path:
     if path.is_file():
         return path
     others = ", ".join(sorted(other.name for other in campaign.glob("*.toml"))[:10])
-    mend = (
+    remedy = (
         f"Name one of its files: {others}."
         if others
         else f"Write one beside the records; 'rigsight init {campaign}' makes a draft."
     )
-    raise InputError(f"Folder {campaign} contains no campaign.toml. {mend}")
+    raise InputError(f"Folder {campaign} contains no campaign.toml. {remedy}")
 
 
 def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
@@ -118,7 +118,7 @@ def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
         text = path.read_text(encoding="utf-8-sig")
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path.name} is not valid TOML: {error}. {_mend(str(error))}") from None
+        raise InputError(f"{path.name} is not valid TOML: {error}. {_remedy(str(error))}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
     except OSError as error:
@@ -139,9 +139,11 @@ def checked_file(where: Where, data: dict[str, Any], table: type[Checked]) -> Ch
     try:
         return table.model_validate(data)
     except ValidationError as error:
-        told = _messages(where, data, table, [dict(problem) for problem in error.errors(include_url=False)])
-        more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
-        raise InputError("\n".join(told[:5]) + more) from None
+        reported = _messages(
+            where, data, table, [dict(problem) for problem in error.errors(include_url=False)]
+        )
+        more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
+        raise InputError("\n".join(reported[:5]) + more) from None
 
 
 def _messages(
@@ -149,12 +151,12 @@ def _messages(
 ) -> list[str]:
     """Return one line per error; if one alternative fails in detail, the errors of the other alternatives are left out."""
     keys = [_without_union_members(problem["loc"], data) for problem in problems]
-    told = [
+    reported = [
         _tell(where, data, table, problem)
         for problem, key in zip(problems, keys, strict=True)
         if not any(len(other) > len(key) and other[: len(key)] == key for other in keys)
     ]
-    return list(dict.fromkeys(told))
+    return list(dict.fromkeys(reported))
 
 
 def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
@@ -238,7 +240,7 @@ def _how_to_write(location: tuple[str | int, ...]) -> str:
     }.get(str(location[-1]), "")
 
 
-def _mend(error: str) -> str:
+def _remedy(error: str) -> str:
     """Return a hint for the most frequent TOML errors in campaigns."""
     if "Cannot declare" in error or "Cannot overwrite" in error or "Cannot mutate" in error:
         return (

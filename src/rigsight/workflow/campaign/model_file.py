@@ -116,9 +116,9 @@ def _checked_table(path: Path, data: dict[str, Any]) -> ModelTable:
     try:
         return ModelTable.model_validate(data)
     except ValidationError as error:
-        told = [_tell(path, problem) for problem in map(dict, error.errors(include_url=False))]
-        more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
-        raise InputError("\n".join(told[:5]) + more) from None
+        reported = [_tell(path, problem) for problem in map(dict, error.errors(include_url=False))]
+        more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
+        raise InputError("\n".join(reported[:5]) + more) from None
 
 
 def _tell(path: Path, problem: dict[str, Any]) -> str:

@@ -134,12 +134,12 @@ def identify_any_rig(
     units = {p.name: p.unit for p in structure.parameters}
     units |= {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
     statement, changing = amplitude_dependence(found, units)
-    told = None
+    reported = None
     if known is not None:
         fit, windows = joint.fit, cut(records, length)
         scales = characteristic_scales(rig, windows, fit.fit.values)
         remedies = helpful_sensors(structure, windows, scales, fit.noise, fit.fit)
-        told = replace(identifiability(known), remedies=remedies)
+        reported = replace(identifiability(known), remedies=remedies)
     reached = () if known is None else reached_bounds(known, errors)
     identification = Identification(
         title=campaign.title,
@@ -160,7 +160,7 @@ def identify_any_rig(
         ),
         reached=reached,
         views=views,
-        identifiability=told,
+        identifiability=reported,
         meanings={parameter.name: parameter.description for parameter in structure.parameters},
     )
     stage.finished("poles and responses")

@@ -31,13 +31,13 @@ SCHEMA_VERSION = 1
 def identification_json(identification: Identification, figures: Mapping[str, str]) -> dict[str, Any]:
     """Return the content of ``identification.json``."""
     units = identification.units
-    told = identification.identifiability
+    reported = identification.identifiability
     # Rigs of one motion with transfer functions of their own have neither.
     of_any_rig = (
         {}
-        if told is None
+        if reported is None
         else {
-            "identifiability": identifiability_json(told),
+            "identifiability": identifiability_json(reported),
             "linear": [view_json(view, units) for view in identification.views],
         }
     )

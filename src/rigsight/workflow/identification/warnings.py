@@ -43,16 +43,16 @@ def out_of_band(
     low, high = driven_band(found.record, motion.source)
     if low <= omega_0 <= high:
         return found
-    told = (
+    reported = (
         f"this record excites '{motion.source}' from {low:.3g} to {high:.3g} rad/s, but the other records show a resonance at "
         f"{omega_0:.3g} rad/s. Measure again with excitation there."
     )
-    path = replace(motion, problem=told)
+    path = replace(motion, problem=reported)
     rest = tuple(text for text in found.warnings if motion.problem not in text)
     return replace(
         found,
         paths=(path, *found.paths[1:]),
-        warnings=(f"{motion.source} -> {motion.response}: {told}", *rest),
+        warnings=(f"{motion.source} -> {motion.response}: {reported}", *rest),
     )
 
 
@@ -70,38 +70,38 @@ def campaign_warnings(
     joint: JointIdentification,
 ) -> list[str]:
     """Return the notes of the records, of their identifications and of the joint fit, a sentence each."""
-    told = list(campaign.notes)
-    told += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
-    told += closed_loop_notes(campaign.records, campaign.rig, _OF_EACH_RECORD)
-    told += [f"Record '{r.record.name}': {text}" for r in found for text in r.warnings]
-    told += _not_the_whole(found)
-    told += [f"Record '{name}' was left out of the joint fit." for name in joint.left_out]
+    reported = list(campaign.notes)
+    reported += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
+    reported += closed_loop_notes(campaign.records, campaign.rig, _OF_EACH_RECORD)
+    reported += [f"Record '{r.record.name}': {text}" for r in found for text in r.warnings]
+    reported += _not_the_whole(found)
+    reported += [f"Record '{name}' was left out of the joint fit." for name in joint.left_out]
     if joint.pooled is None and campaign.rig.downstream and "c_y" not in joint.names:
         missing = ", ".join(symbol.name for symbol in campaign.rig.downstream)
         names = ", ".join(
             p.name for p in campaign.rig.parameters if p.name in campaign.rig.downstream_parameters
         )
-        told.append(
+        reported.append(
             f"No estimation record has {missing}: {names} in the model are given or "
             "placeholders, not identified."
         )
     if not joint.fit.fit.success:
-        told.append(joint.statement)
-    return told
+        reported.append(joint.statement)
+    return reported
 
 
 def any_rig_warnings(
     campaign: Campaign, views: Sequence[LinearView], joint: JointIdentification
 ) -> list[str]:
     """Return the notes on records, responses, poles and fit of a general rig, a sentence each."""
-    told = list(campaign.notes)
-    told += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
-    told += closed_loop_notes(campaign.records, campaign.rig, _NOT_OF_ANY_RIG)
+    reported = list(campaign.notes)
+    reported += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
+    reported += closed_loop_notes(campaign.records, campaign.rig, _NOT_OF_ANY_RIG)
     for view in views:
-        told += _of_view(view, [effect.name for effect in campaign.modelled])
+        reported += _of_view(view, [effect.name for effect in campaign.modelled])
     if not joint.fit.fit.success:
-        told.append(joint.statement)
-    return list(dict.fromkeys(told))
+        reported.append(joint.statement)
+    return list(dict.fromkeys(reported))
 
 
 def offsets_of_records(
@@ -114,27 +114,27 @@ def offsets_of_records(
     names = [record.origin for record in fitted]
     if not fit.offset_names:
         found = differing_means(names, fitted, fit.residuals, list(units))
-        return [f"{told.sentence(units[told.output])} {OFFSETS_MEND}" for told in found]
-    told = []
+        return [f"{reported.sentence(units[reported.output])} {OFFSETS_MEND}" for reported in found]
+    reported = []
     for output in fit.offset_names:
         own: dict[str, list[float]] = {}
         for index, record in enumerate(fitted):
             if output in record:
                 own.setdefault(names[index], []).append(fit.offsets(index)[output])
         listed = ", ".join(f"'{name}' {np.mean(values):.4g}" for name, values in own.items())
-        told.append(
+        reported.append(
             f"Offset of {output} in each record [{units[output]}], estimated and not part of the model: {listed}."
         )
     if held:
         values = ", ".join(f"{name} = {value:.4g}" for name, value in held.items())
-        told.append(
+        reported.append(
             f"{values} {'are' if len(held) > 1 else 'is'} held: not identifiable if each record has its own offset."
         )
-    return told
+    return reported
 
 
 def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
-    told = []
+    reported = []
     where = (
         f" ({', '.join(f'{name} = {value:g}' for name, value in view.constants.items())})"
         if view.constants
@@ -142,19 +142,19 @@ def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
     )
     near_rest = view.linearization
     if not near_rest.rests:
-        told.append(
+        reported.append(
             f"The rig has no equilibrium at the mean input{where}: poles and responses are those of the state closest to rest."
         )
     if near_rest.stability == "unstable":
-        told.append(
+        reported.append(
             f"The equilibrium of the rig is unstable{where}. Records are fitted in short windows with their own initial states; "
             "frequency responses of an unstable rig are meaningful only if an external controller stabilizes it."
         )
     if view.measured is None:
-        return told
+        return reported
     # The transient of a rig that does not return to rest does not decay within a record: its responses are no evidence.
     returns = near_rest.stability == "stable"
-    told += [
+    reported += [
         f"{source} -> {response}{where}: {problem}"
         for (source, response), problem in view.measured.problems.items()
     ]
@@ -171,16 +171,16 @@ def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
             else "Either the motion is too large for a linear model, or an effect is missing. The nonlinear fit in the time "
             "domain shows which; 'rigsight diagnose' finds missing effects."
         )
-        told.append(
+        reported.append(
             f"The residual of the linearized equations is larger than the noise{where}, by these factors: {', '.join(beside)}. "
             f"{why}"
         )
-    return told
+    return reported
 
 
 def _not_the_whole(found: Sequence[RecordIdentification]) -> list[str]:
     """Report the paths on which the residual of the fitted form is far above the noise."""
-    told = []
+    reported = []
     for first in {(path.source, path.response): path for r in found for path in r.paths}.values():
         misfits = [
             path.fit.misfit
@@ -191,12 +191,12 @@ def _not_the_whole(found: Sequence[RecordIdentification]) -> list[str]:
         if misfits:
             form = "PT1" if first.response == "y" else "linear equation"
             span = f"{min(misfits):.3g} to {max(misfits):.3g}" if len(misfits) > 1 else f"{misfits[0]:.3g}"
-            told.append(
+            reported.append(
                 f"{first.source} -> {first.response}: the model order of the {form} is too low, or an effect is missing. "
                 f"In {len(misfits)} of {len(found)} records its residual is {span} times the noise. 'rigsight diagnose' finds "
                 "missing effects."
             )
-    return told
+    return reported
 
 
 def beyond_identified_amplitudes(campaign: Campaign, joint: JointIdentification) -> list[str]:
@@ -212,7 +212,7 @@ def beyond_identified_amplitudes(campaign: Campaign, joint: JointIdentification)
     identified: dict[str, list[float]] = {}
     for size, name in map(amplitude, fitted):
         identified.setdefault(name, []).append(size)
-    told = []
+    reported = []
     for record in campaign.validation:
         size, name = amplitude(record)
         unit = units[name]
@@ -221,8 +221,8 @@ def beyond_identified_amplitudes(campaign: Campaign, joint: JointIdentification)
             continue
         one = math.isclose(low, high, rel_tol=_TOLERANCE)
         span = f"{low:.3g} {unit}" if one else f"{low:.3g} to {high:.3g} {unit}"
-        told.append(
+        reported.append(
             f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, outside the identified range ({span}): "
             "its score shows how well the model extrapolates, not how well it was identified."
         )
-    return told
+    return reported

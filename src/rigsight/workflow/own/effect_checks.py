@@ -147,7 +147,9 @@ def null_gives_the_rig(effect: Effect) -> str | None:
         return None
     changed = _difference(with_effect[bench.output], plain)
 
-    return f"with {_told(null)} the simulation differs from that of the rig without the effect: {changed}."
+    return (
+        f"with {_reported(null)} the simulation differs from that of the rig without the effect: {changed}."
+    )
 
 
 def vanishes_continuously(effect: Effect) -> str | None:
@@ -164,7 +166,7 @@ def vanishes_continuously(effect: Effect) -> str | None:
     if np.max(np.abs(with_effect - plain)) <= _CONTINUOUS * np.max(np.abs(plain)):
         return None
     return (
-        f"close to its null values ({_told(near)}) the simulation is not close to that of the rig without the effect: "
+        f"close to its null values ({_reported(near)}) the simulation is not close to that of the rig without the effect: "
         f"it differs {_difference(with_effect, plain)}. The effect must vanish continuously at its null values."
     )
 
@@ -182,7 +184,7 @@ def gives_no_energy(effect: Effect) -> str | None:
             verb = "generates" if taken < 0.0 else "dissipates"
             return (
                 f"it is declared {effect.energy.value}, but {verb} {abs(taken):.1%} of the work of a cycle "
-                f"({_told({p.name: values[p.name] for p in effect.parameters})}). Check the sign: a torque opposes motion."
+                f"({_reported({p.name: values[p.name] for p in effect.parameters})}). Check the sign: a torque opposes motion."
             )
     return None
 
@@ -231,7 +233,9 @@ def finite_where_searched(effect: Effect) -> str | None:
             finite = may_escape
         if not finite:
             own = {p.name: values[p.name] for p in effect.parameters}
-            return f"it cannot be simulated at {_told(own)}, which is inside its search ranges; narrow them."
+            return (
+                f"it cannot be simulated at {_reported(own)}, which is inside its search ranges; narrow them."
+            )
     return None
 
 
@@ -337,7 +341,7 @@ def failed_checks(effect: Effect) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _told(values: dict[str, float]) -> str:
+def _reported(values: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
 
 

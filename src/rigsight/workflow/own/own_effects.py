@@ -100,7 +100,7 @@ def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
 
 def equation_text(effect: Effect) -> str:
     """Return the equation of an effect in one line of plain text, shortened if it is long."""
-    told = {
+    reported = {
         "torque": "resisting torque = {}",
         "spring": "spring torque = {}",
         "deflection": "deflection of the spring = {}",
@@ -110,7 +110,7 @@ def equation_text(effect: Effect) -> str:
         "measured": "measured = {}",
         "reading_delay": "measured = reading(t - {})",
     }
-    lines = [told[field].format(text(expression, {})) for field, expression in equations(effect).items()]
+    lines = [reported[field].format(text(expression, {})) for field, expression in equations(effect).items()]
     for state in effect.states:
         limit = "" if state.limit is None else f" within +-{text(state.limit, {})}"
         lines.append(f"{state.symbol}' = {text(state.rate, {})}{limit}")

@@ -17,7 +17,7 @@ _VERSIONS_OF = ("rigsight", "numpy", "scipy")
 LARGEST_FILE = 10_000_000
 
 
-def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
+def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
     """Return the object that a file holds."""
     try:
         if file_size(path) > LARGEST_FILE:
@@ -33,15 +33,15 @@ def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
         data = json.loads(text, object_pairs_hook=_without_repeated_keys, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:
         raise InputError(
-            f"{path.name}, line {error.lineno}, column {error.colno}: is not valid JSON: {error.msg}. {mend}"
+            f"{path.name}, line {error.lineno}, column {error.colno}: is not valid JSON: {error.msg}. {remedy}"
         ) from None
     except RecursionError:
-        raise InputError(f"{path.name}: is nested too deeply for a {what}. {mend}") from None
+        raise InputError(f"{path.name}: is nested too deeply for a {what}. {remedy}") from None
     except (_MeaninglessError, ValueError) as error:
         raise InputError(f"{path.name}: {error}") from None
     if not isinstance(data, dict):
         raise InputError(
-            f"{path.name}: must contain one object in braces, got a {type(data).__name__}. {mend}"
+            f"{path.name}: must contain one object in braces, got a {type(data).__name__}. {remedy}"
         )
     return data
 

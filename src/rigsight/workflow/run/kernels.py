@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from joblib import Parallel, delayed
 
-from rigsight.diagnose import candidates_on, structures_of_lineup
+from rigsight.diagnose import candidates_on, structures_of_shortlist
 from rigsight.effects import Effect
 from rigsight.errors import check_in_range
 from rigsight.rigs import Rig
@@ -33,7 +33,7 @@ def structures_to_try(
 ) -> list[Structure]:
     """Return the structures that a diagnosis simulates first: as modelled, pushed at every place, and each effect by itself."""
     offered = candidates_on(rig, effects, modelled)
-    return [compose(rig, modelled), *structures_of_lineup(rig, offered, modelled)]
+    return [compose(rig, modelled), *structures_of_shortlist(rig, offered, modelled)]
 
 
 def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: Listener = silent) -> None:

@@ -83,7 +83,7 @@ def check_writable(folder: Path, *names: str) -> None:
         for name in names:
             _check_replaceable(folder / name)
     except OSError as error:
-        raise _told(folder, error) from None
+        raise _reported(folder, error) from None
 
 
 def check_target(file: Path) -> None:
@@ -93,7 +93,7 @@ def check_target(file: Path) -> None:
 
 
 def write_together(
-    folder: Path, contents: Mapping[str, str | bytes], mend: str = ELSEWHERE
+    folder: Path, contents: Mapping[str, str | bytes], remedy: str = ELSEWHERE
 ) -> tuple[Path, ...]:
     """Write files into a folder, all of them or none; files of these names are replaced.
 
@@ -138,7 +138,7 @@ def write_together(
                 if path.is_dir() and not any(path.iterdir()):
                     path.rmdir()
         if isinstance(error, OSError):
-            raise _told(folder, error, mend) from None
+            raise _reported(folder, error, remedy) from None
         raise
     return tuple(folder / name for name in contents)
 
@@ -212,11 +212,11 @@ def _check_replaceable(file: Path) -> None:
         raise InputError(f"Cannot write {file}: it is a device or a pipe, not a regular file. Name a file.")
 
 
-def _told(folder: Path, error: OSError, mend: str = ELSEWHERE) -> InputError:
+def _reported(folder: Path, error: OSError, remedy: str = ELSEWHERE) -> InputError:
     if isinstance(error, FileExistsError | NotADirectoryError):
         return InputError(f"Cannot write results to {folder}: a file is in the way. Name another folder.")
     reason = _REASONS.get(error.errno or 0, error.strerror or str(error))
-    return MachineError(f"Cannot write results to {folder}: {reason}. {mend}")
+    return MachineError(f"Cannot write results to {folder}: {reason}. {remedy}")
 
 
 def temporary_path(target: Path, token: str, ending: str) -> Path:

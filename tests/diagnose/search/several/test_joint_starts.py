@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.several.joint_starts import with_joint_starts
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
 from rigsight.effects import effect_named
@@ -36,7 +36,7 @@ def context() -> FitContext:
 
 
 @pytest.fixture(scope="module")
-def grown(context: FitContext) -> tuple[Scored, list[Scored], Scored]:
+def grown(context: FitContext) -> tuple[FittedModel, list[FittedModel], FittedModel]:
     """The equations without an effect, single effects, and a pair in which a relative stands for the hysteresis."""
     reidentified = reidentify(context, VALUES)
     saturation, relative = effect_named("input_saturation"), effect_named("presliding_friction")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
@@ -35,7 +35,7 @@ def measured(
     return clean.with_signals(x=clean["x"] + rng.normal(scale=noise, size=t.size))
 
 
-def beside_a_damping(effect: str, noise: float = NOISE) -> tuple[FitContext, Scored]:
+def beside_a_damping(effect: str, noise: float = NOISE) -> tuple[FitContext, FittedModel]:
     """Return the records of a quadratic damping with an effect, and the damping fitted alone."""
     rng = np.random.default_rng(0)
     fitted = tuple(measured(effect, "estimation", amplitude, rng, noise) for amplitude in (0.4, 1.0))

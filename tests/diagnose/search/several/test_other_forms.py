@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.effects import effect_named
 from rigsight.rigs import AXIS
@@ -23,7 +23,7 @@ class Explaining(OtherForms):
         super().__init__(cast("FitContext", SimpleNamespace(rig=AXIS)), lower_bound)
         self.part = part
 
-    def gain(self, model: Scored) -> float:
+    def gain(self, model: FittedModel) -> float:
         return self.part
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several import pair_search
 from rigsight.diagnose.search.several import pairs as pairs_module
@@ -143,7 +143,7 @@ def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
     ]
     beside: list[str] = []
 
-    def tried(_: FitContext, parent: Scored, *rest: object, **options: object) -> list[Scored]:
+    def tried(_: FitContext, parent: FittedModel, *rest: object, **options: object) -> list[FittedModel]:
         beside.extend(parent.names)
         return []
 
@@ -167,7 +167,7 @@ def test_a_pair_near_the_floor_is_extended_if_it_leaves_more_than_noise(
     pair = scored(two, residuals=np.full(8, left))
     asked: list[str] = []
 
-    def third(*_: object) -> list[Scored]:
+    def third(*_: object) -> list[FittedModel]:
         asked.append("third")
         return []
 
@@ -191,7 +191,7 @@ def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:
     fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
     context = FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
 
-    def model(effects: tuple[Effect, ...], own: dict[str, float]) -> Scored:
+    def model(effects: tuple[Effect, ...], own: dict[str, float]) -> FittedModel:
         structure = context.composed(effects)
         fit = context.problem(structure, fitted).fit({**VALUES, **own}, [])
         free = tuple(context.free_parameters(structure))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.several.third_effect import with_relatives
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
@@ -36,7 +36,7 @@ def test_a_pair_that_stopped_short_is_found_again_from_a_triple() -> None:
     scales = characteristic_scales(AXIS, fitted, VALUES)
     context = FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset({"force_off"}))
 
-    def model(names: tuple[str, ...], own: dict[str, float]) -> Scored:
+    def model(names: tuple[str, ...], own: dict[str, float]) -> FittedModel:
         effects = tuple(effect_named(name) for name in names)
         structure = context.composed(effects)
         fit = context.problem(structure, fitted).fit({**VALUES, **own}, [])

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import law_columns
-from rigsight.diagnose.pushes.answers import Answers, orthonormal
+from rigsight.diagnose.pushes.responses import Responses, orthonormal
 from rigsight.diagnose.search.several.one_law import are_one_law, is_one_law
 from rigsight.effects import Effect
 
@@ -37,24 +37,24 @@ class OtherForms:
         # A model that is fitted again has the same names, but another residual.
         self._known: dict[tuple[tuple[str, ...], float], float] = {}
 
-    def gain(self, model: Scored) -> float:
+    def gain(self, model: FittedModel) -> float:
         """Return the reduction of a model's mean square error, in units of the noise floor, by another form of one effect."""
         key = (model.names, model.fit.cost)
         if key not in self._known:
-            answers = Answers(
+            responses = Responses(
                 self._context, self._context.scoring, model.held_out, model.effects, model.fit.free
             )
-            forms = [orthonormal(answers.without_free(law_columns(answers, e))) for e in model.effects]
-            gains = [float(np.sum((form.T @ answers.left) ** 2)) for form in forms]
-            self._known[key] = max(gains) / answers.n_measured
+            forms = [orthonormal(responses.without_free(law_columns(responses, e))) for e in model.effects]
+            gains = [float(np.sum((form.T @ responses.remainder) ** 2)) for form in forms]
+            self._known[key] = max(gains) / responses.n_measured
         return self._known[key]
 
-    def share(self, model: Scored) -> float:
+    def share(self, model: FittedModel) -> float:
         """Return the share of the squared residual above the noise that another form of one effect explains."""
         above_noise = max(model.error_over_noise**2 - self._noise, 0.0)
         return min(1.0, self.gain(model) / above_noise) if above_noise > 0.0 else 1.0
 
-    def partners(self, single: Scored, effects: Sequence[Effect]) -> list[Effect]:
+    def partners(self, single: FittedModel, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects that are worth trying beside a single one.
 
         If another form of it would explain most of its residual, only effects that act as one law with it. Beside an effect with
@@ -64,7 +64,9 @@ class OtherForms:
             return list(effects)
         return [e for e in effects if are_one_law((*single.effects, e), self._context.rig)]
 
-    def with_own_evidence(self, singles: Sequence[Scored], larger: Sequence[Scored]) -> list[Scored]:
+    def with_own_evidence(
+        self, singles: Sequence[FittedModel], larger: Sequence[FittedModel]
+    ) -> list[FittedModel]:
         """Return the models without pairs whose second effect explains less than another form of the first would.
 
         A pair that leaves only noise stands: nothing is left for another form. A third effect was compared with other forms of
@@ -76,7 +78,7 @@ class OtherForms:
             if model.residuals and np.isfinite(model.error_over_noise)
         }
 
-        def stands(model: Scored) -> bool:
+        def stands(model: FittedModel) -> bool:
             single = alone.get(model.names[0])
             # Two effects that act as one law are other forms of each other; they are distinguished by other means.
             if len(model.effects) > 2 or single is None or not model.residuals or is_one_law(model):
@@ -91,8 +93,8 @@ class OtherForms:
 
 
 def beyond_disturbance(
-    evidence: Evidence, singles: Sequence[Scored], larger: Sequence[Scored]
-) -> list[Scored]:
+    evidence: Evidence, singles: Sequence[FittedModel], larger: Sequence[FittedModel]
+) -> list[FittedModel]:
     """Return the models that explain more than any single effect with a disturbance, and increase no part of the error.
 
     A disturbance excites the resonances of a rig, and a second effect with its own motion can follow that in each record. If the
@@ -103,14 +105,14 @@ def beyond_disturbance(
         return list(larger)
     least = min(evidence.criterion(model) for model in alone)
 
-    def stands(model: Scored) -> bool:
+    def stands(model: FittedModel) -> bool:
         parts = [part for part in (*alone, *larger) if part.residuals and set(part.names) < set(model.names)]
         return evidence.criterion(model) < least and all(evidence.gain(model, part) > 0.0 for part in parts)
 
     return [model for model in larger if not model.residuals or stands(model)]
 
 
-def with_parts(chosen: Sequence[Scored], larger: Sequence[Scored]) -> list[Scored]:
+def with_parts(chosen: Sequence[FittedModel], larger: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the chosen models and the others of several effects that are parts of them: they tell the share of each effect."""
     names = [set(model.names) for model in chosen]
     return [model for model in larger if any(set(model.names) <= own for own in names)]

@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.first_look import FirstLook, looked_from, widened
+from rigsight.diagnose.search.first_look import FirstLook, started_from, widened
 from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.several.pairs import larger_first
 from rigsight.diagnose.search.single_effects import finished, followed, refine
@@ -30,13 +30,13 @@ _SEED = 0
 
 def with_joint_starts(
     context: FitContext,
-    reidentified: Scored,
-    models: Sequence[Scored],
-    singles: Sequence[Scored],
+    reidentified: FittedModel,
+    models: Sequence[FittedModel],
+    singles: Sequence[FittedModel],
     effects: Sequence[Effect],
-    is_adequate: Callable[[Scored], bool],
+    is_adequate: Callable[[FittedModel], bool],
     prepare: Prepare | None = None,
-) -> list[Scored]:
+) -> list[FittedModel]:
     """Return the models of several effects, with those pairs similar to the best one that explain more."""
     nearest = _plainest_of_the_best(models)
     if not nearest or len(nearest[0].effects) != 2:
@@ -59,9 +59,9 @@ def with_joint_starts(
 
     def look_at(two: tuple[Effect, Effect]) -> FirstLook:
         structure = context.simplest(two)
-        return looked_from(context, two, structure, _starts(context, two, structure, reidentified.fit))
+        return started_from(context, two, structure, _starts(context, two, structure, reidentified.fit))
 
-    def follow(look: FirstLook) -> Scored:
+    def follow(look: FirstLook) -> FittedModel:
         return finished(context, followed(context, look, promising=True, finish=False))
 
     looks = list(context.threads.side_by_side(look_at, relatives))
@@ -78,7 +78,7 @@ def with_joint_starts(
     return [*larger_first(better, singles), *(m for m in models if frozenset(m.names) not in new)]
 
 
-def _plainest_of_the_best(models: Sequence[Scored]) -> list[Scored]:
+def _plainest_of_the_best(models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the best models; among equally good ones those with the fewest parameters first."""
     lowest = min((model.error_over_noise for model in models), default=np.inf)
     near = [m for m in models if m.error_over_noise <= SEARCH.alike_pairs * lowest]
@@ -86,7 +86,7 @@ def _plainest_of_the_best(models: Sequence[Scored]) -> list[Scored]:
 
 
 def _relatives(
-    context: FitContext, pair: Scored, alone: Mapping[str, Scored], effects: Sequence[Effect]
+    context: FitContext, pair: FittedModel, alone: Mapping[str, FittedModel], effects: Sequence[Effect]
 ) -> Iterator[tuple[Effect, Effect]]:
     """Yield the pair, and those with another effect at the place of one of the two.
 

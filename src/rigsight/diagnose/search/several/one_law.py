@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 import sympy as sp
 
-from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
@@ -20,11 +20,11 @@ from rigsight.rigs import Rig
 
 
 def split_distinguishable(
-    pairs: Sequence[Scored],
-    singles: Sequence[Scored],
+    pairs: Sequence[FittedModel],
+    singles: Sequence[FittedModel],
     allowed: float,
-    is_adequate: Callable[[Scored], bool],
-) -> tuple[list[Scored], list[Scored]]:
+    is_adequate: Callable[[FittedModel], bool],
+) -> tuple[list[FittedModel], list[FittedModel]]:
     """Return the pairs that compete, and those that act as one law and are excluded because other laws fit equally well.
 
     Such pairs compete only if no single effect comes near the floor and the best of them reaches it or leaves only noise and
@@ -40,13 +40,13 @@ def split_distinguishable(
     return [pair for pair in pairs if pair not in of_one_law], of_one_law
 
 
-def _has_one_law(model: Scored) -> bool:
+def _has_one_law(model: FittedModel) -> bool:
     """Return True if two of the effects act as one law."""
     rig = model.fit.structure.rig
     return any(are_one_law(two, rig) for two in itertools.combinations(model.effects, 2))
 
 
-def is_one_law(model: Scored) -> bool:
+def is_one_law(model: FittedModel) -> bool:
     """Return True for a pair of effects that act as one law."""
     return are_one_law(model.effects, model.fit.structure.rig)
 

@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
 from rigsight.diagnose.search.places import search_places
-from rigsight.diagnose.search.screening import structures_of_lineup
+from rigsight.diagnose.search.screening import structures_of_shortlist
 from rigsight.diagnose.search.single_effects import followed
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
@@ -24,14 +24,14 @@ from rigsight.identify import FitResult
 
 def with_one_more(
     context: FitContext,
-    parent: Scored,
+    parent: FittedModel,
     effects: Sequence[Effect],
-    known: Sequence[Scored],
-    singles: Sequence[Scored],
+    known: Sequence[FittedModel],
+    singles: Sequence[FittedModel],
     prepare: Prepare | None = None,
     least_share: float = 0.0,
     enough: float = float("inf"),
-) -> list[Scored]:
+) -> list[FittedModel]:
     """Return a model with each effect added that lowers its cost clearly, fitted and scored."""
     context = context.looking_at_residual(parent.fit)
     open_ones = [
@@ -40,7 +40,7 @@ def with_one_more(
         if effect not in parent.effects and not is_among(known, {*parent.names, effect.name})
     ]
     if prepare is not None:
-        prepare(structures_of_lineup(context.rig, open_ones, (*context.modelled, *parent.effects)))
+        prepare(structures_of_shortlist(context.rig, open_ones, (*context.modelled, *parent.effects)))
     search = search_places(context, parent, open_ones)
     if search.most < least_share * _above_noise(parent.fit) / parent.fit.cost:
         # The screening says nothing about effects that no push represents, such as periodic ones.
@@ -54,19 +54,19 @@ def with_one_more(
     return found
 
 
-def is_among(models: Sequence[Scored], names: AbstractSet[str]) -> bool:
+def is_among(models: Sequence[FittedModel], names: AbstractSet[str]) -> bool:
     """Return True if one of the models has just these effects."""
     return any(set(model.names) == names for model in models)
 
 
 def _fitted_beside(
     context: FitContext,
-    parent: Scored,
+    parent: FittedModel,
     effects: Sequence[Effect],
     starts: Mapping[str, Mapping[str, float]],
-    singles: Sequence[Scored],
+    singles: Sequence[FittedModel],
     prepare: Prepare | None,
-) -> list[Scored]:
+) -> list[FittedModel]:
     base = parent.fit
     if prepare is not None:
         prepare([context.simplest((*parent.effects, effect), base.structure) for effect in effects])
@@ -110,7 +110,7 @@ def _fitted_beside(
     worth = min(base.cost - unexplained, SEARCH.near_the_best * lowest)
     promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
 
-    def follow(found: FirstLook) -> Scored:
+    def follow(found: FirstLook) -> FittedModel:
         return followed(context, found, promising=True, finish=False)
 
     return list(context.threads.side_by_side(follow, promising[: SEARCH.most_followed]))

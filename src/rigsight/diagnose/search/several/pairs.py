@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import FirstLook
@@ -31,15 +31,15 @@ from rigsight.simulate import carried_over
 
 def grown(
     context: FitContext,
-    singles: Sequence[Scored],
+    singles: Sequence[FittedModel],
     effects: Sequence[Effect],
     at_floor: float,
     worthwhile: float,
     forms: OtherForms,
     together: Together,
-    is_enough: Callable[[Scored], bool],
+    is_enough: Callable[[FittedModel], bool],
     prepare: Prepare | None = None,
-) -> list[Scored]:
+) -> list[FittedModel]:
     """Return fitted models of two and three effects that close at least half of the error of the best with one less."""
     usable = sorted(
         (m for m in singles if m.residuals and np.isfinite(m.error_over_noise)),
@@ -71,13 +71,15 @@ def grown(
     return larger_first(without_repeated_equations(context, models), singles)
 
 
-def _added_one_by_one(search: PairSearch, worthwhile: float, known: Sequence[Scored]) -> list[Scored]:
+def _added_one_by_one(
+    search: PairSearch, worthwhile: float, known: Sequence[FittedModel]
+) -> list[FittedModel]:
     """Return the known pairs with those that extend a single effect, and with other forms of their effects."""
     explaining = [model for model in search.usable if model.error_over_noise <= worthwhile] or search.usable
     return with_other_forms(search, _beside_singles(search, explaining, known))
 
 
-def _alike_finished(context: FitContext, pairs: Sequence[Scored]) -> list[Scored]:
+def _alike_finished(context: FitContext, pairs: Sequence[FittedModel]) -> list[FittedModel]:
     """Return pairs, best first, with the best two, and those that explain as much, fitted to convergence."""
     # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
     last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
@@ -86,8 +88,8 @@ def _alike_finished(context: FitContext, pairs: Sequence[Scored]) -> list[Scored
 
 
 def _competing_triples(
-    search: PairSearch, triples: Sequence[Scored], pairs: Sequence[Scored]
-) -> tuple[list[Scored], list[Scored]]:
+    search: PairSearch, triples: Sequence[FittedModel], pairs: Sequence[FittedModel]
+) -> tuple[list[FittedModel], list[FittedModel]]:
     """Return the triples that close half of what the best pair leaves, and the pairs with the parts of the best triples."""
     context, nearest = search.context, _lowest(pairs)
     if nearest <= search.at_floor:
@@ -104,8 +106,8 @@ def _competing_triples(
 
 
 def _beside_singles(
-    search: PairSearch, explaining: Sequence[Scored], known: Sequence[Scored]
-) -> list[Scored]:
+    search: PairSearch, explaining: Sequence[FittedModel], known: Sequence[FittedModel]
+) -> list[FittedModel]:
     """Return the known pairs with those that extend single effects: until one explains all.
 
     Beside an effect that explains nothing a second one does what it does alone, so those that explain something are extended.
@@ -128,10 +130,10 @@ def _beside_singles(
         parents.append(
             (min(others, key=lambda model: (model.n_free, model.error_over_noise)), search.allowed)
         )
-    tried: list[Scored] = []
+    tried: list[FittedModel] = []
     # Pairs fitted from where the screening puts them may have ended in another minimum: others start from a single effect.
     settled = [pair for pair in known if pair.error_over_noise <= VERDICT.exact]
-    found: list[Scored] = []
+    found: list[FittedModel] = []
     for parent, enough in parents:
         if parent not in tried and _lowest([*known, *found]) > enough:
             partners = search.forms.partners(parent, search.effects)
@@ -141,47 +143,49 @@ def _beside_singles(
     return each_once([*known, *found])
 
 
-def _best_converged(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+def _best_converged(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the models, best first, that one fitted to convergence."""
     ordered = sorted(models, key=lambda model: model.error_over_noise)
     return [*refine(context, [finished(context, model) for model in ordered[:1]]), *ordered[1:]]
 
 
-def _lowest(models: Sequence[Scored]) -> float:
+def _lowest(models: Sequence[FittedModel]) -> float:
     return min((model.error_over_noise for model in models), default=np.inf)
 
 
-def each_once(models: Sequence[Scored]) -> list[Scored]:
+def each_once(models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return of the models with the same effects the best, best first."""
-    found: dict[frozenset[str], Scored] = {}
+    found: dict[frozenset[str], FittedModel] = {}
     for model in sorted(models, key=lambda model: model.error_over_noise):
         found.setdefault(frozenset(model.names), model)
     return list(found.values())
 
 
-def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Scored]:
+def larger_first(models: Sequence[FittedModel], singles: Sequence[FittedModel]) -> list[FittedModel]:
     """Return models with the effect that explains more alone in first place."""
     alone = {model.names[0]: model.error_over_noise for model in singles}
 
-    def left(effect: Effect) -> float:
+    def remainder(effect: Effect) -> float:
         return alone.get(effect.name, np.inf)
 
-    return [replace(model, effects=tuple(sorted(model.effects, key=left))) for model in models]
+    return [replace(model, effects=tuple(sorted(model.effects, key=remainder))) for model in models]
 
 
-def _half_closed(left: float) -> float:
+def _half_closed(remainder: float) -> float:
     """Return the error that one more effect may leave, in units of the noise floor."""
-    return left - VERDICT.larger_part * (left - 1.0)
+    return remainder - VERDICT.larger_part * (remainder - 1.0)
 
 
-def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect]) -> Scored:
+def _plainest(models: Sequence[FittedModel], like: FittedModel, effects: Sequence[Effect]) -> FittedModel:
     """Return of the models that explain as much as one of them that with the fewest numbers, the first in the catalogue."""
     order = {effect.name: place for place, effect in enumerate(effects)}
     tied = [model for model in models if model.error_over_noise <= SEARCH.alike_pairs * like.error_over_noise]
     return min(tied, key=lambda model: (model.n_free, order[model.names[0]]))
 
 
-def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
+def refit_singles(
+    context: FitContext, singles: Sequence[FittedModel], pairs: Sequence[FittedModel]
+) -> list[FittedModel]:
     """Return the singles, refitted where they are better from their values in a pair than from their own starts.
 
     A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
@@ -213,7 +217,7 @@ def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequenc
     return list(better.values())
 
 
-def _alike(one: Scored, other: Scored) -> bool:
+def _alike(one: FittedModel, other: FittedModel) -> bool:
     """Return True if one is a special or limiting case of the other: the effect missing in addition is the same."""
     parents = {name for model in (one, other) for effect in model.effects for name in effect.parents}
     return bool(parents & {*one.names, *other.names})

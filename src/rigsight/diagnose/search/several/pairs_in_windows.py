@@ -10,27 +10,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH
-from rigsight.diagnose.search.first_look import looked_from
+from rigsight.diagnose.search.first_look import started_from
 from rigsight.diagnose.search.sensitive_motion import scored_in_windows
 from rigsight.diagnose.search.starts import start_values
 
 
 def pairs_in_windows(
-    context: FitContext, windows: FitContext, reidentified: Scored, pairs: Sequence[Scored]
-) -> list[Scored]:
+    context: FitContext, windows: FitContext, reidentified: FittedModel, pairs: Sequence[FittedModel]
+) -> list[FittedModel]:
     """Return the best pairs, fitted and scored in windows."""
     of_two = [pair for pair in pairs if len(pair.effects) == 2]
     nearest = sorted(of_two, key=lambda pair: pair.error_over_noise)[: SEARCH.most_windowed_pairs]
 
-    def one(pair: Scored) -> Scored:
+    def one(pair: FittedModel) -> FittedModel:
         return _fitted(context, windows, reidentified, pair)
 
     return list(context.threads.side_by_side(one, nearest))
 
 
-def _fitted(context: FitContext, windows: FitContext, reidentified: Scored, pair: Scored) -> Scored:
+def _fitted(
+    context: FitContext, windows: FitContext, reidentified: FittedModel, pair: FittedModel
+) -> FittedModel:
     structure = pair.fit.structure
     first, second = pair.effects
     alone = context.simplest((first,))
@@ -39,7 +41,7 @@ def _fitted(context: FitContext, windows: FitContext, reidentified: Scored, pair
         for values in start_values(context, alone, first, reidentified.fit, {})
     ]
     starts = [start for base in bases for start in start_values(context, structure, second, base, {})]
-    look = looked_from(context, pair.effects, structure, starts)
+    look = started_from(context, pair.effects, structure, starts)
     problem = windows.problem(structure, windows.estimation)
     fits = [problem.fit_windows(fit.values, pair.fit.free) for fit in (pair.fit, *look.fits)]
     usable = [fit for fit in fits if fit.residuals]

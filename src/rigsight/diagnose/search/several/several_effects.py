@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import VERDICT
@@ -21,14 +21,14 @@ from rigsight.effects import Effect
 
 def several_effects(
     context: FitContext,
-    reidentified: Scored,
-    singles: Sequence[Scored],
+    reidentified: FittedModel,
+    singles: Sequence[FittedModel],
     effects: Sequence[Effect],
     forms: OtherForms,
     checks: Checks,
     lower_bound: bool,
     prepare: Prepare | None,
-) -> list[Scored]:
+) -> list[FittedModel]:
     """Return models of two and three effects if a single effect does not explain everything.
 
     Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
@@ -46,7 +46,7 @@ def several_effects(
     worthwhile = reidentified.error_over_noise / VERDICT.worthwhile
     together = Together(context, reidentified, effects, prepare)
 
-    def is_enough(pair: Scored) -> bool:
+    def is_enough(pair: FittedModel) -> bool:
         return lower_bound or checks.is_adequate(pair)
 
     pairs = grown(context, singles, effects, at_floor, worthwhile, forms, together, is_enough, prepare)

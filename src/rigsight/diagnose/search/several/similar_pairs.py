@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import LOOK_ACCURACY, look_at, widened
@@ -18,18 +18,18 @@ from rigsight.simulate import carried_over
 
 def with_similar(
     context: FitContext,
-    pairs: Sequence[Scored],
-    singles: Sequence[Scored],
+    pairs: Sequence[FittedModel],
+    singles: Sequence[FittedModel],
     effects: Sequence[Effect],
     prepare: Prepare | None,
-) -> list[Scored]:
+) -> list[FittedModel]:
     """Return the pairs with those in which an effect that explains as much stands for one of the best pair.
 
     One of the two may be right and the other only similar to the right one, or records cannot distinguish them. What each of the
     two explains is the residual of the pair's other parameters without it.
     """
     found = list(pairs)
-    replaced: Scored | None = None
+    replaced: FittedModel | None = None
     for _ in range(SEARCH.most_swaps):
         best = min(found, key=lambda pair: pair.error_over_noise)
         if best is replaced:
@@ -41,7 +41,7 @@ def with_similar(
     return found
 
 
-def _without_the_other(context: FitContext, pair: Scored, kept: Effect) -> Scored:
+def _without_the_other(context: FitContext, pair: FittedModel, kept: Effect) -> FittedModel:
     """Return the model of one effect of a pair with the values that it has there, and with initial states of its own."""
     structure = context.simplest((kept,), pair.fit.structure)
     values = {**carried_over(pair.fit.values, pair.fit.structure, structure), **dict(structure.fixed)}
@@ -51,7 +51,7 @@ def _without_the_other(context: FitContext, pair: Scored, kept: Effect) -> Score
     return context.score((kept,), replace(fit, free=free, standard_errors=errors), roughly=True)
 
 
-def with_other_forms(search: PairSearch, pairs: Sequence[Scored]) -> list[Scored]:
+def with_other_forms(search: PairSearch, pairs: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the pairs with those in which a more general form of an effect, or a simpler one, stands for it."""
     found = list(pairs)
     for _ in range(SEARCH.most_swaps):
@@ -66,11 +66,11 @@ def with_other_forms(search: PairSearch, pairs: Sequence[Scored]) -> list[Scored
     return found
 
 
-def _best(pairs: Sequence[Scored]) -> Scored | None:
+def _best(pairs: Sequence[FittedModel]) -> FittedModel | None:
     return min(pairs, key=lambda pair: pair.error_over_noise, default=None)
 
 
-def _more_general(search: PairSearch, pair: Scored, known: Sequence[Scored]) -> list[Scored]:
+def _more_general(search: PairSearch, pair: FittedModel, known: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the pairs in which one effect is replaced by a more general one, fitted from there.
 
     In combination with another effect a simpler form may lead at a first look, because it has fewer parameters to fit.
@@ -90,7 +90,7 @@ def _more_general(search: PairSearch, pair: Scored, known: Sequence[Scored]) -> 
     if search.prepare is not None:
         search.prepare([context.simplest((other, child)) for other, child, _ in swaps])
 
-    def one(swap: tuple[Effect, Effect, Effect]) -> Scored:
+    def one(swap: tuple[Effect, Effect, Effect]) -> FittedModel:
         other, child, member = swap
         look = look_at(
             context,
@@ -105,12 +105,12 @@ def _more_general(search: PairSearch, pair: Scored, known: Sequence[Scored]) -> 
     return list(context.threads.side_by_side(one, swaps))
 
 
-def _plainer(search: PairSearch, pair: Scored, known: Sequence[Scored]) -> list[Scored]:
+def _plainer(search: PairSearch, pair: FittedModel, known: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the pairs in which a simpler form replaces an effect, fitted beside the other effect.
 
     Alone, a more general form may compensate for the missing effect; beside that effect the simpler one may suffice.
     """
-    found: list[Scored] = []
+    found: list[FittedModel] = []
     for kept in search.usable:
         if kept.effects[0] not in pair.effects:
             continue

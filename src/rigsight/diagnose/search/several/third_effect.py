@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import FirstLook
@@ -25,12 +25,12 @@ from rigsight.simulate import carried_over
 
 def with_a_third(
     context: FitContext,
-    singles: Sequence[Scored],
-    pairs: Sequence[Scored],
+    singles: Sequence[FittedModel],
+    pairs: Sequence[FittedModel],
     effects: Sequence[Effect],
     forms: OtherForms,
     prepare: Prepare | None = None,
-) -> list[Scored]:
+) -> list[FittedModel]:
     """Return models of three effects, grown from the best pair, fitted and scored."""
     best = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
     alone = min((model.error_over_noise for model in singles), default=np.inf)
@@ -42,12 +42,12 @@ def with_a_third(
 
 def with_relatives(
     context: FitContext,
-    triples: Sequence[Scored],
-    pairs: Sequence[Scored],
-    singles: Sequence[Scored],
+    triples: Sequence[FittedModel],
+    pairs: Sequence[FittedModel],
+    singles: Sequence[FittedModel],
     effects: Sequence[Effect],
     prepare: Prepare | None = None,
-) -> tuple[list[Scored], list[Scored]]:
+) -> tuple[list[FittedModel], list[FittedModel]]:
     """Return the triples with those in which a relative stands for an effect of the best one, and the pairs with their parts.
 
     An effect found with an incomplete model may be only similar to the right one, or more general than needed.
@@ -64,7 +64,7 @@ def with_relatives(
         return other.name in replaced.parents
 
     found, known = list(triples), list(pairs)
-    compared: Scored | None = None
+    compared: FittedModel | None = None
     for is_tried in (as_good, plainer, as_good):
         best = min(found, key=lambda model: model.error_over_noise)
         if is_tried is as_good:
@@ -72,7 +72,7 @@ def with_relatives(
                 break
             compared = best
         known = _with_refitted_parts(context, best, known)
-        new: list[Scored] = []
+        new: list[FittedModel] = []
         for replaced in best.effects:
             pair = next(p for p in known if set(p.names) == set(best.names) - {replaced.name})
             instead = [effect for effect in effects if is_tried(replaced, effect)]
@@ -85,17 +85,19 @@ def with_relatives(
     return found, [*refine(context, near), *(pair for pair in known if pair not in near)]
 
 
-def finished_best(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+def finished_best(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the models, the best two fitted to convergence and those near them to full precision."""
     ordered = sorted(models, key=lambda model: model.error_over_noise)
     best = [finished(context, model) for model in ordered[: SEARCH.most_finished]]
     return refine(context, [*best, *ordered[SEARCH.most_finished :]])
 
 
-def _with_refitted_parts(context: FitContext, triple: Scored, pairs: Sequence[Scored]) -> list[Scored]:
+def _with_refitted_parts(
+    context: FitContext, triple: FittedModel, pairs: Sequence[FittedModel]
+) -> list[FittedModel]:
     """Return the pairs with those of the effects of a triple, fitted from where they stand in it if that is better."""
 
-    def one(effects: tuple[Effect, ...]) -> Scored:
+    def one(effects: tuple[Effect, ...]) -> FittedModel:
         structure = context.simplest(effects, triple.fit.structure)
         values = {**carried_over(triple.fit.values, triple.fit.structure, structure), **dict(structure.fixed)}
         start = replace(triple.fit, values=values)

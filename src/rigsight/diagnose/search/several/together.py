@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH
-from rigsight.diagnose.search.first_look import FirstLook, looked_from, widened
-from rigsight.diagnose.search.screening import Lineup, Response
+from rigsight.diagnose.search.first_look import FirstLook, started_from, widened
+from rigsight.diagnose.search.screening import Response, Shortlist
 from rigsight.diagnose.search.several.joint_screening import EffectSet, best_sets
 from rigsight.diagnose.search.single_effects import followed
 from rigsight.diagnose.search.starts import start_values, with_own_values
@@ -37,7 +37,7 @@ class Together:
     def __init__(
         self,
         context: FitContext,
-        reidentified: Scored,
+        reidentified: FittedModel,
         effects: Sequence[Effect],
         prepare: Prepare | None = None,
     ) -> None:
@@ -46,11 +46,11 @@ class Together:
         self._effects = effects
         self._prepare = prepare
 
-    def fitted(self, size: int) -> list[Scored]:
+    def fitted(self, size: int) -> list[FittedModel]:
         """Return models of so many effects that explain most together in the screening, fitted and scored."""
         context = self._context
         found: dict[frozenset[str], list[EffectSet]] = {}
-        for effect_set in best_sets(self._responses, self._lineup.left, size):
+        for effect_set in best_sets(self._responses, self._lineup.remainder, size):
             if len(found) < SEARCH.joint_sets or effect_set.names in found:
                 found.setdefault(effect_set.names, []).append(effect_set)
         starts = list(found.values())
@@ -60,7 +60,7 @@ class Together:
         def look_at(sets: list[EffectSet]) -> FirstLook:
             effects = sets[0].effects
             values = [self._start(one) for one in sets[: SEARCH.lengthy_starts]]
-            return looked_from(context, effects, context.simplest(effects), values)
+            return started_from(context, effects, context.simplest(effects), values)
 
         looks = widened(context, list(context.threads.side_by_side(look_at, starts)))
         lowest = min((look.cost for look in looks), default=float("inf"))
@@ -68,15 +68,15 @@ class Together:
             (look for look in looks if look.cost <= SEARCH.near_the_best * lowest), key=lambda look: look.cost
         )
 
-        def follow(look: FirstLook) -> Scored:
+        def follow(look: FirstLook) -> FittedModel:
             return followed(context, look, promising=True, finish=False)
 
         models = context.threads.side_by_side(follow, promising[: SEARCH.most_followed])
         return [model for model in models if np.isfinite(model.error_over_noise)]
 
     @cached_property
-    def _lineup(self) -> Lineup:
-        return Lineup(self._context, self._reidentified, liveliest=self._context.rig.has_one_motion)
+    def _lineup(self) -> Shortlist:
+        return Shortlist(self._context, self._reidentified, liveliest=self._context.rig.has_one_motion)
 
     @cached_property
     def _responses(self) -> list[Response]:

@@ -53,10 +53,10 @@ class Followed:
 
     def without(self, columns: Floats) -> Floats:
         """Return columns, shape (n,) or (n, m), after projecting out parameters and initial states."""
-        left = np.array(columns, dtype=np.float64)
+        remainder = np.array(columns, dtype=np.float64)
         for span, basis in zip(self.spans, self.of_states, strict=True):
-            left[span] -= basis @ (basis.T @ left[span])
-        return np.asarray(left - self.of_parameters @ (self.of_parameters.T @ left))
+            remainder[span] -= basis @ (basis.T @ remainder[span])
+        return np.asarray(remainder - self.of_parameters @ (self.of_parameters.T @ remainder))
 
     def along(self, basis: Floats, stretches: Sequence[slice]) -> Floats:
         """Return what a basis and these share in stretches, none of which reaches from one record into the next."""
@@ -72,7 +72,7 @@ class Followed:
         return products
 
 
-class Answers:
+class Responses:
     """Fitted equations along records, with a push at every place.
 
     Parameters
@@ -132,14 +132,14 @@ class Answers:
         return all(bool(np.all(np.isfinite(out))) for out in self.calm_outputs)
 
     @cached_property
-    def seen_left(self) -> Floats:
+    def seen_remainder(self) -> Floats:
         """Residuals of the equations, weighted and stacked."""
         return self.stacked(self._residuals)
 
     @cached_property
-    def left(self) -> Floats:
+    def remainder(self) -> Floats:
         """The same after projecting out parameters and initial states."""
-        return self.without_free(self.seen_left)
+        return self.without_free(self.seen_remainder)
 
     @cached_property
     def motions(self) -> list[dict[str, Floats]]:
