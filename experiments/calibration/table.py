@@ -15,7 +15,7 @@ FILE = Path(__file__).parent / "trials.csv"
 _OF_SITUATION = (
     "verdict",
     "first_share",
-    "left",
+    "remainder",
     "gap",
     "n_effects",
     "adequate",
@@ -59,7 +59,7 @@ def _trial(row: dict[str, str]) -> TrainingTrial:
         Situation(
             row["verdict"],
             float(row["first_share"]),
-            float(row["left"]),
+            float(row["remainder"]),
             float(row["gap"]),
             int(row["n_effects"]),
             row["adequate"] == "1",
@@ -73,4 +73,4 @@ def _trial(row: dict[str, str]) -> TrainingTrial:
 
 def is_judgeable(trial: TrainingTrial) -> bool:
     """Return True if the figures of a trial are finite: a model that could not be scored tells nothing."""
-    return math.isfinite(trial.situation.left) and math.isfinite(trial.situation.gap)
+    return math.isfinite(trial.situation.remainder) and math.isfinite(trial.situation.gap)

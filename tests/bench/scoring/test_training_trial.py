@@ -49,7 +49,7 @@ def key(kind: str = "single", *effects: str) -> dict:
 def test_the_named_cause_is_first() -> None:
     found = training_trial(key("single", "coulomb_friction"), diagnosis("effect", "coulomb_friction"))
     assert (found.cause, found.share_of_cause) == ("first", 0.0)
-    assert (found.situation.first_share, found.situation.left, found.situation.gap) == (0.6, 1.02, 20.0)
+    assert (found.situation.first_share, found.situation.remainder, found.situation.gap) == (0.6, 1.02, 20.0)
 
 
 def test_a_rival_that_is_the_cause_has_its_part_of_what_is_behind_the_first() -> None:
@@ -74,7 +74,7 @@ def test_of_an_unknown_cause_the_first_is_the_nearest() -> None:
 def test_of_a_control_the_verdict_alone_is_first(verdict: str, cause: str) -> None:
     found = training_trial(key("none"), diagnosis(verdict))
     assert found.cause == cause
-    assert found.situation.left == 20.0
+    assert found.situation.remainder == 20.0
 
 
 def test_the_named_cause_stands_first_even_where_another_has_a_larger_share() -> None:

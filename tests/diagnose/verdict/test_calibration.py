@@ -11,7 +11,7 @@ from rigsight.diagnose.verdict.calibration import Situation, trained
 CLEAR = Situation(
     verdict="effect",
     first_share=1.0,
-    left=1.02,
+    remainder=1.02,
     gap=30.0,
     n_effects=1,
     adequate=True,
@@ -33,7 +33,7 @@ def test_probabilities_and_what_is_left_for_all_else_add_up_to_one() -> None:
 
 
 def test_without_a_gap_the_equations_alone_are_probable() -> None:
-    calm = replace(CLEAR, verdict="none", gap=1.0, left=1.0, n_effects=0)
+    calm = replace(CLEAR, verdict="none", gap=1.0, remainder=1.0, n_effects=0)
     calibration = trained()
     others = calibration.probabilities(calm, [0.5, 0.5])
     assert calibration.without_effect(calm) > 0.8
@@ -50,9 +50,9 @@ def test_a_clear_cause_is_probable() -> None:
     "worse",
     [
         {"first_share": 0.5},
-        {"left": 5.0, "adequate": False},
+        {"remainder": 5.0, "adequate": False},
         {"gap": 1.3},
-        {"verdict": "unknown", "left": 5.0, "adequate": False},
+        {"verdict": "unknown", "remainder": 5.0, "adequate": False},
     ],
     ids=str,
 )
@@ -61,13 +61,13 @@ def test_less_evidence_is_less_probable(worse: dict) -> None:
 
 
 def test_of_an_unknown_cause_the_nearest_model_is_less_probable_than_if_it_were_named() -> None:
-    far = replace(CLEAR, left=5.0, adequate=False)
+    far = replace(CLEAR, remainder=5.0, adequate=False)
     assert stated(replace(far, verdict="unknown")) < stated(far) - 0.02
 
 
 def test_a_model_that_is_endlessly_far_is_not_the_cause() -> None:
     for left in (1e300, float("inf")):
-        far = replace(CLEAR, verdict="unknown", left=left, adequate=False)
+        far = replace(CLEAR, verdict="unknown", remainder=left, adequate=False)
         assert stated(far) == 0.0
         assert stated(replace(far, gap=3000.0)) == 0.0, "and beyond the gaps of the training trials"
 
@@ -79,7 +79,7 @@ def test_one_model_alone_takes_what_the_first_has() -> None:
 
 
 def test_no_rival_is_more_probable_than_the_doubted_first_model() -> None:
-    doubted = replace(CLEAR, first_share=0.503, left=1.15, n_effects=2, adequate=False)
+    doubted = replace(CLEAR, first_share=0.503, remainder=1.15, n_effects=2, adequate=False)
     calibration = trained()
     first, second, third = calibration.probabilities(doubted, [0.503, 0.49, 0.007])
     assert calibration.probability_first(doubted) < 0.5
@@ -90,13 +90,13 @@ def test_no_rival_is_more_probable_than_the_doubted_first_model() -> None:
 
 def test_less_noise_than_in_any_training_trial_takes_nothing_from_a_main_cause() -> None:
     """A law that leaves a sixtieth of the gap; a tenth of the noise raises error and gap alike."""
-    quiet = replace(CLEAR, left=50.0, gap=3000.0, adequate=False)
-    quieter = replace(quiet, left=500.0, gap=30_000.0)
+    quiet = replace(CLEAR, remainder=50.0, gap=3000.0, adequate=False)
+    quieter = replace(quiet, remainder=500.0, gap=30_000.0)
     assert stated(quiet) > 0.5
     assert stated(quieter) == pytest.approx(stated(quiet), rel=1e-3)
 
 
 def test_a_gap_beyond_the_training_trials_says_no_more_than_their_largest() -> None:
     assert stated(replace(CLEAR, gap=1e6)) == pytest.approx(
-        stated(replace(CLEAR, gap=trained().largest_gap, left=1.0)), rel=1e-3
+        stated(replace(CLEAR, gap=trained().largest_gap, remainder=1.0)), rel=1e-3
     )

@@ -42,7 +42,7 @@ class Situation:
         The verdict.
     first_share
         Share of the first model in the ranking of those with an effect, 0 to 1.
-    left, gap
+    remainder, gap
         Errors of that model and of the re-identified equations, in units of the noise floor.
     n_effects
         Number of its effects.

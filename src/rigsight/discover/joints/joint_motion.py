@@ -52,7 +52,7 @@ class JointMotion:
         Of the joint from its rest, shape (n_samples,) per record.
     force, error
         The unknown force that resists it and its standard error, per record.
-    left
+    remainder
         Weighted sum of squares of the sensor residuals of this motion.
     """
 
