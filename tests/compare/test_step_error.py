@@ -55,7 +55,7 @@ def test_a_record_that_ends_early_is_compared_up_to_its_end() -> None:
 
 
 @pytest.mark.parametrize(
-    ("u", "told"),
+    ("u", "reported"),
     [(np.ones(500), "constant"), (np.where(np.arange(500) < 1, 0.0, 1.0), "rest before the step")],
 )
 def test_a_step_without_offset_or_without_step_is_told(u: np.ndarray, reported: str) -> None:

@@ -52,7 +52,7 @@ def test_python_control_sees_the_same_values() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"omega": OMEGA[::-1]}, "must increase"),
         ({"omega": OMEGA - 1.0}, "omega must not be negative"),

@@ -133,7 +133,7 @@ def broken(case: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("case", "told"),
+    ("case", "reported"),
     [
         ("short", ["49 samples", "at least 50"]),
         ("backwards", ["line 102", "not increasing", "0.5 follows 0.99"]),

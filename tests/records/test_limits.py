@@ -89,7 +89,7 @@ def test_a_separator_that_separates_nothing_is_refused(tmp_path: Path, separator
 
 
 @pytest.mark.parametrize(
-    ("changed", "told"),
+    ("changed", "reported"),
     [
         ({"u": 1e308 * ROWS["u"]}, "are implausible"),
         ({"t": 1e306 * T}, "which is implausible"),

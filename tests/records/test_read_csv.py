@@ -133,7 +133,7 @@ BROKEN: list[tuple[str, str | bytes, dict[str, object], list[str]]] = [
 
 
 @pytest.mark.parametrize(
-    ("content", "options", "told"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN]
+    ("content", "options", "reported"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN]
 )
 def test_broken_files_are_told_with_place_and_mend(
     tmp_path: Path, content: str | bytes, options: dict[str, object], reported: list[str]

@@ -41,7 +41,7 @@ def test_an_expression_means_what_it_says(text: str, expected: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "place", "told"),
+    ("text", "place", "reported"),
     [
         ("sin(a", 4, "ends too early"),
         ("2 a", 2, "a product needs"),

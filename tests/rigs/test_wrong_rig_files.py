@@ -46,7 +46,7 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "told"), MISTAKES)
+@pytest.mark.parametrize(("old", "new", "reported"), MISTAKES)
 def test_a_mistake_is_one_message_with_its_place_and_mend(old: str, new: str, reported: str) -> None:
     assert old in TRAIN
     with pytest.raises(InputError, match=reported) as caught:
@@ -67,7 +67,7 @@ ALTERNATIVES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "told"), ALTERNATIVES)
+@pytest.mark.parametrize(("old", "new", "reported"), ALTERNATIVES)
 def test_an_alternative_follows_from_itself_and_constants(old: str, new: str, reported: str) -> None:
     text = rig_file_text("running_gear")
     assert old in text

@@ -136,7 +136,7 @@ def test_a_model_of_another_rig_is_refused_before_anything_is_done(
 
 
 @pytest.mark.parametrize(
-    ("model", "told"),
+    ("model", "reported"),
     [("nominl", "Did you mean 'nominal'"), ("=nominal", "NAME=MODEL"), ("missing.json", "does not exist")],
 )
 def test_a_model_that_is_none_is_told(axis_campaign: Path, model: str, reported: str) -> None:

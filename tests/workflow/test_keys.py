@@ -91,7 +91,7 @@ def outcome(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str, boo
     @cache
     def reported(command: str) -> str:
         changes = [CHANGES[key][1] for key in TOLD]
-        return result(command, read_campaign(written(tmp_path_factory.mktemp("told") / "c", *changes)))
+        return result(command, read_campaign(written(tmp_path_factory.mktemp("reported") / "c", *changes)))
 
     def call(command: str, key: str, given: bool) -> str:
         if key in TOLD:

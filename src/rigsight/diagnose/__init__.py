@@ -20,6 +20,6 @@ __all__ = [
     "Verdict",
     "candidates_on",
     "diagnose",
-    "structures_of_lineup",
+    "structures_of_shortlist",
     "structures_to_fit",
 ]

@@ -242,7 +242,7 @@ def with_lost_counts(x):
 
 
 @pytest.mark.parametrize(
-    ("fault", "kind", "told"),
+    ("fault", "kind", "reported"),
     [
         (clipped, "clipping", "is clipped at"),
         (stuck, "stuck", "is exactly constant from 7.5 s to 7.995 s"),

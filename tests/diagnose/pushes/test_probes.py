@@ -86,5 +86,5 @@ def test_an_effect_by_itself_is_its_law() -> None:
     force = out[structure.rig.outputs[column].name]
     np.testing.assert_allclose(force, 2.0 * x + 5.0 * x**3, atol=1e-6)
     structure, column = alone(placed(effect_named("input_saturation"), "motor"))
-    out = simulate(structure, {"u_max": 0.1}, Record("told", DT, {"signal": x}, {}))
+    out = simulate(structure, {"u_max": 0.1}, Record("reported", DT, {"signal": x}, {}))
     np.testing.assert_allclose(out[structure.rig.outputs[column].name], np.clip(x, -0.1, 0.1), atol=1e-12)

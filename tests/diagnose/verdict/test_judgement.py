@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.verdict.judgement import Judgement, judge, most_left
+from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
 from rigsight.diagnose.verdict.main_cause import MainCause
 
 ABOVE, BELOW = 1.001, 0.999
@@ -109,7 +109,7 @@ def test_models_that_explain_the_same_part_from_elsewhere_are_told(verdict) -> N
 )
 def test_of_a_larger_gap_a_cause_may_leave_more(verdict, gap: float, allowed: float) -> None:
     """A fortieth of the gap, between 1.15 and 1.6 times the floor."""
-    assert most_left(gap) == pytest.approx(allowed)
+    assert most_remainder(gap) == pytest.approx(allowed)
     assert verdict(gap, gap, allowed * BELOW).verdict == "effect"
     assert verdict(gap, gap, allowed * ABOVE).verdict == "unknown"
 

@@ -127,7 +127,7 @@ def test_every_rule_is_called() -> None:
 
 @pytest.mark.parametrize("effect", ["input_delay", "sensor_delay", "time_shift"])
 @pytest.mark.parametrize(
-    ("delay", "uncertainty", "told"), [(1e-3, 2e-3, True), (3e-3, 2e-3, False), (1e-3, 0.0, False)]
+    ("delay", "uncertainty", "reported"), [(1e-3, 2e-3, True), (3e-3, 2e-3, False), (1e-3, 0.0, False)]
 )
 def test_a_delay_shorter_than_the_clocks_can_tell_is_said(
     effect: str, delay: float, uncertainty: float, reported: bool

@@ -258,7 +258,7 @@ BROKEN: list[tuple[str, str, str, list[str]]] = [
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN]
+    ("old", "new", "reported"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN]
 )
 def test_broken_campaigns_are_told_with_key_and_mend(
     campaign: Callable[..., Path], old: str, new: str, reported: list[str], request: pytest.FixtureRequest
@@ -411,7 +411,7 @@ def test_what_a_rig_does_not_know_is_told_with_line_and_column(campaign: Callabl
 
 
 @pytest.mark.parametrize(
-    ("moved", "before", "told"),
+    ("moved", "before", "reported"),
     [
         (
             "b = 0.3",

@@ -72,7 +72,7 @@ def test_every_field_is_checked(declared):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"name": "Extra spring"}, "lower-case"),
         ({"summary": " "}, "summary is empty"),

@@ -111,7 +111,7 @@ def test_the_given_simulation_may_have_the_effect_already(campaign: Path, quinti
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         (lambda text: text.replace("x**5", "x**5 +"), r"^mine\.py, line 18: is not valid Python"),
         (lambda text: text + "\n1 / 0\n", r"^mine\.py, line 21: running the file failed: ZeroDivisionError"),
@@ -179,7 +179,7 @@ def test_an_installed_package_offers_its_effects(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("value", "reported"),
     [
         ("offered:NUMBER", r"offers-effects \(entry point mine\): is a int, not an Effect"),
         ("nowhere:EFFECT", r"offers-effects \(entry point mine\): cannot be loaded: ModuleNotFoundError"),
