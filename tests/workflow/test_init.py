@@ -367,9 +367,11 @@ def test_every_candidate_is_listed(tmp_path: Path) -> None:
 
 
 def test_constants_beside_the_signals_are_no_candidates(tmp_path: Path) -> None:
-    savemat(tmp_path / "a.mat", {"t": T, "u": SWEEP, "Weg": ANSWER, "Kraft": ANSWER, "gains": np.arange(4.0)})
+    savemat(
+        tmp_path / "a.mat", {"t": T, "u": SWEEP, "a1": ANSWER, "a2": ANSWER, "gains": np.arange(4.0)}
+    )
     text = run_init(tmp_path, model="axis").path.read_text(encoding="utf-8")
-    assert 'one of: "Weg", "Kraft"' in text
+    assert 'one of: "a1", "a2"' in text
     assert "gains" not in text
 
 
