@@ -69,6 +69,7 @@ def test_a_detail_of_few_samples_is_the_record() -> None:
     assert (window.start, window.stop) == (0, 20)
 
 
+@pytest.mark.slow
 def test_importing_the_figures_does_not_import_matplotlib() -> None:
     code = "import sys, rigsight.plot, rigsight.report; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=180).returncode == 0

@@ -120,6 +120,7 @@ def test_a_discovery_of_a_folder_is_that_of_the_command(axis_campaign: Path) -> 
     assert discovered.to_json() == run_discover(axis_campaign, method="full", seed=3, n_jobs=1).to_json()
 
 
+@pytest.mark.slow
 def test_a_comparison_of_files_is_that_of_the_command(axis_campaign: Path, diagnoser: rs.Diagnoser) -> None:
     diagnoser.diagnosis_.save(axis_campaign / "found")
     models = [axis_campaign / "found"]
@@ -129,6 +130,7 @@ def test_a_comparison_of_files_is_that_of_the_command(axis_campaign: Path, diagn
     assert by_name.scores == mine.scores
 
 
+@pytest.mark.slow
 def test_an_own_effect_competes_and_its_model_predicts(campaign: rs.Campaign) -> None:
     own = replace(effect_named("cubic_stiffness"), name="my_spring")
     diagnoser = rs.Diagnoser(effects=["quadratic_damping", own], n_jobs=1).fit(campaign)
@@ -167,6 +169,7 @@ def test_a_wrong_setting_is_told_when_it_is_used(estimator: Any, message: str, c
     assert fitted_attributes(estimator) == set()
 
 
+@pytest.mark.slow
 def test_verbose_says_what_is_done(campaign: rs.Campaign, capfd: pytest.CaptureFixture[str]) -> None:
     rs.LinearIdentifier(n_jobs=1).fit(campaign)
     assert capfd.readouterr() == ("", "")

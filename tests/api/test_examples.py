@@ -54,6 +54,7 @@ def test_an_example_says_what_comes_out(name: str, tmp_path: Path, monkeypatch: 
     run(EXAMPLES[name])
 
 
+@pytest.mark.slow
 def test_the_page_says_what_comes_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pandas", reason="pandas, with which the page makes tables, is not installed")
     monkeypatch.chdir(tmp_path)

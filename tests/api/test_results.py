@@ -103,6 +103,7 @@ def test_a_console_shows_one_line(result: Any) -> None:
     assert len(repr(result)) < 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("result", RESULTS, indirect=True)
 def test_saved_it_is_what_the_command_leaves(result: Any, tmp_path: Path) -> None:
     files = result.save(tmp_path / "out")
@@ -126,6 +127,7 @@ def test_a_page_quotes_what_made_it(diagnoser: rs.Diagnoser, tmp_path: Path) -> 
     assert "rigsight.Diagnoser(effects=['cubic_stiffness', 'quadratic_damping'], seed=0).fit(...)" in page
 
 
+@pytest.mark.slow
 def test_a_result_that_a_workflow_returned_can_be_looked_at(axis_campaign: Path) -> None:
     found = run_diagnose(axis_campaign, effects=[effect_named("cubic_stiffness")], n_jobs=1)
     shown = rs.DiagnosisResult.of(found)

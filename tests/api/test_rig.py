@@ -58,6 +58,7 @@ def test_every_function_takes_a_rig(tmp_path: Path) -> None:
     assert (list(read.signals), dict(read.constants)) == (["u", "load_angle"], {"k_t": 0.07})
 
 
+@pytest.mark.slow
 def test_estimators_take_records_of_a_rig(campaign: rs.Campaign) -> None:
     records = list(campaign.records)
     fitted = rs.LinearIdentifier(n_jobs=1, rig="axis").fit(records)

@@ -279,6 +279,7 @@ def test_a_failed_diagnosis_is_kept_with_its_reason(bench: BenchFolder) -> None:
     assert (found.verdict, found.right, found.message) == ("failed", False, "rigsight: no good")
 
 
+@pytest.mark.slow
 def test_a_machine_that_lets_no_diagnosis_work_is_no_result_of_a_trial(
     bench: BenchFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -31,12 +31,14 @@ def test_usage_errors_exit_2(arguments: list[str], expected: str, run: Run) -> N
     assert "Traceback" not in stderr
 
 
+@pytest.mark.slow
 def test_help_lists_the_commands() -> None:
     shown = subprocess.run([RIGSIGHT, "--help"], capture_output=True, text=True, check=True)
     for command in ("demo", "diagnose", "simulate"):
         assert command in shown.stdout
 
 
+@pytest.mark.slow
 def test_the_package_runs_as_a_module() -> None:
     shown = subprocess.run(
         [sys.executable, "-m", "rigsight", "--version"], capture_output=True, text=True, check=True
@@ -49,6 +51,7 @@ def test_help_imports_nothing_heavy() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.slow
 def test_nothing_but_the_bench_needs_dask_and_sqlite() -> None:
     """Help, every public name and every other command come without them."""
     code = """

@@ -26,6 +26,7 @@ def test_a_bench_that_is_not_installed_says_how_it_is(arguments: tuple[str, ...]
     assert len(ran.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [("--help",), ("blind", "--help")])
 def test_help_lists_the_command_all_the_same(arguments: tuple[str, ...]) -> None:
     ran = rigsight(*arguments)
@@ -33,6 +34,7 @@ def test_help_lists_the_command_all_the_same(arguments: tuple[str, ...]) -> None
     assert "blind" in ran.stdout
 
 
+@pytest.mark.slow
 def test_other_commands_do_without_the_bench() -> None:
     ran = rigsight("rigs", "--json")
     assert ran.returncode == 0, ran.stderr

@@ -23,6 +23,7 @@ def test_diagnose_leaves_three_results_and_tells_the_verdict(
     assert json.loads((out / "diagnosis.json").read_text())["effects"] == ["cubic_stiffness"]
 
 
+@pytest.mark.slow
 def test_quiet_says_nothing(axis_campaign: Path, tmp_path: Path, run: Run) -> None:
     arguments = ("-o", tmp_path / "out", "--effect", "cubic_stiffness", "--quiet", "--jobs", "1")
     assert run("diagnose", axis_campaign, *arguments) == (0, "", "")

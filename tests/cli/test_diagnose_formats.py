@@ -40,6 +40,7 @@ def test_records_in_another_format_are_diagnosed_alike(
     assert figures(run, axis_campaign) == in_text
 
 
+@pytest.mark.slow
 def test_a_folder_with_clear_names_is_diagnosed_at_once(axis_campaign: Path, run: Run) -> None:
     (axis_campaign / "campaign.toml").unlink()
     assert run("init", axis_campaign, "--quiet") == (0, "", "")

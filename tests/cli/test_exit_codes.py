@@ -180,6 +180,7 @@ def test_output_that_nobody_reads_ends_without_a_word() -> None:
     assert (shown.returncode, shown.stderr) == (141, b"")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device here that is always full")
 def test_output_that_finds_no_room_is_told(axis_campaign: Path) -> None:
     record = axis_campaign / "fit.csv"

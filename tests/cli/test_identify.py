@@ -28,6 +28,7 @@ def test_identify_leaves_all_results_and_shows_the_table(
     assert code == 0, stderr
 
 
+@pytest.mark.slow
 def test_identify_says_nothing_if_quiet(axis_campaign: Path, tmp_path: Path, run: Run) -> None:
     assert run("identify", axis_campaign, "-o", tmp_path / "out", "--quiet") == (0, "", "")
 

@@ -23,6 +23,7 @@ T = 0.01 * np.arange(300)
 ROWS = {"t": T, "u": np.sin(9 * T**2), "x": 0.01 * np.cos(9 * T**2)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("suffix", "write"), FORMATS.values(), ids=FORMATS)
 def test_every_format_is_told_to_people_and_machines(
     tmp_path: Path, run: Run, suffix: str, write: Write

@@ -70,6 +70,7 @@ def test_every_command_takes_it(run: Run) -> None:
         assert "--json" in run(command, "--help")[1], command
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="completion of another shell there")
 def test_the_shell_completes_names_of_effects() -> None:
     environment = {

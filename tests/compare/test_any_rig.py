@@ -98,6 +98,7 @@ def test_a_sensor_that_a_record_lacks_is_left_out() -> None:
     assert errors(comparison, "same", "free_run_nrmse") == {"load_angle": pytest.approx(NOISE, rel=0.1)}
 
 
+@pytest.mark.slow
 def test_inputs_that_move_at_once_are_told_apart() -> None:
     rng = np.random.default_rng(1)
     low = butter(3, 0.1)

@@ -149,6 +149,7 @@ def test_unknown_when_the_true_effect_is_not_among_the_candidates() -> None:
     assert diagnosis.candidates[0].probability < 0.5
 
 
+@pytest.mark.slow
 def test_without_given_numbers_the_gap_is_that_of_the_best_linear_ones(cubic_records) -> None:
     diagnosis = diagnosed(cubic_records, ("cubic_stiffness",), given={})
     gap = diagnosis.gap["x"]
@@ -156,6 +157,7 @@ def test_without_given_numbers_the_gap_is_that_of_the_best_linear_ones(cubic_rec
     assert diagnosis.effects == ("cubic_stiffness",)
 
 
+@pytest.mark.slow
 def test_models_of_an_axis_without_a_spring_follow_its_motion() -> None:
     records = stage(["coulomb_friction"], T_c=0.8, k=0.0, d=3.0)
     diagnosis = diagnosed(records, ("coulomb_friction", "quadratic_damping"), {"m": 2.0, "d": 3.0, "k": 0.0})
@@ -194,6 +196,7 @@ def test_a_force_element(effect: str, own: Mapping[str, float]) -> None:
     assert diagnosis.gap["force"].closed == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_running_gear_whose_records_lack_the_lateral_displacement() -> None:
     inputs = [sweep(0.25 * amplitude) for amplitude, _ in RUNS]
     full = measured(RUNNING_GEAR, ["cubic_stiffness"], {**GEAR, "k_3": 2e5}, inputs)
@@ -212,6 +215,7 @@ def test_a_running_gear_whose_records_lack_the_lateral_displacement() -> None:
     assert not {"l_0", "c_y", "y_off"} & set(diagnosis.candidates[0].parameters)
 
 
+@pytest.mark.slow
 def test_without_a_validation_record_errors_are_those_of_the_fit_and_it_says_so(cubic_records) -> None:
     fitted = [r for r in cubic_records if r.role == "estimation"]
     diagnosis = diagnosed(fitted, ("cubic_stiffness",))
@@ -237,12 +241,14 @@ def test_validation_records_are_never_fitted(cubic: Diagnosis, cubic_records) ->
                 assert estimate.value == pytest.approx(before.parameters[name].value, rel=1e-3), name
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_identical_results(cubic: Diagnosis, cubic_records: tuple[Record, ...]) -> None:
     again = diagnosed(cubic_records)
     assert json.dumps(again.to_json()) == json.dumps(cubic.to_json())
     assert json.dumps(again.model) == json.dumps(cubic.model)
 
 
+@pytest.mark.slow
 def test_the_number_of_jobs_does_not_change_the_result(cubic: Diagnosis, cubic_records) -> None:
     campaign = Campaign("stage", AXIS, {"gain": 1.0}, GIVEN, cubic_records)
     parallel = diagnose(campaign, [effect_named(name) for name in CANDIDATES], n_jobs=2)

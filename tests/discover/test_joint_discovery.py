@@ -51,6 +51,7 @@ def found(drive_train: Rig) -> Discovery:
     return discover(campaign(drive_train, {**TRAIN, "k_t": 0.05, "c_2": DAMPING}))
 
 
+@pytest.mark.slow
 def test_the_law_stands_in_the_equations_at_its_joint(found: Discovery) -> None:
     (term,) = found.kept
     assert (term.name, term.where) == ("quadratic_damping", "motor_bearing")
@@ -66,6 +67,7 @@ def test_its_numbers_are_as_far_off_as_they_say(found: Discovery) -> None:
     assert numbers["c_2"].value == pytest.approx(DAMPING, rel=0.02)
 
 
+@pytest.mark.slow
 def test_results_say_where(found: Discovery) -> None:
     content = json.loads(json.dumps(found.to_json()))
     assert content["terms"][0]["where"] == "motor_bearing"

@@ -53,6 +53,7 @@ def disturbed(values: Mapping[str, float], share: float = 0.05) -> dict[str, flo
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "parameter", "value"),
     slow_but(

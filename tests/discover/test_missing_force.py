@@ -28,6 +28,7 @@ def shape_of(data: RegressionData, records: Sequence[Record] | None = None) -> M
     return missing_force(data.rig, records or estimation, values, scales, data.noise["x"], rng)
 
 
+@pytest.mark.slow
 def test_a_cube_is_seen_as_a_cube(make_data) -> None:
     values, data = make_data("cubic", 2e-5)
     found = shape_of(data)
@@ -39,6 +40,7 @@ def test_a_cube_is_seen_as_a_cube(make_data) -> None:
     assert "x^3" in found.sentence
 
 
+@pytest.mark.slow
 def test_a_product_that_no_effect_has_is_seen(make_data) -> None:
     values, data = make_data("monomial", 2e-5)
     (term,) = shape_of(data).terms
@@ -46,6 +48,7 @@ def test_a_product_that_no_effect_has_is_seen(make_data) -> None:
     assert term.coefficient == pytest.approx(values["c_11"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_nothing_is_seen_where_nothing_is_lacking(make_data) -> None:
     found = shape_of(make_data("linear", 2e-5)[1])
     assert found.terms == ()
@@ -53,6 +56,7 @@ def test_nothing_is_seen_where_nothing_is_lacking(make_data) -> None:
     assert found.sentence.startswith("No product")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [2.5e-3, 1e-2])
 def test_records_of_different_sample_times_show_the_same_force(make_data, dt: float) -> None:
     values, data = make_data("cubic", 2e-5, sample_times={0.6: dt})
@@ -61,6 +65,7 @@ def test_records_of_different_sample_times_show_the_same_force(make_data, dt: fl
     assert term.coefficient == pytest.approx(values["k_3"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_record_shorter_than_a_window_changes_nothing(make_data) -> None:
     _, data = make_data("cubic", 2e-5, validation=False)
     tail = replace(data.records[0].slice(-40, None), name="tail")
@@ -73,6 +78,7 @@ def test_records_that_are_all_too_short_are_refused(make_data) -> None:
         shape_of(data, [record.slice(-40, None) for record in data.records])
 
 
+@pytest.mark.slow
 def test_each_record_has_its_own_drive_gain(make_data) -> None:
     values, data = make_data("cubic", 2e-5, validation=False)
     strong, *others = data.records
@@ -81,6 +87,7 @@ def test_each_record_has_its_own_drive_gain(make_data) -> None:
     assert term.coefficient == pytest.approx(values["k_3"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_records_of_different_inertia_are_refused(make_data) -> None:
     _, data = make_data("cubic", 2e-5, validation=False)
     text = rig_file_text("axis").replace("m*d(x)^2/2", "(m + payload)*d(x)^2/2")

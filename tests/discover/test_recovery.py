@@ -124,6 +124,7 @@ def test_one_amplitude_is_warned_of(make_data: Make) -> None:
     assert any("is nearly as good" in warning for warning in discover(data).warnings)
 
 
+@pytest.mark.slow
 def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_data: Make) -> None:
     _, data = make_data("linear", 2e-5, seconds=5.0, amplitudes=(0.3, 0.6))
     assert not any("input of fitted ones" in warning for warning in discover(data).warnings)
@@ -135,6 +136,7 @@ def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_data
     assert any("'again' as 'sweep_0.6'" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
 def test_the_full_form_finds_the_damper_among_the_terms(make_data: Make) -> None:
     values, data = make_data("linear", 2e-5, seconds=5.0)
     found = discover(data, "full")
@@ -144,6 +146,7 @@ def test_the_full_form_finds_the_damper_among_the_terms(make_data: Make) -> None
     assert found.rig_parameters["d"].value == pytest.approx(values["d"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_points_give_the_same_equation_as_windows_where_noise_is_low(make_data: Make) -> None:
     values, data = make_data("cubic", 2e-6, seconds=5.0)
     found = discover(data, pointwise=True)
@@ -156,6 +159,7 @@ def test_terms_that_the_records_cannot_tell_apart_are_named(discovered: Discover
     assert any("gravity_pendulum" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
 def test_the_held_out_error_is_that_of_the_polished_equation(
     make_data: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -185,6 +189,7 @@ def test_equations_that_cannot_be_simulated_are_told(
         discover(data)
 
 
+@pytest.mark.slow
 def test_a_chosen_equation_whose_score_stayed_rough_is_scored(
     make_data: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,6 +204,7 @@ def test_a_chosen_equation_whose_score_stayed_rough_is_scored(
     assert [run.record for run in found.runs] == list(found.held_out)
 
 
+@pytest.mark.slow
 def test_without_validation_a_record_is_set_aside_and_this_is_said(make_data: Make) -> None:
     _, data = make_data("cubic", 2e-5, seconds=5.0, validation=False)
     found = discover(data)

@@ -57,6 +57,7 @@ def test_the_index_and_the_neighbors_link_to_pages_that_exist(hook: Hook) -> Non
         assert set(re.findall(r"\]\((\w+)\.md\)", pages.effect_page(effect))) <= names - {effect.name}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["coulomb_friction", "input_delay"])
 def test_the_pictures_of_a_page_are_drawn(hook: Hook, few_frequencies: ModuleType, name: str) -> None:
     effect = effect_named(name)

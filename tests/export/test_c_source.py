@@ -51,6 +51,7 @@ def output_of(program: Path, case) -> dict[str, np.ndarray]:
     return {name: table[:, i + 1] for i, name in enumerate(case.outputs)}
 
 
+@pytest.mark.slow
 def test_it_gives_the_outputs_of_the_engine_to_rounding(case, tmp_path: Path):
     written(case, tmp_path)
     flags = (*(option for option in kernel_options() if option != "-w"), *WARNED)
@@ -59,6 +60,7 @@ def test_it_gives_the_outputs_of_the_engine_to_rounding(case, tmp_path: Path):
 
 
 # One of each kind of text that the integrator has; FMUs are compiled with yet other options.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     slow_but(
@@ -83,6 +85,7 @@ def test_it_holds_the_engine_s_own_text(case_named, tmp_path: Path):
     assert accurate_integrator(KernelEquations(case.model.structure)) in text
 
 
+@pytest.mark.slow
 def test_its_accuracy_can_be_chosen(case_named, tmp_path: Path):
     case = case_named("bouc_wen_hysteresis")
     written(case, tmp_path)
@@ -154,6 +157,7 @@ def test_a_delay_longer_than_the_history_is_told(case_named, tmp_path: Path):
     assert "status 3" in run.stderr
 
 
+@pytest.mark.slow
 def test_a_start_that_friction_would_hold_is_refused_with_a_status_of_its_own(case_named, tmp_path: Path):
     case = case_named("friction at two joints")
     written(case, tmp_path)

@@ -231,6 +231,7 @@ def test_the_same_model_gives_the_same_bytes(target: str, case_named):
     assert first == second
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("target", "others"), [("fmu", []), ("fmu3", ["sources/buildDescription.xml"])])
 @pytest.mark.parametrize("name", ["all delays", "axis held constant", "element"])
 def test_its_sources_compile_without_a_warning(

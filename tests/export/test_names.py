@@ -195,6 +195,7 @@ def c_outputs(case: Named, folder: Path) -> dict[str, NDArray[np.float64]]:
     return dict(zip(head.split(",")[1:], columns[1:], strict=True))
 
 
+@pytest.mark.slow
 def test_the_words_are_those_of_the_templates(words: list[str]):
     known = ("n", "dt", "c", "p", "i", "x", "y", "state", "first", "numbers", "given", "params", "result0")
     assert set(known) < set(words)
@@ -202,6 +203,7 @@ def test_the_words_are_those_of_the_templates(words: list[str]):
     assert WORDS & set(words)
 
 
+@pytest.mark.slow
 def test_the_python_function_gives_the_outputs_of_the_engine(all_named: Named):
     assert all_named.worst(python_outputs(all_named)) <= 1e-6
 
@@ -217,10 +219,12 @@ def test_the_control_system_gives_the_outputs_of_the_engine(all_named: Named):
     assert all_named.worst(outputs) <= 1e-6
 
 
+@pytest.mark.slow
 def test_the_c_file_gives_the_outputs_of_the_engine(all_named: Named, tmp_path: Path):
     assert all_named.worst(c_outputs(all_named, tmp_path), reported=True) <= 1e-8
 
 
+@pytest.mark.slow
 def test_the_matlab_function_binds_no_name_twice(all_named: Named):
     text = str(export_model(all_named.model, "matlab", source="rig", name="rig", step=STEP))
     fields = re.findall(r"^p\.(\w+) = ", text, re.MULTILINE)
@@ -243,6 +247,7 @@ def test_the_matlab_function_binds_no_name_twice(all_named: Named):
     assert not set(inputs) & set(re.findall(r"\w+", re.sub(r"_of\(\w+", "_of(", pieces.partition("\n")[2])))
 
 
+@pytest.mark.slow
 def test_the_modelica_model_declares_every_name_once_and_none_that_it_calls(all_named: Named):
     text = str(export_model(all_named.model, "modelica", source="rig", name="Rig"))
     head, _, body = re.sub(r"\"[^\"]*\"|//.*", "", text).partition("\nequation\n")
@@ -339,6 +344,7 @@ def part_named(request: pytest.FixtureRequest, tmp_path: Path) -> Named:
     return make(tmp_path)
 
 
+@pytest.mark.slow
 def test_an_equilibrium_and_friction_are_those_of_the_engine(part_named: Named, tmp_path: Path):
     assert part_named.worst(python_outputs(part_named)) <= 1e-6
     assert part_named.worst(c_outputs(part_named, tmp_path), reported=True) <= 1e-8

@@ -10,6 +10,7 @@ from rigsight.records import Record
 RESOLUTION = 2.0 * np.pi / 20.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 def test_the_hold_between_samples_is_taken_out(second_order, hold: str) -> None:
     truth = second_order(D=0.5)

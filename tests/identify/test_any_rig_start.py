@@ -85,6 +85,7 @@ def constants_of(rig: Rig) -> dict[str, float]:
     return {c.name: c.default for c in rig.constants if c.default is not None}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.1, 10.0])
 def test_a_rate_and_a_travel_tell_all_of_a_car_whatever_its_size(factor: float) -> None:
     rig = rig_of("quarter_car")
@@ -96,6 +97,7 @@ def test_a_rate_and_a_travel_tell_all_of_a_car_whatever_its_size(factor: float) 
         assert found[name] == pytest.approx(truth[name], rel=0.05), name
 
 
+@pytest.mark.slow
 def test_a_load_that_no_sensor_shows_is_told_by_the_resonances_of_the_motor() -> None:
     rig = rig_of("drive_train")
     record = measured(rig, TRAIN, {"u": chirp(1.0, 250.0)}, ("motor_angle",))
@@ -185,6 +187,7 @@ def test_sensors_of_a_prescribed_motion_need_no_joint() -> None:
         rig_of_text(GYRO.replace('prescribed_by = "stepper"', ""))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_samples", [20, 50, 63])
 def test_a_short_record_is_cut_into_pieces_that_say_more_than_their_own_initial_states(
     n_samples: int,

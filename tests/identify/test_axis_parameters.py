@@ -21,6 +21,7 @@ def measured(values: np.ndarray, seed: int, share: float = 0.01) -> FrequencyRes
     return FrequencyResponse(OMEGA, values + error, "u", "x", "m/N", variance=size**2)
 
 
+@pytest.mark.slow
 def test_an_axis_returns_its_numbers_with_honest_errors() -> None:
     truth = GAIN / (K - M * OMEGA**2 + 1j * D * OMEGA)
     deviations = []

@@ -165,6 +165,7 @@ def test_an_undetermined_coordinate_spoils_only_the_parameters_that_depend_on_it
     assert not np.any(np.isnan(propagated))
 
 
+@pytest.mark.slow
 def test_an_interval_of_a_mean_covers_as_often_as_it_says() -> None:
     rng, ones, inside = np.random.default_rng(7), np.ones((400, 1)), {False: 0, True: 0}
     for _ in range(1000):

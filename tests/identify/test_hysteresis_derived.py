@@ -82,6 +82,7 @@ def test_a_spring_without_hysteresis_has_no_loop() -> None:
         loop_area(whole, parameter_vector(whole, VALUES)[:, None], 0.0)
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_saturation_follows_the_sum_not_the_parts() -> None:
     # beta and gamma are known to 20 % each, and so anticorrelated that their sum is known to 2 %.
     covariance = np.array([[64.0, -63.5], [-63.5, 64.0]])

@@ -64,6 +64,7 @@ def calibrated(values: dict[str, float], n: float | None, seed: int) -> tuple[Ca
     return found, records
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but("r", of=SETS))
 def test_the_sets_of_the_thesis_come_back(name: str) -> None:
     found, _ = calibrated(SETS[name], 1.0, seed=3)
@@ -119,6 +120,7 @@ def test_an_exponent_that_is_no_whole_number_comes_back() -> None:
     assert saturation.value == pytest.approx(4000.0 ** (-1.0 / 1.5), rel=0.02)
 
 
+@pytest.mark.slow
 def test_sliders_that_a_search_takes_for_their_neighbors_come_back() -> None:
     """Nearly all slip at every amplitude: the search alone ends at 58 times their reach, whatever its seed."""
     truth = {

@@ -62,6 +62,7 @@ def test_a_command_that_is_constant_from_the_first_sample_is_a_step_with_which_t
         assert estimates.standard_errors[name] < 0.05 * abs(VALUES[name]), name
 
 
+@pytest.mark.slow
 def test_a_record_that_is_too_short_is_told_what_would_help() -> None:
     record = measured(log_sweep(DT * np.arange(600), 3e-3, 0.6, 60.0), "sweep")
     motion = identify_record(record, RUNNING_GEAR, CONSTANTS, EstimationOptions()).paths[0]
@@ -118,6 +119,7 @@ def swept_at_once(shape: str, own: dict[str, float], first: int = 0) -> Record:
     return clean.with_signals(**noisy).slice(first, t.size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["local_rational", "local_polynomial", "h1"])
 @pytest.mark.parametrize("own", [SOFT, STIFF], ids=["soft", "stiff"])
 @pytest.mark.parametrize(("shape", "first"), [("linear", 0), ("log", 0), ("linear", 250)])

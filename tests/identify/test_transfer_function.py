@@ -191,6 +191,7 @@ def test_a_band_below_the_break_frequency_is_no_success() -> None:
     assert "does not show the break frequency" in low.message
 
 
+@pytest.mark.slow
 def test_the_wrong_form_is_named_by_its_misfit() -> None:
     fit = fit_frequency_response(measured(YAW, 0.01), "pt1")
     assert fit.misfit > 3.0
@@ -297,6 +298,7 @@ def test_bad_steps_are_told_in_words() -> None:
     assert "does not exceed the noise" in fit.message
 
 
+@pytest.mark.slow
 def test_errors_from_short_steps_allow_for_a_disturbance_that_rings_as_the_rig_does() -> None:
     """Lightly damped, 4 s, and nearly all that is left is a disturbance: lines of a spectrum lie wider than the resonance."""
     own = {**GEAR_VALUES, "k_d": 1.2}

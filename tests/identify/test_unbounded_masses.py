@@ -50,6 +50,7 @@ unit = "m"
 """
 
 
+@pytest.mark.slow
 def test_a_mass_without_a_bound_starts_above_zero() -> None:
     rig = rig_of_text(CARTS)
     values = {"m": 2.0, "k": 40.0, "c": 20.0, "d": 1.0}

@@ -26,6 +26,7 @@ def every_place(rig: Rig) -> list[str]:
     return [place.name for place in (*mechanism.joints, *mechanism.drives, *mechanism.sensors)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("marked", [False, True])
 @pytest.mark.parametrize("name", ALL)
 def test_no_text_stands_on_another_or_beyond_the_edge(name: str, marked: bool) -> None:

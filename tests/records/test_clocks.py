@@ -141,6 +141,7 @@ def check_times(record: Record, late: float = 0.0) -> None:
     np.testing.assert_allclose(record["x"][inner], position(record.t - late)[inner], atol=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITERS)
 def test_each_signal_goes_by_its_own_clock(tmp_path: Path, name: str) -> None:
     file, write = WRITERS[name]
@@ -153,6 +154,7 @@ def test_each_signal_goes_by_its_own_clock(tmp_path: Path, name: str) -> None:
     assert "clocks of their own" in record.notes[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in WRITERS if name != "MDF groups"])
 def test_init_proposes_what_can_be_read(tmp_path: Path, name: str) -> None:
     file, write = WRITERS[name]

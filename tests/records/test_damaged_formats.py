@@ -83,6 +83,7 @@ def test_flipped_bytes_are_told_or_read(tmp_path: Path, name: str) -> None:
         reported(path)
 
 
+@pytest.mark.slow
 @formats
 def test_damaged_files_are_not_said_to_be_a_defect_of_the_program(tmp_path: Path, name: str) -> None:
     path, good = contents(tmp_path, name)

@@ -57,6 +57,7 @@ def test_the_same_record_in_any_format(tmp_path: Path, suffix: str, write: Write
         np.testing.assert_array_equal(other[signal], text[signal], strict=True)
 
 
+@pytest.mark.slow
 @formats
 def test_single_precision_is_kept_and_its_time_meant_as_decimals(
     tmp_path: Path, suffix: str, write: Write
@@ -70,6 +71,7 @@ def test_single_precision_is_kept_and_its_time_meant_as_decimals(
     assert record.notes == ()
 
 
+@pytest.mark.slow
 @formats
 def test_content_decides_and_not_the_name(tmp_path: Path, suffix: str, write: Write) -> None:
     write(tmp_path / f"run{suffix}", rows(), {})
@@ -86,6 +88,7 @@ def test_a_name_that_promises_what_the_content_is_not(tmp_path: Path, suffix: st
         read(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("write", [write_hdf5, write_mdf, write_tdms, write_parquet, write_uff])
 def test_units_that_the_file_states_are_converted_and_told(tmp_path: Path, write: Write) -> None:
     path = tmp_path / "run"
@@ -98,6 +101,7 @@ def test_units_that_the_file_states_are_converted_and_told(tmp_path: Path, write
     assert any("mA" in note and "'" in note for note in record.notes)
 
 
+@pytest.mark.slow
 def test_scale_wins_over_the_unit_of_the_file(tmp_path: Path) -> None:
     write_parquet(tmp_path / "run", rows(), {"u": "mA"})
     record = read(tmp_path / "run", columns={"u": ColumnMapping("u", scale=2.0)})
@@ -105,6 +109,7 @@ def test_scale_wins_over_the_unit_of_the_file(tmp_path: Path) -> None:
     assert record.notes == ()
 
 
+@pytest.mark.slow
 def test_a_unit_of_the_campaign_wins_over_that_of_the_file(tmp_path: Path) -> None:
     write_parquet(tmp_path / "run", rows(), {"u": "kA"})
     record = read(tmp_path / "run", columns={"u": ColumnMapping("u", unit="mA")})
@@ -144,6 +149,7 @@ def test_a_unit_in_brackets_behind_the_name_is_converted_and_told(tmp_path: Path
     np.testing.assert_array_equal(record["y"], rows()["y"])
 
 
+@pytest.mark.slow
 def test_a_unit_that_does_not_fit_is_told_with_the_mend(tmp_path: Path) -> None:
     write_parquet(tmp_path / "run.parquet", rows(), {"psi": "mm"})
     with pytest.raises(InputError) as caught:
@@ -152,6 +158,7 @@ def test_a_unit_that_does_not_fit_is_told_with_the_mend(tmp_path: Path) -> None:
         assert part in str(caught.value)
 
 
+@pytest.mark.slow
 def test_an_input_without_a_unit_of_its_own_is_converted_to_that_of_a_drive_and_told(tmp_path: Path) -> None:
     write_parquet(tmp_path / "run", rows(), {"u": "kN"})
     record = read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS)
@@ -269,6 +276,7 @@ def test_columns_of_a_matrix(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(tmp_path / "run.mat", columns=by_number)["y"], rows()["y"])
 
 
+@pytest.mark.slow
 def test_time_may_be_given_as_a_sample_time(tmp_path: Path) -> None:
     timeless = {name: samples for name, samples in rows().items() if name != "t"}
     write_matlab(tmp_path / "run.mat", timeless, {})
@@ -282,6 +290,7 @@ def test_time_may_be_given_as_a_sample_time(tmp_path: Path) -> None:
         read(tmp_path / "run.csv", dt=0.01, columns={"t": ColumnMapping("u")})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["text", "matlab", "mdf"])
 def test_a_sample_time_beside_the_time_of_a_file_is_told(tmp_path: Path, kind: str) -> None:
     suffix, write = {
@@ -295,6 +304,7 @@ def test_a_sample_time_beside_the_time_of_a_file_is_told(tmp_path: Path, kind: s
     assert note.endswith("was not read. Leave dt out to read it.")
 
 
+@pytest.mark.slow
 def test_dates_count_in_seconds_from_the_first(tmp_path: Path) -> None:
     stamps = np.datetime64("2024-05-01T12:00:00", "us") + (10_000 * np.arange(120)).astype("timedelta64[us]")
     write_parquet(tmp_path / "run", rows() | {"t": stamps}, {})
@@ -308,6 +318,7 @@ def test_whole_numbers_are_read_as_numbers(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(tmp_path / "run")["u"], counts["u"].astype(np.float64))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("write", [write_matlab, write_hdf5, write_mdf, write_tdms, write_parquet])
 def test_a_gap_is_told_with_channel_and_sample(tmp_path: Path, write: Write) -> None:
     broken = rows()
@@ -411,6 +422,7 @@ def test_references_and_data_in_other_files_are_not_followed(tmp_path: Path) -> 
     assert "link" not in refused
 
 
+@pytest.mark.slow
 def test_a_formula_in_a_file_is_not_executed(tmp_path: Path) -> None:
     asammdf = pytest.importorskip("asammdf")
     signals = [

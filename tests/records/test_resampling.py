@@ -112,6 +112,7 @@ def test_the_own_rate_changes_nothing_and_is_not_told(tmp_path: Path) -> None:
     np.testing.assert_array_equal(same["x"], plain["x"])
 
 
+@pytest.mark.slow
 def test_groups_with_a_time_each_go_by_their_own(tmp_path: Path) -> None:
     from scipy.io import savemat
 

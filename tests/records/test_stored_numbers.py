@@ -108,6 +108,7 @@ def test_attributes_that_are_no_conversion_are_passed_over() -> None:
     assert stored_by(odd) == Stored()
 
 
+@pytest.mark.slow
 def test_invalid_samples_of_an_mdf_channel_keep_the_others_at_their_times(tmp_path: Path) -> None:
     asammdf = pytest.importorskip("asammdf")
     invalid = T < 0.2

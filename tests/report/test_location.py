@@ -7,6 +7,8 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 
+import pytest
+
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.result import Diagnosis
 from rigsight.discover import JointForce, JointLaw
@@ -24,6 +26,7 @@ def words(html: str) -> str:
     return " ".join(re.sub(r"<[^>]+>", " ", html).split())
 
 
+@pytest.mark.slow
 def test_the_page_says_on_which_leg_the_gap_lies(page_of: Callable[[str], str]) -> None:
     page = words(page_of("effect"))
     assert "The gap lies before psi is measured." in page
@@ -95,6 +98,7 @@ def joint_force(joint: str, left: float) -> JointForce:
     return JointForce(joint, "rad", "N m", (), 0.9, left, 1e-3, JointLaw((), 0.0, {}), {}, 1.0)
 
 
+@pytest.mark.slow
 def test_the_missing_force_is_told_joint_by_joint(variant: Callable[[str], Diagnosis]) -> None:
     forces = (joint_force("load", 0.95), joint_force("motor", 1.2), joint_force("shaft", 145.0))
     unknown = replace(variant("unknown"), missing_force=None, joint_forces=forces)
@@ -107,6 +111,7 @@ def test_the_missing_force_is_told_joint_by_joint(variant: Callable[[str], Diagn
     assert "ruled out by the sensors" not in words(render(variant("effect")))
 
 
+@pytest.mark.slow
 def test_the_maps_of_joints_are_those_that_the_verdict_names_else_all(diagnosis: Diagnosis) -> None:
     states = diagnosis.localization.by_state
     at_joints = tuple(replace(part, joint=joint) for joint in ("load", "shaft") for part in states)

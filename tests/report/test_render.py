@@ -135,6 +135,7 @@ def test_parameters_without_a_fit_come_from_the_model(page_of: Callable[[str], s
     assert "J_z 0.5612 kg m 2 yaw inertia of the axle bridge" in words
 
 
+@pytest.mark.slow
 def test_long_records_make_no_heavy_page(page_of: Callable[[str], str]) -> None:
     assert len(page_of("long").encode()) < 3_000_000
 

@@ -51,6 +51,7 @@ def page(diagnosis: Diagnosis) -> str:
     return render_report(diagnosis, command="rigsight diagnose", versions={})
 
 
+@pytest.mark.slow
 def test_a_number_that_differs_is_told_everywhere(diagnosis: Diagnosis) -> None:
     found = with_trust(diagnosis, FALLING, SAME)
     html, line = page(found), trust_line(found)
@@ -64,6 +65,7 @@ def test_a_number_that_differs_is_told_everywhere(diagnosis: Diagnosis) -> None:
     assert line.startswith("Trust: d falls with amplitude. Damping depends on the motion")
 
 
+@pytest.mark.slow
 def test_numbers_that_are_the_same_need_no_experiment(diagnosis: Diagnosis) -> None:
     found = with_trust(diagnosis, SAME)
     assert "k is the same in every record" in trust_line(found)

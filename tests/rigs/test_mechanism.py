@@ -66,6 +66,7 @@ def test_an_arm_without_damping_keeps_its_energy() -> None:
     assert np.ptp(run.y[0]) > 1.0
 
 
+@pytest.mark.slow
 def test_the_equations_of_a_large_arm_come_in_seconds_and_keep_its_energy() -> None:
     """Measured: 2.6 s of processor time; with simplified symbols it takes many minutes."""
     start = time.process_time()

@@ -39,6 +39,7 @@ def test_numbers_of_joints_are_parameters_and_those_of_bodies_and_drives_constan
     assert draft.left_out == draft.notes == ()
 
 
+@pytest.mark.slow
 def test_the_text_declares_the_same_rig() -> None:
     draft = draft_rig(load_model(MODELS / "spatial_arm.xml"), "spatial arm")
     text = rig_text(draft, "spatial_arm.xml", Path())

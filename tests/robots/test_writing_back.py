@@ -72,6 +72,7 @@ def test_the_written_model_moves_as_the_plant_and_the_old_one_does_not(tmp_path:
     assert np.all(left < 1e-6 * gap)
 
 
+@pytest.mark.slow
 def test_every_field_is_the_one_that_the_effect_means(tmp_path: Path) -> None:
     """MuJoCo runs what was written as rigsight simulates it; its dry friction gives way a little."""
     fine = tmp_path / ARM.name

@@ -123,6 +123,7 @@ def test_a_delay_within_a_loop(effect: str, delay: float, goal: str, hold: Hold)
     assert_same(found, shown(past, 0, delay if of_sensor else 0.0))
 
 
+@pytest.mark.slow
 def test_a_late_drive_that_reads_a_late_sensor() -> None:
     structure = compose(RIGS["servo"], [at("input_delay@motor"), at("sensor_delay@angle")])
     record = Record("run", DT, {"goal": GOALS["saturated"]}, {}, hold="foh")

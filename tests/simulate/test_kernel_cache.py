@@ -90,6 +90,7 @@ def fresh_cache(tmp_path, monkeypatch):
     return tmp_path / "kernels"
 
 
+@pytest.mark.slow
 def test_second_process_does_not_compile_and_gives_the_same_bits_and_damaged_code_is_replaced(
     fresh_cache, tmp_path
 ):

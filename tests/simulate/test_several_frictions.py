@@ -161,6 +161,7 @@ def driven(signals: Mapping[str, Floats], hold: Hold = "foh") -> Record:
     return Record("run", DT, dict(signals), {}, hold=hold)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("levels", "counts"), [(TWO, {0, 1, 2}), (THREE, {0, 1, 3})], ids=["bearings", "bearings and shaft"]
 )

@@ -177,6 +177,7 @@ def test_the_hysteresis_benchmark_reaches_its_noise(shared_data: Path) -> None:
     assert values["gamma"] == pytest.approx(1e3 * -1.1, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="names of files are text elsewhere")
 def test_a_folder_whose_name_is_no_text_is_diagnosed_and_compared(
     axis_campaign: Path, write_model: Callable[..., Path], tmp_path: Path

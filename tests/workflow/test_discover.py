@@ -87,6 +87,7 @@ def test_effects_that_are_modelled_already_are_refused(axis_campaign: Path) -> N
         regression_data(campaign)
 
 
+@pytest.mark.slow
 def test_the_command_says_the_equation_and_where_it_is(axis_campaign: Path, tmp_path: Path) -> None:
     from typer.testing import CliRunner
 

@@ -118,6 +118,7 @@ def test_what_bends_a_decay_is_named(
     assert any("only up to a common factor. m = 1 kg is held" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_friction_that_ends_a_decay_is_told_from_what_else_slows_it(tmp_path: Path) -> None:
     tried = [effect_named(name) for name in ("coulomb_friction", "quadratic_damping", "input_dead_zone")]
     found = run_diagnose(campaign(tmp_path / "c", dry=0.35), effects=tried, n_jobs=1)

@@ -35,6 +35,7 @@ def test_clear_names_make_a_campaign_at_once(tmp_path: Path) -> None:
     assert campaign.records[0].amplitude == pytest.approx(2.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_units_in_names_are_written_and_applied(tmp_path: Path) -> None:
     odd = {"Zeit [ms]": 1e3 * T, "Anregung": SWEEP, "Signal/Weg mm": 1e3 * ANSWER, "Temperatur": ANSWER}
     write_text(tmp_path / "messung.csv", odd, {})
@@ -220,6 +221,7 @@ def test_a_log_of_a_robot_is_read_from_json(tmp_path: Path) -> None:
     np.testing.assert_allclose(record["x"], ANSWER)
 
 
+@pytest.mark.slow
 def test_units_that_the_file_states_need_no_mapping(tmp_path: Path) -> None:
     write_mdf(tmp_path / "a.mf4", {"t": T, "u": SWEEP, "x": 1e3 * ANSWER}, {"u": "N", "x": "mm"})
     draft = run_init(tmp_path)
@@ -367,9 +369,7 @@ def test_every_candidate_is_listed(tmp_path: Path) -> None:
 
 
 def test_constants_beside_the_signals_are_no_candidates(tmp_path: Path) -> None:
-    savemat(
-        tmp_path / "a.mat", {"t": T, "u": SWEEP, "a1": ANSWER, "a2": ANSWER, "gains": np.arange(4.0)}
-    )
+    savemat(tmp_path / "a.mat", {"t": T, "u": SWEEP, "a1": T, "a2": ANSWER, "gains": np.arange(4.0)})
     text = run_init(tmp_path, model="axis").path.read_text(encoding="utf-8")
     assert 'one of: "a1", "a2"' in text
     assert "gains" not in text

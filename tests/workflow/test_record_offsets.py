@@ -90,6 +90,7 @@ def reported(diagnosis: Diagnosis) -> list[Any]:
     return [finding for finding in diagnosis.data_quality.findings if finding.kind == "offset"]
 
 
+@pytest.mark.slow
 def test_offsets_that_nobody_declared_are_told_before_a_second_effect_is_believed() -> None:
     found = diagnosed(campaign(), ["coulomb_friction", "iwan_hysteresis"])
     assert found.effects == ("coulomb_friction",)
@@ -169,6 +170,7 @@ def test_identify_estimates_them_and_compare_scores_without_them() -> None:
     assert abs(at_rest["x"][-1]) < 1e-3
 
 
+@pytest.mark.slow
 def test_discovery_finds_the_friction_beside_them() -> None:
     found = discover_campaign(campaign("per_record"))
     assert found.model["effects"] == ["coulomb_friction"]

@@ -157,6 +157,7 @@ def test_two_masses_answer_by_their_closed_form(tmp_path: Path) -> None:
         assert variant.features["lowest_gain"] == pytest.approx(own["k_t"] / own["k_l"], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_road_is_swept_as_a_motion(tmp_path: Path) -> None:
     values = {"m_b": 300.0, "m_w": 40.0, "k_b": 2e4, "d_b": 1500.0, "k_t": 2e5, "d_t": 100.0}
     model = larger_model(tmp_path, "quarter_car", values)

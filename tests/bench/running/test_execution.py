@@ -24,6 +24,8 @@ from rigsight.errors import InputError, RigsightError
 from rigsight_bench.running import execution
 from rigsight_bench.running.execution import finished
 
+pytestmark = pytest.mark.slow
+
 PATIENCE = 120.0
 
 
@@ -130,6 +132,7 @@ def test_a_killed_process_of_this_machine_is_told_as_what_it_is() -> None:
         list(finished(run, range(2), n_jobs=2))
 
 
+@pytest.mark.slow
 @on_a_cluster
 def test_a_worker_that_is_killed_in_the_middle_loses_no_trial(
     address: str, tmp_path: Path, files: Path
@@ -246,6 +249,7 @@ def test_a_worker_with_another_rigsight_is_named(address: str, tmp_path: Path, f
     assert not begun(files)
 
 
+@pytest.mark.slow
 @on_a_cluster
 @pytest.mark.parametrize("away", [0.0, 2.0])
 def test_a_scheduler_that_dies_is_told_in_one_message(
@@ -269,6 +273,7 @@ def test_a_scheduler_that_dies_is_told_in_one_message(
     assert not [record for record in caplog.records if record.name.startswith("distributed")]
 
 
+@pytest.mark.slow
 @on_a_cluster
 def test_a_trial_that_kills_its_workers_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(execution, "_ROUNDS", 2)

@@ -103,6 +103,7 @@ def test_one_effect_of_each_family_is_drawn_and_any_may_be_the_main_one() -> Non
     assert {family[kind_of(effects[0].name)] for effects in drawn} == set(cell.families)
 
 
+@pytest.mark.slow
 def test_a_wired_rig_that_nothing_touches_moves_as_the_rig_itself() -> None:
     bench, _ = taken("clean", "drive_train")
     run = bench.runs[1]
@@ -124,6 +125,7 @@ def test_a_joint_that_is_warm_has_lost_what_is_said() -> None:
     assert np.allclose(warm["psi"], expected["psi"], atol=1e-5 * np.ptp(expected["psi"]))
 
 
+@pytest.mark.slow
 def test_clean_records_differ_from_the_motion_by_white_noise_alone() -> None:
     bench, records = taken("clean", "stage")
     for record, motion in zip(records, quiet(bench), strict=True):
@@ -133,6 +135,7 @@ def test_clean_records_differ_from_the_motion_by_white_noise_alone() -> None:
         assert abs(np.corrcoef(left[1:], left[:-1])[0, 1]) < 0.1
 
 
+@pytest.mark.slow
 def test_behind_a_filter_noise_rolls_off_and_no_record_begins_at_rest() -> None:
     bench, records = taken("antialias_filter", "stage")
     for record in records:
@@ -152,6 +155,7 @@ def test_a_filter_leaves_what_is_slow_and_begins_settled() -> None:
     assert np.allclose(sampled(slow, 4, 0.5, 0.0, rng), slow[::4], atol=1e-2)
 
 
+@pytest.mark.slow
 def test_feedback_is_measured_with_noise_on_the_input_and_a_force_moves_the_rig() -> None:
     bench, records = taken("feedback", "joint")
     assert bench.around.law is not None
@@ -190,6 +194,7 @@ def test_a_loop_brings_a_joint_to_its_goal() -> None:
     assert np.real(found.frequency_response(np.zeros(1))[0, 0, column]) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_repeats_have_one_input_but_for_the_noise_of_its_sensor() -> None:
     bench, records = taken("repeats", "stage")
     noise = bench.around.input_noise * bench.sizes["u"]
@@ -200,6 +205,7 @@ def test_repeats_have_one_input_but_for_the_noise_of_its_sensor() -> None:
         assert np.std(records[one]["x"] - records[other]["x"]) > 0.0
 
 
+@pytest.mark.slow
 def test_under_stiction_a_force_from_outside_is_a_share_of_that_of_the_drive() -> None:
     bench, records = taken("stiction", "element")
     assert 5e-3 <= bench.around.push <= 5e-2
@@ -229,6 +235,7 @@ def test_an_encoder_shows_whole_steps() -> None:
     assert in_steps(np.array([0.26]), 0.5)[0] == 0.5
 
 
+@pytest.mark.slow
 def test_what_only_decays_has_a_constant_input_or_none_and_begins_away_from_rest() -> None:
     bench, records = taken("free_decay", "arm")
     inputs = [name for name in ("tau_1", "tau_2") if name in records[0]]
@@ -243,12 +250,14 @@ def test_what_only_decays_has_a_constant_input_or_none_and_begins_away_from_rest
         assert np.ptp(motion["angle_2"][-400:]) < np.ptp(motion["angle_2"][:400])
 
 
+@pytest.mark.slow
 def test_some_loggers_leave_out_the_channel_that_does_not_move() -> None:
     bench, _ = taken("free_decay", "stage")
     handed_over = [handed(bench, quiet(bench)[:1], np.random.default_rng(i))[0] for i in range(10)]
     assert {"u" in record for record in handed_over} == {True, False}
 
 
+@pytest.mark.slow
 def test_offsets_differ_from_record_to_record() -> None:
     bench, records = taken("offsets", "running_gear")
     for name in ("psi", "y"):

@@ -188,6 +188,7 @@ def test_a_hold_hidden_by_an_effect_shows_with_the_effect_in_the_model():
     assert finding.explained == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_delay_of_half_a_sample_in_the_model_hides_no_wrong_hold():
     context, reidentified = prepared([replace(r, hold="foh") for r in sweeps(effect=CUBIC, hold="zoh")])
     pair = (effect_named("cubic_stiffness"), effect_named("input_delay"))

@@ -66,6 +66,7 @@ def diagnosed(name: str) -> Diagnosis:
     return diagnose(recorded(TRUTHS[name]), [IWAN])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but("nearly all memory", of=TRUTHS))
 def test_its_numbers_come_back(name: str) -> None:
     truth, found = TRUTHS[name], diagnosed(name)

@@ -212,6 +212,7 @@ unit = "m"
 """
 
 
+@pytest.mark.slow
 def test_noise_that_is_followed_shows_in_a_pressure_and_counts_as_its_floor(tmp_path: Path) -> None:
     """A cylinder hands the noise of its position on to its pressure; a true model cannot leave less."""
     (tmp_path / "cylinder.toml").write_text(CYLINDER)

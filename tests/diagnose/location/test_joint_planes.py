@@ -72,6 +72,7 @@ def test_the_cells_of_each_plane_add_up_to_the_gap(hidden: tuple[tuple[StatePart
             assert squares == pytest.approx(np.sum(gap**2), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_of_long_records_the_stretch_with_the_largest_gap_is_mapped(
     train: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -84,6 +85,7 @@ def test_of_long_records_the_stretch_with_the_largest_gap_is_mapped(
     assert min(part.reidentified for part in own) * np.std(trace.measured["load_angle"][-300:]) > 0.5
 
 
+@pytest.mark.slow
 def test_without_a_gap_no_force_is_lacking(train: Any) -> None:
     parts = joint_parts(*reported(train, train.records()))
     assert {part.joint for part in parts} == {"shaft", "motor_bearing", "load_bearing"}

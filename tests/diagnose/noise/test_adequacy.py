@@ -144,6 +144,7 @@ def train_bench(train: Any, records: Sequence[Record]) -> FitContext:
     return FitContext(rig, estimation, scoring, estimation, scales, noise, frozenset(), train.values)
 
 
+@pytest.mark.slow
 def test_the_joint_is_told(train: Any) -> None:
     damping = placed(effect_named("quadratic_damping"), "load_bearing")
     context = train_bench(train, train.records([damping], {"c_2": 1e-3}))
@@ -153,6 +154,7 @@ def test_the_joint_is_told(train: Any) -> None:
     assert found.agreements[0].place == "load_bearing"
 
 
+@pytest.mark.slow
 def test_a_sensor_that_drifts_is_told_though_another_one_stands_still(train: Any) -> None:
     """A disturbance wanders too, but moves both sensors: what one of them alone shows is its own."""
     drift = 10.0 * train.noise
@@ -191,6 +193,7 @@ def test_of_a_residual_in_a_few_stretches_the_whole_remains() -> None:
         assert "p = " not in left.text
 
 
+@pytest.mark.slow
 def test_a_record_without_a_sensor_has_no_quieter_residual(train: Any) -> None:
     """Records of small motion that lack one of two sensors: white noise does not grow with the motion."""
     gentle, middle, strong = sorted(train.records(), key=lambda record: float(np.std(record["load_angle"])))
@@ -237,6 +240,7 @@ def test_a_true_second_effect_is_worth_trying() -> None:
     assert forms.with_own_evidence([single], [pair]) == [pair]
 
 
+@pytest.mark.slow
 def test_noise_that_only_motion_makes_is_no_noise_of_a_sensor() -> None:
     context, rng = axis_bench(), np.random.default_rng(7)
 

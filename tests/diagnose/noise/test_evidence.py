@@ -54,6 +54,7 @@ def modelled(context: FitContext) -> tuple[FittedModel, FittedModel, FittedModel
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
 def test_a_tone_that_follows_the_swing_of_a_disturbed_mass_explains_nothing(seed: int) -> None:
     context = bench_of({"k_3": 2e3}, 0.01, seed)
@@ -63,6 +64,7 @@ def test_a_tone_that_follows_the_swing_of_a_disturbed_mass_explains_nothing(seed
     assert beyond_disturbance(Evidence(context, reidentified, single), [single], [tone]) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("force", [0.0, 0.01])
 def test_a_second_effect_that_is_there_stands_with_and_without_a_disturbance(force: float) -> None:
     context = bench_of({"k_3": 2e3, "T_c": 0.02}, force)
@@ -72,6 +74,7 @@ def test_a_second_effect_that_is_there_stands_with_and_without_a_disturbance(for
     assert evidence.criterion(friction) < min(evidence.criterion(single), evidence.criterion(tone)) - 100.0
 
 
+@pytest.mark.slow
 def test_the_powers_of_force_and_noise_are_told_apart() -> None:
     context = bench_of({"k_3": 2e3}, force=0.01)
     reidentified, single, *_ = modelled(context)
@@ -81,6 +84,7 @@ def test_the_powers_of_force_and_noise_are_told_apart() -> None:
     assert np.sqrt(force) == pytest.approx(0.01, rel=0.15)
 
 
+@pytest.mark.slow
 def test_what_trades_a_slow_error_for_a_fast_one_gains_nothing() -> None:
     context = bench_of({"k_3": 2e3, "T_c": 0.02}, 0.01)
     reidentified, single, _, friction = modelled(context)

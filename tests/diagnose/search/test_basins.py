@@ -61,6 +61,7 @@ def test_a_fit_that_stopped_elsewhere_is_taken_to_the_lowest_basin(bench: FitCon
     assert found.fit.values["T_s"] == pytest.approx(TRUE["T_s"], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_fit_at_the_floor_is_left_alone(bench: FitContext) -> None:
     model = fitted(bench, STRIBECK, TRUE)
     assert in_lowest_basins(bench, [model])[0] is model
@@ -72,6 +73,7 @@ def test_a_wrong_effect_keeps_the_only_basin_that_it_has(bench: FitContext) -> N
     assert in_lowest_basins(bench, [model])[0] is model
 
 
+@pytest.mark.slow
 def test_a_rival_beside_wrong_numbers_of_the_rig_gets_those_of_the_best(bench: FitContext) -> None:
     coulomb = effect_named("coulomb_friction")
     best, right = fitted(bench, STRIBECK, TRUE), fitted(bench, coulomb, {**TRUE, "T_c": 2e-3})
@@ -102,6 +104,7 @@ def test_a_rival_of_several_effects_gets_the_effect_that_both_have(bench: FitCon
     assert found.fit.values["T_s"] == pytest.approx(TRUE["T_s"], rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_best_one_starts_from_the_numbers_of_the_next_too(
     bench: FitContext, monkeypatch: pytest.MonkeyPatch
 ) -> None:

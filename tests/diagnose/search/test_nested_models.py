@@ -85,6 +85,7 @@ def test_no_effect_ends_above_the_equations_without_it(
         assert model.fit.cost <= (1.0 + 1e-6) * base.fit.cost
 
 
+@pytest.mark.slow
 def test_an_extension_is_at_least_as_good_as_its_special_case(dry: FitContext) -> None:
     base = reidentify(dry, dry.start)
     structure = dry.composed((COULOMB,))

@@ -63,6 +63,7 @@ def examined(name: str, values: Mapping[str, float]) -> tuple[Search, list[Effec
     return search_places(context, reidentify(context, VALUES), offered), offered
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "values"), slow_but(HIDDEN[0], HIDDEN[3], of=HIDDEN), ids=str)
 def test_the_true_one_is_looked_at_first_and_its_push_tells_its_size(
     name: str, values: Mapping[str, float]
@@ -99,6 +100,7 @@ def test_the_others_follow_where_none_explains_the_records() -> None:
     assert {name for candidate in found.candidates for name in candidate.effects} >= set(tried)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("at_once", "values"),
     slow_but(

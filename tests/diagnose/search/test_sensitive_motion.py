@@ -70,6 +70,7 @@ def test_windows_do_not_make_a_wrong_effect_right(of_play: tuple[Record, ...]) -
     assert diagnosis.window_cycles is None
 
 
+@pytest.mark.slow
 def test_what_can_be_predicted_is_read_whole() -> None:
     diagnosis = diagnosed(
         measured(["cubic_stiffness"], {"k_3": 4e7}), [effect_named("cubic_stiffness"), PLAY]

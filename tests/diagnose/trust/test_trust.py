@@ -85,6 +85,7 @@ def number(found: Trust, name: str) -> ParameterTrust:
     return next(one for one in found.parameters if one.name == name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("disturbance", [0.0, 0.5], ids=["white noise", "disturbed"])
 def test_numbers_of_a_right_model_are_the_same_everywhere(disturbance: float) -> None:
     """The level is one false alarm in a hundred models: two of ten would be beyond chance."""
@@ -287,6 +288,7 @@ def test_nothing_fitted_is_nothing_to_trust() -> None:
     assert trust(context, model, records, VALUES).parameters == ()
 
 
+@pytest.mark.slow
 def test_a_diagnosis_carries_it() -> None:
     effects = (effect_named("coulomb_friction"),)
     records = axis_records((1.0, 4.0, 0.5), effects, {"T_c": 0.3})

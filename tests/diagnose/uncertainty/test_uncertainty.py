@@ -59,6 +59,7 @@ def test_it_is_the_formula_on_a_linear_rig_with_white_noise() -> None:
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([found.std[name] for name in fit.free])
 
 
+@pytest.mark.slow
 def test_errors_of_friction_under_a_slow_force_are_wider_and_true() -> None:
     before, after = [], []
     for seed in range(3, 9):
@@ -113,6 +114,7 @@ def test_what_the_records_do_not_determine_stays_undetermined() -> None:
     assert all(np.isfinite(found.std[name]) for name in fit.free[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "force"), slow_but((1e-5, 0.02), of=[(1e-3, 0.0), (1e-5, 0.02)]))
 def test_an_observer_has_errors_of_the_size_that_fits_scatter_by(noise: float, force: float) -> None:
     """A cart without a spring: an observer follows noise too, and its own errors die away."""

@@ -48,6 +48,7 @@ def test_a_missing_force_is_traced_to_its_joint(train: Any) -> None:
     assert term["coefficients"]["c_2"]["value"] == pytest.approx(1e-3, rel=0.1)
 
 
+@pytest.mark.slow
 def test_sensor_zeros_of_single_records_do_not_bend_the_missing_force() -> None:
     values = {"gain": 1.0, "m": 2.0, "d": 3.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
     noise, rng = {"x": 1e-6}, np.random.default_rng(1)

@@ -87,6 +87,7 @@ def assert_same(found: NDArray[np.float64], expected: NDArray[np.float64], limit
     assert np.max(np.abs(found - expected)) <= limit * np.max(np.abs(expected))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "effects", "hold"), slow_but(CASES[0], CASES[3], CASES[5], of=CASES))
 def test_the_motion_is_the_same(
     monkeypatch: pytest.MonkeyPatch, name: str, effects: tuple[str, ...], hold: Hold
@@ -116,6 +117,7 @@ def test_a_rate_is_read_late_with_the_acceleration(monkeypatch: pytest.MonkeyPat
     assert_same(found["angle_2"], expected["angle_2"], 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", [("quadratic_damping@elbow",), ("coulomb_friction@elbow",)])
 def test_sets_side_by_side_and_their_derivatives_are_the_same(
     monkeypatch: pytest.MonkeyPatch, effects: tuple[str, ...]

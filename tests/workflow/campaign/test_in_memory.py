@@ -43,6 +43,7 @@ def test_memory_and_disk_hold_the_same_campaign(axis_campaign: Path) -> None:
         np.testing.assert_array_equal(mine["x"], theirs["x"])
 
 
+@pytest.mark.slow
 def test_memory_and_disk_give_the_same_diagnosis(axis_campaign: Path) -> None:
     read = read_campaign(axis_campaign)
     made = make_campaign("axis", read.records, parameters=read.parameters, title=read.title)

@@ -144,6 +144,7 @@ def hardening(tmp_path_factory: pytest.TempPathFactory) -> Identification:
     )
 
 
+@pytest.mark.slow
 def test_a_hardening_spring_is_seen_in_the_amplitudes(hardening: Identification) -> None:
     assert "k_c" in hardening.changing
     assert "k_c rises" in hardening.amplitude_statement
@@ -190,6 +191,7 @@ def test_an_unknown_method_and_a_senseless_resolution_are_refused(linear_folder:
         run_identify(linear_folder, resolution=-1.0)
 
 
+@pytest.mark.slow
 def test_nothing_half_written_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -201,6 +203,7 @@ def test_nothing_half_written_is_left(tmp_path: Path, monkeypatch: pytest.Monkey
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.slow
 def test_records_of_like_names_get_figures_of_their_own(tmp_path: Path) -> None:
     campaign = write_campaign(
         tmp_path / "c", [sweep("one", 0.5, seconds=20.0), sweep("two", 0.4, seconds=20.0)]

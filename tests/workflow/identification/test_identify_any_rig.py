@@ -79,6 +79,7 @@ def test_a_record_shows_the_paths_of_the_inputs_that_move_in_it(arm: Identificat
     assert all(left < 0.005 for score in arm.joint.scores for left in score.nrmse.values())
 
 
+@pytest.mark.slow
 def test_files_hold_the_same_words_per_input_and_sensor(arm: Identification, tmp_path: Path) -> None:
     written = write_identification(arm, tmp_path)
     assert {path.name for path in written} == {
@@ -183,6 +184,7 @@ def test_a_servo_is_identified_without_any_start_values() -> None:
     assert found.changing == ()
 
 
+@pytest.mark.slow
 def test_a_record_at_rest_is_no_motion_that_the_fit_misses(monkeypatch: pytest.MonkeyPatch) -> None:
     rng, rig = np.random.default_rng(3), RIGS["drive_train"]
     moved = recorded("moved", rig, TRAIN, {"u": multisine(rng, 1.0, 100.0)}, rng)

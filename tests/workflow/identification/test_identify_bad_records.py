@@ -37,6 +37,7 @@ def test_a_campaign_without_any_excitation_of_the_resonance_is_refused(tmp_path:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_sweep_too_short_for_its_peak_is_told(tmp_path: Path) -> None:
     sharp = {**CONSTANTS, **TRUTH, "k_d": 0.05}
     found = run_identify(write_campaign(tmp_path, [sweep("short", 0.1, seconds=20.0)], values=sharp))

@@ -251,6 +251,7 @@ def test_a_record_may_have_the_word_window_in_its_name() -> None:
     assert found.joint.statement.startswith("One parameter set fits all 3 estimation records")
 
 
+@pytest.mark.slow
 def test_given_values_that_diverge_within_a_sample_are_no_start(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = rig_of_text(
         STAGE.replace('[parameters.leaf]\nunit = "N/m"\nlower = 0.0', '[parameters.leaf]\nunit = "N/m"')

@@ -144,6 +144,7 @@ def test_an_element_may_be_given_without_stiffness(tmp_path: Path) -> None:
     assert found.model["parameters"]["d"] == pytest.approx(30.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_damping_of_the_other_sign_stops_at_its_bound(tmp_path: Path) -> None:
     t = DT * np.arange(SAMPLES)
 

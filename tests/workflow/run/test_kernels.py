@@ -47,6 +47,7 @@ print(json.dumps({
 """
 
 
+@pytest.mark.slow
 def test_kernels_compiled_beforehand_are_those_that_a_fit_calls(tmp_path: Path) -> None:
     environment = {**os.environ, "RIGSIGHT_CACHE_DIR": str(tmp_path)}
     ran = subprocess.run(

@@ -115,6 +115,7 @@ def test_rates_holds_kinds_and_lengths_differ_from_trial_to_trial() -> None:
     assert all(r.dt * r.n_samples >= 9.9 for plan in drawn for r in plan)
 
 
+@pytest.mark.slow
 def test_every_plan_has_two_amplitudes_to_fit_and_another_waveform_to_score() -> None:
     for plan in plans(prescribed=False) + plans(prescribed=True):
         fitted = [r for r in plan if r.role == "estimation"]

@@ -148,6 +148,7 @@ def apart(shown: dict[str, np.ndarray], composed: Record, inside: slice = slice(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NUMBERS)
 def test_two_sources_of_each_rig_move_alike(name: str) -> None:
     inside = slice(EDGE, -EDGE) if name == PRESCRIBED else slice(None)

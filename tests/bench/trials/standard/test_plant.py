@@ -121,6 +121,7 @@ def test_friction_holds_the_mass_until_the_drive_exceeds_it() -> None:
     assert freed[-1, 0] == freed[-200, 0] != 0.0
 
 
+@pytest.mark.slow
 def test_every_effect_from_outside_moves_the_record_and_vanishes_with_its_strength() -> None:
     state = np.array([GEAR["psi_off"], 0.0, 0.0])
     sizes = np.array([SCALES["x"], SCALES["x"] * OMEGA, SCALES["length"]])

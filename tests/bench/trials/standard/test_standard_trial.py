@@ -64,6 +64,7 @@ def test_the_given_simulation_fits_the_one_sweep_it_was_identified_from_and_no_o
     assert min(errors) < 0.3 * max(errors)
 
 
+@pytest.mark.slow
 def test_without_an_effect_nothing_but_noise_is_left(nothing: Trial) -> None:
     assert nothing.key["gap"] == pytest.approx(1.0, abs=0.05)
     for name in ("J_z", "k_c", "k_d", "m", "d", "k"):

@@ -46,6 +46,7 @@ def grown(context: FitContext) -> tuple[FittedModel, list[FittedModel], FittedMo
     return reidentified, singles, fit_candidate(context, (saturation, relative), alone.fit)
 
 
+@pytest.mark.slow
 def test_a_relative_gives_way_to_the_right_effect(context: FitContext, grown) -> None:
     reidentified, singles, pair = grown
     effects = [effect_named(name) for name in ("input_saturation", "presliding_friction", "iwan_hysteresis")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
@@ -46,6 +47,7 @@ def beside_a_damping(effect: str, noise: float = NOISE) -> tuple[FitContext, Fit
     return context, damped
 
 
+@pytest.mark.slow
 def test_an_effect_that_the_screening_puts_last_is_tried_where_the_first_ones_explain_too_little() -> None:
     context, damped = beside_a_damping("flexible_mode")
     tried = [effect_named("maxwell_branch"), effect_named("flexible_mode")]
@@ -59,6 +61,7 @@ def test_an_effect_that_the_screening_puts_last_is_tried_where_the_first_ones_ex
     assert best.error_over_noise < VERDICT.at_floor
 
 
+@pytest.mark.slow
 def test_an_effect_that_no_push_represents_is_tried_where_the_pushes_explain_too_little() -> None:
     context, damped = beside_a_damping("torque_ripple")
     tried = [effect_named("maxwell_branch"), effect_named("torque_ripple")]

@@ -105,6 +105,7 @@ def test_one_effect_stays_one():
     assert all(len(candidate.effects) < 2 for candidate in found.candidates)
 
 
+@pytest.mark.slow
 def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
     records = measured({"cubic_stiffness": {"k_3": 4e5}, "actuator_lag": {"T_a": 0.01}}, seed=0).records
     scales = characteristic_scales(AXIS, records, VALUES)

@@ -29,6 +29,7 @@ def measured(role: str, amplitude: float, rng: np.random.Generator) -> Record:
     return clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size))
 
 
+@pytest.mark.slow
 def test_a_pair_that_stopped_short_is_found_again_from_a_triple() -> None:
     rng = np.random.default_rng(0)
     fitted = (measured("estimation", 0.6, rng), measured("estimation", 1.0, rng))
