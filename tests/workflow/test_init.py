@@ -369,10 +369,10 @@ def test_every_candidate_is_listed(tmp_path: Path) -> None:
 
 
 def test_constants_beside_the_signals_are_no_candidates(tmp_path: Path) -> None:
-    savemat(tmp_path / "a.mat", {"t": T, "u": SWEEP, "a1": T, "a2": ANSWER, "gains": np.arange(4.0)})
+    savemat(tmp_path / "a.mat", {"t": T, "u": SWEEP, "a1": T, "a2": ANSWER, "feedback": np.arange(4.0)})
     text = run_init(tmp_path, model="axis").path.read_text(encoding="utf-8")
     assert 'one of: "a1", "a2"' in text
-    assert "gains" not in text
+    assert "feedback" not in text
 
 
 def test_x_and_y_of_a_regression_are_asked_about(tmp_path: Path) -> None:
