@@ -26,7 +26,7 @@ NOW := date +%s
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all check release-check bench dist docs fuzz calibrate blind clean
+.PHONY: help demo test test-all coverage check release-check bench dist docs fuzz calibrate blind clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 22
@@ -37,12 +37,15 @@ demo: $(RUNNABLE) $(COMPILER)  ## run the whole chain on the built-in virtual ri
 # Tests start dozens of processes; each would compile a thousand Python files again if Python could not cache them.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-test: $(DEVELOPMENT)  ## run the tests that every change must pass; twelve minutes on two processors
+test: $(DEVELOPMENT)  ## run the tests that every change must pass; TIME
 	@# Kernels compile in two thirds of the time; test-all takes the options that users have.
 	@RIGSIGHT_CFLAGS=-O1 $(PYTEST) -m "not slow and not release"
 
 test-all: $(DEVELOPMENT)  ## run all tests, with long studies, notebooks, wheel and browser
 	@$(PYTEST)
+
+coverage: $(DEVELOPMENT)  ## run the tests of `make test` and print which share of the lines they reach
+	@RIGSIGHT_CFLAGS=-O1 $(PYTEST) -m "not slow and not release" --cov=rigsight --cov-report=term:skip-covered
 
 release-check: check test-all docs  ## what a release must pass: checks, all tests, documentation; nightly too
 
