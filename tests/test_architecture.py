@@ -1,4 +1,4 @@
-"""The rules of the house that a machine can check."""
+"""The rules of CONTRIBUTING.md that a machine can check."""
 
 from __future__ import annotations
 
@@ -97,13 +97,13 @@ def test_every_language_is_printed_in_one_place() -> None:
     assert {name for name in printers if not name.startswith("simulate/printing/")} == set()
 
 
-def test_no_text_names_a_module_of_a_room_above() -> None:
+def test_no_text_names_a_module_of_a_package_above() -> None:
     """The linter does not see an import that stands in a text: code for another process, a name for importlib."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
         "contracts"
     ]
     layers = next(c["layers"] for c in contracts if c.get("containers") == ["rigsight"])
-    height = {room: -i for i, layer in enumerate(layers) for room in layer.split(" | ")}
+    height = {package: -i for i, layer in enumerate(layers) for package in layer.split(" | ")}
     found = []
     for module in (ROOT / "src" / "rigsight").rglob("*.py"):
         own = module.relative_to(ROOT / "src" / "rigsight").with_suffix("").parts[0]
@@ -113,7 +113,9 @@ def test_no_text_names_a_module_of_a_room_above() -> None:
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told:
                 named = re.findall(r"(?:^|import |from )rigsight\.([a-z_]+)", node.value)
                 found += [
-                    f"{module}: {node.value}" for room in named if height.get(room, -99) > height.get(own, 0)
+                    f"{module}: {node.value}"
+                    for package in named
+                    if height.get(package, -99) > height.get(own, 0)
                 ]
     assert found == []
 

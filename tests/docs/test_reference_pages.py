@@ -14,13 +14,13 @@ from rigsight.records import Record
 SOURCE = Path(__file__).parents[2] / "src/rigsight"
 
 
-def test_every_room_but_the_command_line_has_a_page(hook: Callable[[str], ModuleType]) -> None:
-    rooms = {
+def test_every_package_but_the_command_line_has_a_page(hook: Callable[[str], ModuleType]) -> None:
+    packages = {
         path.stem
         for path in SOURCE.iterdir()
         if path.stem not in ("__init__", "__main__", "__pycache__", "py")
     }
-    assert set(hook("reference_pages").PACKAGES) == rooms - {"cli"}
+    assert set(hook("reference_pages").PACKAGES) == packages - {"cli"}
 
 
 def test_the_bench_has_a_page(hook: Callable[[str], ModuleType]) -> None:
