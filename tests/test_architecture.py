@@ -23,7 +23,6 @@ NAME_A_RIG = {
     "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/transfer/axis_parameters.py": "API: the parameters of an axis from a transfer function",
     "identify/transfer/running_gear_parameters.py": "API: equation (2.21) of the thesis, yaw parameters",
-    "records/formats/isolated_reader.py": "an axis of time, no rig",
     "rigs/__init__.py": "the built-in rigs",
     "rigs/built_in.py": "the built-in rigs",
     "rigs/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
