@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records import ColumnMapping, ReadingOptions, Record, read_record
 from rigsight.records.formats.channel_file import file_format, open_channels
 from rigsight.records.formats.known import BY_SUFFIX
 from rigsight.records.formats.known import FORMATS as KNOWN
@@ -43,7 +43,7 @@ formats = pytest.mark.parametrize(("suffix", "write"), FORMATS.values(), ids=FOR
 
 
 def read(path: Path, **options: object) -> Record:
-    return read_record(path, INPUTS, OUTPUTS, **options)
+    return read_record(path, INPUTS, OUTPUTS, ReadingOptions(**options))
 
 
 @formats
@@ -158,13 +158,13 @@ def test_an_input_without_a_unit_of_its_own_is_converted_to_that_of_a_drive_and_
     np.testing.assert_allclose(record["u"], 1e3 * rows()["u"], rtol=1e-14)
     assert "from kN" in record.notes[0]
     with pytest.raises(InputError, match="gain counts per N"):
-        read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS, gain="gain")
+        read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS, ReadingOptions(gain="gain"))
     write_parquet(tmp_path / "turns", rows(), {"u": "rpm"})
     record = read_record(tmp_path / "turns", (Named("u", "input"),), OUTPUTS)
     np.testing.assert_array_equal(record["u"], rows()["u"])
     assert "in rpm" in record.notes[0]
     columns = {"u": ColumnMapping("u", unit="kN")}
-    asked = read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS, columns=columns)
+    asked = read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS, ReadingOptions(columns=columns))
     np.testing.assert_allclose(asked["u"], 1e3 * rows()["u"], rtol=1e-14)
 
 

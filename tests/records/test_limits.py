@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.records import read_record
+from rigsight.records import ReadingOptions, read_record
 from rigsight.records.formats.channel import MOST_IN_TABLE, Refused, check_total, columns_of, kept_last
 from rigsight.workflow.inspect import run_inspect
 
@@ -22,7 +22,7 @@ ROWS = {"t": T, "u": np.sin(9 * T), "psi": np.cos(9 * T)}
 
 
 def read(path: Path, **options: object) -> None:
-    read_record(path, (Named("u", "A"),), (Named("psi", "rad"),), **options)  # type: ignore[arg-type]
+    read_record(path, (Named("u", "A"),), (Named("psi", "rad"),), ReadingOptions(**options))  # type: ignore[arg-type]
 
 
 def csv_text(**changed: np.ndarray) -> str:
