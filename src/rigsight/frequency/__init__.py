@@ -10,16 +10,3 @@ from rigsight.frequency.several_inputs import responses_of_inputs as responses_o
 from rigsight.frequency.signal_pair import hold_response as hold_response
 from rigsight.frequency.spectral import averaged_response as averaged_response
 from rigsight.frequency.thesis_pipeline import thesis_response as thesis_response
-
-__all__ = [
-    "FrequencyResponse",
-    "PlainRatio",
-    "ResponsesOfInputs",
-    "averaged_response",
-    "hold_response",
-    "local_polynomial_response",
-    "local_rational_response",
-    "plain_ratio",
-    "responses_of_inputs",
-    "thesis_response",
-]

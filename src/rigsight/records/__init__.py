@@ -7,5 +7,3 @@ from rigsight.records.record import Hold as Hold
 from rigsight.records.record import Kind as Kind
 from rigsight.records.record import Record as Record
 from rigsight.records.record import Role as Role
-
-__all__ = ["ColumnMapping", "Hold", "Kind", "ReadingOptions", "Record", "Role", "read_record"]
