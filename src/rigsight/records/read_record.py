@@ -13,7 +13,7 @@ from rigsight.errors import InputError, readable
 from rigsight.records.channel_table import read_channels, unread_time
 from rigsight.records.channel_units import si_mapping, units_of_columns
 from rigsight.records.clocks import TIME as TIME
-from rigsight.records.clocks import own_clocks, side_by_side
+from rigsight.records.clocks import own_clocks, refuse_one_dt, side_by_side
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
 from rigsight.records.conditioning import check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
@@ -228,10 +228,7 @@ def _table(
         return table
     clocks = own_clocks(table.names)
     if len({clocks.get(table.names.index(label)) for label in table.labels.values()}) > 1:
-        raise InputError(
-            f"{path.name}: dt = {dt:g} cannot hold for signals that have clocks of their own. Leave dt out, and name the time of "
-            'each where the file does not show it: { name = "...", time = "..." }.'
-        )
+        refuse_one_dt(path.name, dt, "clocks of their own")
     stamps = dt * np.arange(table.lines.size, dtype=np.float64)
     notes = unread_time(path, dt, [TIME] if TIME in table.names else [])
     return replace(
