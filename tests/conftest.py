@@ -238,7 +238,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
         monkeypatch.setattr(sys, "argv", ["rigsight", *map(str, arguments)])
         capfd.readouterr()
         try:
-            cli.command_line()
+            cli.main()
             code: Any = 0
         except SystemExit as leaving:
             code = leaving.code or 0

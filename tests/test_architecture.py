@@ -1,4 +1,4 @@
-"""The rules of the house that a machine can check."""
+"""The rules of CONTRIBUTING.md that a machine can check."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ NAME_A_RIG = {
     "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/transfer/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
     "identify/transfer/running_gear_parameters.py": "API: equation (2.21) of the thesis, yaw parameters",
-    "records/formats/isolated_reader.py": "an axis of time, no rig",
     "rigs/__init__.py": "the built-in rigs",
     "rigs/built_in.py": "the built-in rigs",
     "workflow/demo.py": "the demo is the running gear of the thesis",
@@ -95,13 +94,13 @@ def test_every_language_is_printed_in_one_place() -> None:
     assert {name for name in printers if not name.startswith("simulate/printing/")} == set()
 
 
-def test_no_text_names_a_module_of_a_room_above() -> None:
+def test_no_text_names_a_module_of_a_package_above() -> None:
     """The linter does not see an import that stands in a text: code for another process, a name for importlib."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
         "contracts"
     ]
     layers = next(c["layers"] for c in contracts if c.get("containers") == ["rigsight"])
-    height = {room: -i for i, layer in enumerate(layers) for room in layer.split(" | ")}
+    height = {package: -i for i, layer in enumerate(layers) for package in layer.split(" | ")}
     found = []
     for module in (ROOT / "src" / "rigsight").rglob("*.py"):
         own = module.relative_to(ROOT / "src" / "rigsight").with_suffix("").parts[0]
@@ -111,7 +110,9 @@ def test_no_text_names_a_module_of_a_room_above() -> None:
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in reported:
                 named = re.findall(r"(?:^|import |from )rigsight\.([a-z_]+)", node.value)
                 found += [
-                    f"{module}: {node.value}" for room in named if height.get(room, -99) > height.get(own, 0)
+                    f"{module}: {node.value}"
+                    for package in named
+                    if height.get(package, -99) > height.get(own, 0)
                 ]
     assert found == []
 

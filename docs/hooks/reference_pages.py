@@ -32,7 +32,7 @@ PACKAGES = (
     "export",
     "api",
 )
-"""From what is measured to what is shown, as the rooms of the house lie above each other."""
+"""From what is measured to what is shown, as the packages lie above each other."""
 COMMANDS = (
     "campaign.read_campaign",
     "diagnose",

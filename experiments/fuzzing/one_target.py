@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import resource
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -27,7 +28,7 @@ with atheris.instrument_imports(include=_INSTRUMENTED):
     import oracle
     import targets
 
-    from rigsight.records.formats import isolated_reader, reader_process
+    from rigsight.records.formats import isolated_reader
     from rigsight.records.formats.known import BY_SUFFIX, FORMATS, reader_of
 
     for _format in FORMATS:
@@ -51,9 +52,9 @@ def main(name: str, folder: Path, options: list[str]) -> None:
     judge = oracle.Oracle.resumed(folder)
     if target.in_child:
         targets.read_in_this_process()
-        # As the process that reads apart does.
+        # As the process that reads apart does, but for the processor time.
         judge.most_growth = isolated_reader.LEAST_MEMORY
-        reader_process.limit_memory(judge.most_growth)
+        resource.setrlimit(resource.RLIMIT_DATA, (judge.most_growth, judge.most_growth))
 
     def try_it(data: bytes) -> None:
         judge.judge(data, target.try_it)

@@ -20,7 +20,7 @@ import seeds
 from declarations import DECLARATIONS, effect_of
 
 from rigsight.errors import InputError
-from rigsight.records import read_record
+from rigsight.records import ReadingOptions, read_record
 from rigsight.records.formats import channel_file
 from rigsight.records.formats.known import BY_SUFFIX, reader_of
 from rigsight.rigs import RIGS
@@ -97,7 +97,7 @@ def _measurement(suffix: str) -> Callable[[bytes], object]:
         for columns in unmapped:
             mapped = None if columns is None else {s: ColumnMapping(n) for s, n in columns.items()}
             try:
-                read_record(path, rig.inputs, rig.outputs, columns=mapped)
+                read_record(path, rig.inputs, rig.outputs, ReadingOptions(columns=mapped))
             except InputError as error:
                 # What this raises in the end, the oracle looks at as well.
                 failure = error

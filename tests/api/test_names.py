@@ -54,10 +54,10 @@ def test_type_checkers_see_the_same_names_in_the_same_places() -> None:
 
 
 def test_no_name_is_that_of_a_room() -> None:
-    # Importing a room sets its name on the package, over whatever stood there.
-    rooms = {module.name for module in pkgutil.iter_modules(rs.__path__)}
-    assert "simulate" in rooms
-    assert not rooms.intersection(rs.__all__)
+    # Importing a package sets its name on the package, over whatever stood there.
+    packages = {module.name for module in pkgutil.iter_modules(rs.__path__)}
+    assert "simulate" in packages
+    assert not packages.intersection(rs.__all__)
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

@@ -134,28 +134,6 @@ def test_requests_to_end_end_like_ctrl_c(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
-def test_a_request_that_comes_where_exceptions_are_dropped_is_not_lost(
-    axis_campaign: Path, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Seen with a request that came while LLVM told of a compiled module."""
-
-    class Finalized:
-        def __del__(self) -> None:
-            signal.raise_signal(signal.SIGINT)
-
-    def long(*_: object, **__: object) -> None:
-        Finalized()
-        time.sleep(30.0)
-        pytest.fail("the request was lost")
-
-    monkeypatch.setattr("rigsight.workflow.diagnose.diagnose", long)
-    monkeypatch.setattr("rigsight.workflow.diagnose.prepare_kernels", lambda *_, **__: None)
-    code, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
-    assert code == 130
-    assert stderr == "rigsight: interrupted; nothing was written; the same command continues from there.\n"
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
 def test_who_does_not_want_to_be_ended_by_a_terminal_is_not(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,7 +13,7 @@ from rigsight.diagnose.policy import POLICY
 from rigsight.diagnose.policy.number import number, stated
 from rigsight.errors import InputError
 
-ROOM = Path(rigsight.diagnose.__file__).parent
+PACKAGE = Path(rigsight.diagnose.__file__).parent
 GROUPS = [getattr(POLICY, own.name) for own in dataclasses.fields(POLICY)]
 MOST_DECIDING = 30
 TOLERANCES = {
@@ -96,7 +96,7 @@ def test_the_policy_cannot_be_changed() -> None:
 def test_outside_the_policy_are_tolerances_alone() -> None:
     found = {
         name: path
-        for path in ROOM.rglob("*.py")
+        for path in PACKAGE.rglob("*.py")
         if path.parent.name != "policy"
         for name in _numbers_of(path)
     }

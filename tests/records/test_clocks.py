@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records import ColumnMapping, ReadingOptions, Record, read_record
 from rigsight.records.clocks import own_clocks
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.init import run_init
@@ -132,7 +132,9 @@ WRITERS: dict[str, tuple[str, Callable[[Path], None]]] = {
 
 def read(path: Path, columns: dict[str, ColumnMapping | str | int], **options: object) -> Record:
     options = {"hold": "band_limited", **options}
-    return read_record(path, (Named("u", "input"),), (Named("x", "m"),), columns=columns, **options)
+    return read_record(
+        path, (Named("u", "input"),), (Named("x", "m"),), ReadingOptions(columns=columns, **options)
+    )
 
 
 def check_times(record: Record, late: float = 0.0) -> None:

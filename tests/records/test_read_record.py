@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.records import ColumnMapping, read_record
+from rigsight.records import ColumnMapping, ReadingOptions, read_record
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,10 @@ def test_a_file_becomes_a_record_in_si(write_csv: WriteCsv) -> None:
         "u": ColumnMapping("mA", scale=1e-3, offset=0.25),
     }
     record = read_record(
-        path, INPUTS, OUTPUTS, columns=columns, role="validation", kind="sweep", amplitude=0.5
+        path,
+        INPUTS,
+        OUTPUTS,
+        ReadingOptions(columns=columns, role="validation", kind="sweep", amplitude=0.5),
     )
     assert record.name == "sweep"
     assert (record.dt, record.t0, record.n_samples) == (pytest.approx(1e-5), 5.0, 200)
@@ -65,12 +68,14 @@ def test_a_column_called_nearly_like_a_missing_output_is_told(write_csv: WriteCs
 
 def test_a_second_output_that_was_mapped_must_be_there(write_csv: WriteCsv) -> None:
     with pytest.raises(InputError, match="no column 'lateral' for signal 'y'"):
-        read_record(write_csv(), INPUTS, OUTPUTS, columns={"y": ColumnMapping("lateral")})
+        read_record(write_csv(), INPUTS, OUTPUTS, ReadingOptions(columns={"y": ColumnMapping("lateral")}))
 
 
 def test_time_and_input_suffice_to_simulate(write_csv: WriteCsv) -> None:
     rows = np.column_stack([0.01 * np.arange(60), np.ones(60)])
-    record = read_record(write_csv(rows=rows, header="t,u"), INPUTS, OUTPUTS, require_outputs=False)
+    record = read_record(
+        write_csv(rows=rows, header="t,u"), INPUTS, OUTPUTS, ReadingOptions(require_outputs=False)
+    )
     assert list(record.signals) == ["u"]
 
 
@@ -92,11 +97,13 @@ def test_a_still_input_is_a_free_motion_and_said(write_csv: WriteCsv) -> None:
 
 
 def test_a_still_input_of_a_step_is_a_step_with_which_the_record_begins(write_csv: WriteCsv) -> None:
-    record = read_record(write_csv(change=replaced(1, "0.5")), INPUTS, OUTPUTS, kind="step", amplitude=0.5)
+    record = read_record(
+        write_csv(change=replaced(1, "0.5")), INPUTS, OUTPUTS, ReadingOptions(kind="step", amplitude=0.5)
+    )
     assert set(record["u"]) == {0.5}
     assert "column 'u': no input changes (u = 0.5); taken as a step" in record.notes[-1]
     with pytest.raises(InputError, match="no input changes"):
-        read_record(write_csv(change=replaced(1, "0")), INPUTS, OUTPUTS, kind="step")
+        read_record(write_csv(change=replaced(1, "0")), INPUTS, OUTPUTS, ReadingOptions(kind="step"))
 
 
 @pytest.mark.parametrize(
@@ -111,11 +118,13 @@ def test_a_still_input_of_a_step_is_a_step_with_which_the_record_begins(write_cs
 )
 def test_a_still_input_that_is_said_to_move_is_refused(write_csv: WriteCsv, options: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=r"no input changes \(u = 0\.5\).* Check the column"):
-        read_record(write_csv(change=replaced(1, "0.5")), INPUTS, OUTPUTS, **options)
+        read_record(write_csv(change=replaced(1, "0.5")), INPUTS, OUTPUTS, ReadingOptions(**options))
 
 
 def test_free_decay_may_be_scored(write_csv: WriteCsv) -> None:
-    record = read_record(write_csv(change=replaced(1, "0")), INPUTS, OUTPUTS, role="validation")
+    record = read_record(
+        write_csv(change=replaced(1, "0")), INPUTS, OUTPUTS, ReadingOptions(role="validation")
+    )
     assert not record["u"].any()
 
 
@@ -131,17 +140,21 @@ def test_a_column_of_no_signal_is_refused(write_csv: WriteCsv) -> None:
     with pytest.raises(
         InputError, match=r"sweep.csv: columns names 'Psi', .* Did you mean 'psi'\? Signals: t, u, psi, y\."
     ):
-        read_record(write_csv(), INPUTS, OUTPUTS, columns={"Psi": ColumnMapping("psi", unit="deg")})
+        read_record(
+            write_csv(), INPUTS, OUTPUTS, ReadingOptions(columns={"Psi": ColumnMapping("psi", unit="deg")})
+        )
 
 
 def test_a_column_may_be_a_name_or_a_number(write_csv: WriteCsv) -> None:
     path = write_csv(header="t,current,psi,y")
-    record = read_record(path, INPUTS, OUTPUTS, columns={"u": "current", "y": 4})
+    record = read_record(path, INPUTS, OUTPUTS, ReadingOptions(columns={"u": "current", "y": 4}))
     assert list(record.signals) == ["u", "psi", "y"]
     with pytest.raises(InputError, match=r"the column of u must be its name, .* got \['current'\]\."):
-        read_record(path, INPUTS, OUTPUTS, columns={"u": ["current"]})  # type: ignore[dict-item]
+        read_record(path, INPUTS, OUTPUTS, ReadingOptions(columns={"u": ["current"]}))  # type: ignore[dict-item]
 
 
 def test_time_that_runs_backwards_by_its_scale_is_refused(write_csv: WriteCsv) -> None:
     with pytest.raises(InputError, match="scale of time must be positive"):
-        read_record(write_csv(), INPUTS, OUTPUTS, columns={"t": ColumnMapping("t", scale=-1.0)})
+        read_record(
+            write_csv(), INPUTS, OUTPUTS, ReadingOptions(columns={"t": ColumnMapping("t", scale=-1.0)})
+        )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records import ColumnMapping, ReadingOptions, Record, read_record
 
 from .formats import write_parquet, write_text
 
@@ -27,7 +27,7 @@ ANGLE = 9.0 * np.sin(2.0 * T) + 1.0
 
 
 def read(path: Path, unit: str = "rad", **options: object) -> Record:
-    return read_record(path, (Named("u", "A"),), (Named("x", unit),), **options)
+    return read_record(path, (Named("u", "A"),), (Named("x", unit),), ReadingOptions(**options))
 
 
 def write(path: Path, x: np.ndarray) -> Path:

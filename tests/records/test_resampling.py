@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.records import Record, read_record
+from rigsight.records import ReadingOptions, Record, read_record
 
 from .formats import write_text
 
@@ -36,7 +36,7 @@ def write_two_rates(path: Path, start: float = 0.0) -> None:
 
 
 def read(path: Path, **options: object) -> Record:
-    return read_record(path, (Named("u", "input"),), (Named("x", "m"),), **options)
+    return read_record(path, (Named("u", "input"),), (Named("x", "m"),), ReadingOptions(**options))
 
 
 def test_different_rates_come_onto_the_finest_clock(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records import ColumnMapping, ReadingOptions, Record, read_record
 from rigsight.records.formats.channel_file import open_channels
 from rigsight.records.formats.stored_numbers import Stored, stored_by
 
@@ -28,7 +28,7 @@ COUNTS = np.round((X - 2.0) / 0.001).astype(np.int16)
 
 
 def read(path: Path, **options: object) -> Record:
-    return read_record(path, (Named("u", "A"),), (Named("x", "m"),), **options)
+    return read_record(path, (Named("u", "A"),), (Named("x", "m"),), ReadingOptions(**options))
 
 
 def write_hdf5(path: Path, x: np.ndarray, **attributes: Any) -> Path:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.records import read_record
+from rigsight.records import ReadingOptions, read_record
 from rigsight.records.read_record import read_stretches
 from rigsight.workflow.campaign.read_campaign import read_campaign
 
@@ -127,14 +127,14 @@ def test_a_gap_of_one_clock_ends_the_others_there_as_well(tmp_path: Path) -> Non
     ("start", "end", "span"), [(1.0, 2.0, (1.0, 2.0)), (None, 1.5, (0.0, 1.5)), (3.0, None, (3.0, 3.99))]
 )
 def test_start_and_end_choose_a_stretch(write_csv: WriteCsv, start, end, span) -> None:
-    (record,) = read_stretches(write_csv(rows=table()), INPUTS, OUTPUTS, start=start, end=end)
+    (record,) = read_stretches(write_csv(rows=table()), INPUTS, OUTPUTS, ReadingOptions(start=start, end=end))
     assert (record.t[0], record.t[-1]) == pytest.approx(span)
     np.testing.assert_allclose(record["psi"], np.cos(9.0 * record.t), atol=1e-8)
 
 
 def test_a_stretch_outside_the_record_is_told_with_its_span(write_csv: WriteCsv) -> None:
     with pytest.raises(InputError, match=r"start = 5, end = 9 .*0 s to 3.99 s"):
-        read_stretches(write_csv(rows=table()), INPUTS, OUTPUTS, start=5.0, end=9.0)
+        read_stretches(write_csv(rows=table()), INPUTS, OUTPUTS, ReadingOptions(start=5.0, end=9.0))
 
 
 def test_a_campaign_holds_the_stretches(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
-from rigsight.records import read_record
+from rigsight.records import ReadingOptions, read_record
 from rigsight.rigs import ELEMENT
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.compare import run_compare
@@ -189,4 +189,9 @@ def test_a_motion_that_is_prescribed_must_move(tmp_path: Path) -> None:
     folder = campaign(tmp_path / "c", 0.5)
     (folder / "high.csv").write_text((folder / "high.csv").read_text().replace("t,u,x", "t,x,force"))
     with pytest.raises(InputError, match="no input changes"):
-        read_record(folder / "high.csv", ELEMENT.inputs, ELEMENT.outputs, moving_inputs=ELEMENT.moving_inputs)
+        read_record(
+            folder / "high.csv",
+            ELEMENT.inputs,
+            ELEMENT.outputs,
+            ReadingOptions(moving_inputs=ELEMENT.moving_inputs),
+        )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
 from rigsight.records import read_record as read_file
-from rigsight.records.reference import signals_beside
 from rigsight.rigs import Rig, rotational
 from rigsight.workflow.campaign.given_simulation import checked_numbers
 from rigsight.workflow.campaign.in_memory import rig_of
+from rigsight.workflow.campaign.listed_records import options_of
 from rigsight.workflow.campaign.where import Where
 
 
@@ -93,28 +94,25 @@ def read_record(
     ('push', 50, 0.01, 0.003)
     """
     found = rig_of(rig)
-    other = rotational(found)
     return read_file(
         Path(path),
         found.inputs,
         found.outputs,
-        columns=columns,
-        require_outputs=require_outputs,
-        required_outputs=found.required_outputs,
-        absent_inputs=found.absent_inputs,
-        moving_inputs=found.moving_inputs,
-        name=name,
-        role=role,
-        kind=kind,
-        amplitude=amplitude,
-        hold=hold,
-        dt=dt,
-        resample=resample,
-        start=start,
-        end=end,
-        constants=checked_numbers(
-            Where(Path(path).name), ("constants",), found, found.constants, constants or {}
+        replace(
+            options_of(found, rotational(found)),
+            columns=columns,
+            require_outputs=require_outputs,
+            name=name,
+            role=role,
+            kind=kind,
+            amplitude=amplitude,
+            hold=hold,
+            dt=dt,
+            resample=resample,
+            start=start,
+            end=end,
+            constants=checked_numbers(
+                Where(Path(path).name), ("constants",), found, found.constants, constants or {}
+            ),
         ),
-        beside=signals_beside([signal.name for signal in (*found.inputs, *found.outputs)]),
-        other_units=() if other is None else (other.signal_units,),
     )

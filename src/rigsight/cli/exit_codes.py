@@ -61,7 +61,9 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
                 )
             if error.errno in _OF_A_PATH and error.filename:
                 leave(f"{shown(error.filename)} cannot be used: {error.strerror}. Check the path.", BAD_INPUT)
-            if error.errno not in _OF_THE_DISK and "temporary directory" not in str(error):
+            # Only a search for a temporary folder names no file.
+            is_without_folder = error.errno == errno.ENOENT and error.filename is None
+            if error.errno not in _OF_THE_DISK and not is_without_folder:
                 _leave_defect(error)
             # Result files have messages of their own; here remain input files and temporary files.
             if error.errno in (errno.EACCES, errno.EPERM) and error.filename:

@@ -10,11 +10,6 @@ from types import FrameType
 
 from rigsight.workflow.run.results import ENDING_SIGNALS
 
-_AGAIN_AFTER = 0.05
-"""Seconds after which a signal is raised again that arrived where an exception would be swallowed."""
-_DROPPING = ("__del__", "_raw_object_cache_notify", "_raw_object_cache_getbuffer")
-"""Functions whose callers print an exception and continue: finalizers, and callbacks of LLVM during compilation."""
-
 
 class Ended(KeyboardInterrupt):
     """The process was asked to end, by kill or because its terminal was closed; it cleans up as after Ctrl-C."""
@@ -48,27 +43,5 @@ def exit_code(error: BaseException | None) -> int:
     return 128 + (error.number if isinstance(error, Ended) else int(signal.SIGINT))
 
 
-def _end(number: int, frame: FrameType | None) -> None:
-    if _is_dropped(frame):
-        later = threading.Timer(_AGAIN_AFTER, _repeat, (number,))
-        later.daemon = True
-        later.start()
-        return
+def _end(number: int, _: FrameType | None) -> None:
     raise Ended(number)
-
-
-def _repeat(number: int) -> None:
-    # The signal goes to the main thread, which may be waiting; a signal to this thread would not wake it.
-    main = threading.main_thread().ident
-    if hasattr(signal, "pthread_kill") and main is not None:
-        signal.pthread_kill(main, number)
-    else:
-        signal.raise_signal(number)
-
-
-def _is_dropped(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if frame.f_code.co_name in _DROPPING:
-            return True
-        frame = frame.f_back
-    return False

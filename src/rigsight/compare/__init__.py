@@ -17,23 +17,3 @@ from rigsight.compare.score import Column as Column
 from rigsight.compare.score import Score as Score
 from rigsight.compare.step_error import StepWindow as StepWindow
 from rigsight.compare.step_error import step_window as step_window
-
-__all__ = [
-    "QUANTITIES",
-    "Column",
-    "Comparison",
-    "Competitor",
-    "Failure",
-    "Floor",
-    "RecordComparison",
-    "ResponseError",
-    "Score",
-    "SignalPath",
-    "StepWindow",
-    "Yardstick",
-    "compare_on_record",
-    "response_error",
-    "response_floor",
-    "signal_paths",
-    "step_window",
-]

@@ -10,16 +10,3 @@ from rigsight.diagnose.search.screening import structures_of_shortlist as struct
 from rigsight.diagnose.verdict.calibration import Calibration as Calibration
 from rigsight.diagnose.verdict.calibration import Situation as Situation
 from rigsight.diagnose.verdict.judgement import Verdict as Verdict
-
-__all__ = [
-    "Calibration",
-    "Candidate",
-    "Diagnosis",
-    "LikelyCauses",
-    "Situation",
-    "Verdict",
-    "candidates_on",
-    "diagnose",
-    "structures_of_shortlist",
-    "structures_to_fit",
-]

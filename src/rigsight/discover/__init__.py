@@ -16,22 +16,3 @@ from rigsight.discover.regression import RegressionData as RegressionData
 from rigsight.discover.result import Discovery as Discovery
 from rigsight.discover.terms.monomials import MONOMIALS as MONOMIALS
 from rigsight.discover.terms.monomials import known_terms as known_terms
-
-__all__ = [
-    "METHODS",
-    "MONOMIALS",
-    "Discovery",
-    "ForceTrace",
-    "JointForce",
-    "JointLaw",
-    "JointMotion",
-    "LawTerm",
-    "MissingForce",
-    "RegressionData",
-    "discover",
-    "joint_motions",
-    "known_terms",
-    "missing_force",
-    "missing_forces",
-    "not_contradicted",
-]

@@ -14,20 +14,3 @@ from rigsight.effects.placed import AT as AT
 from rigsight.effects.placed import kind_of as kind_of
 from rigsight.effects.placed import placed as placed
 from rigsight.effects.placed import placed_dimension as placed_dimension
-
-__all__ = [
-    "AT",
-    "CATALOGUE",
-    "Effect",
-    "Energy",
-    "GainTrend",
-    "Place",
-    "Signature",
-    "Start",
-    "State",
-    "SumAndDifference",
-    "effect_named",
-    "kind_of",
-    "placed",
-    "placed_dimension",
-]

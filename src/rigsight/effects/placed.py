@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Generic, TypeVar
 
 from rigsight.effects.effect import Effect, Start
 from rigsight.units import at_place
 
 AT = "@"
+
+T = TypeVar("T")
 
 
 def placed(effect: Effect, place: str) -> Effect:
@@ -23,25 +26,26 @@ def placed(effect: Effect, place: str) -> Effect:
     place
         Name of the joint, drive, sensor or state.
     """
-    return _placed(_Same(effect), place)
+    return _placed(ByIdentity(effect), place)
 
 
-class _Same:
-    """Lets declarations, which hold dictionaries and so cannot be hashed, be keys of a cache by identity."""
+class ByIdentity(Generic[T]):
+    """A key of a cache that is the object itself: declarations hold dictionaries and cannot be hashed."""
 
-    def __init__(self, effect: Effect) -> None:
-        self.effect = effect
+    def __init__(self, value: T) -> None:
+        self.value = value
+        self._identity = tuple(map(id, value)) if isinstance(value, tuple) else (id(value),)
 
     def __hash__(self) -> int:
-        return id(self.effect)
+        return hash(self._identity)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.effect is other.effect
+        return isinstance(other, ByIdentity) and self._identity == other._identity
 
 
 @cache
-def _placed(same: _Same, place: str) -> Effect:
-    effect = same.effect
+def _placed(key: ByIdentity[Effect], place: str) -> Effect:
+    effect = key.value
     starts = tuple(
         start if start.parent is None else Start(start.values, f"{start.parent}{AT}{place}")
         for start in effect.starts

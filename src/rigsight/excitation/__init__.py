@@ -9,15 +9,3 @@ from rigsight.excitation.sweeps import linear_sweep as linear_sweep
 from rigsight.excitation.sweeps import log_sweep as log_sweep
 from rigsight.excitation.sweeps import step as step
 from rigsight.excitation.sweeps import stepped_sine as stepped_sine
-
-__all__ = [
-    "Multisine",
-    "crest_factor",
-    "linear_sweep",
-    "log_sweep",
-    "multisine",
-    "multisine_lines",
-    "step",
-    "stepped_sine",
-    "time_bandwidth_product",
-]

@@ -3,5 +3,3 @@
 from rigsight.export.targets import TARGETS as TARGETS
 from rigsight.export.targets import Target as Target
 from rigsight.export.targets import export_model as export_model
-
-__all__ = ["TARGETS", "Target", "export_model"]

@@ -1,16 +1,6 @@
-"""Estimators of frequency responses, their noise and their distortion."""
+"""Estimators of frequency responses and their noise."""
 
-from rigsight.frequency.best_linear_approximation import BestLinearApproximation as BestLinearApproximation
-from rigsight.frequency.best_linear_approximation import DetectedDistortion as DetectedDistortion
-from rigsight.frequency.best_linear_approximation import (
-    fast_best_linear_approximation as fast_best_linear_approximation,
-)
-from rigsight.frequency.best_linear_approximation import (
-    robust_best_linear_approximation as robust_best_linear_approximation,
-)
 from rigsight.frequency.frequency_response import FrequencyResponse as FrequencyResponse
-from rigsight.frequency.harmonics import HarmonicTrack as HarmonicTrack
-from rigsight.frequency.harmonics import track_harmonics as track_harmonics
 from rigsight.frequency.local_model import local_polynomial_response as local_polynomial_response
 from rigsight.frequency.local_model import local_rational_response as local_rational_response
 from rigsight.frequency.plain_ratio import PlainRatio as PlainRatio
@@ -20,22 +10,3 @@ from rigsight.frequency.several_inputs import responses_of_inputs as responses_o
 from rigsight.frequency.signal_pair import hold_response as hold_response
 from rigsight.frequency.spectral import averaged_response as averaged_response
 from rigsight.frequency.thesis_pipeline import thesis_response as thesis_response
-
-__all__ = [
-    "BestLinearApproximation",
-    "DetectedDistortion",
-    "FrequencyResponse",
-    "HarmonicTrack",
-    "PlainRatio",
-    "ResponsesOfInputs",
-    "averaged_response",
-    "fast_best_linear_approximation",
-    "hold_response",
-    "local_polynomial_response",
-    "local_rational_response",
-    "plain_ratio",
-    "responses_of_inputs",
-    "robust_best_linear_approximation",
-    "thesis_response",
-    "track_harmonics",
-]

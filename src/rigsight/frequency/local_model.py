@@ -139,26 +139,8 @@ def local_rational_response(
 
     Parameters
     ----------
-    record
-        One record; it need not be periodic, nor begin or end at rest.
-    source, response
-        Names of the signals.
-    order
-        Degree of the polynomials.
-    bandwidth
-        Width of the band around each line [rad/s]; None takes the narrowest that leaves six degrees of freedom.
-    transient
-        False for a record that begins and ends at rest.
-    hold
-        Hold of the source between its samples: the default for a measured source, the record's hold for a commanded input
-        (see `hold_response`).
-    band
-        Limits [rad/s]; None takes all that the source excites.
-    wanted
-        Required frequencies [rad/s], ascending: other lines are skipped. None takes all of the band.
-    instrument
-        A signal that drives source and response from outside, free of their noise: the reference of a closed loop. The response
-        is then the ratio of their responses to it, which noise on the source, fed back or not, does not bias.
+    record, source, response, order, bandwidth, transient, hold, band, wanted, instrument
+        As of `local_polynomial_response`.
 
     Returns
     -------

@@ -133,13 +133,17 @@ def excited(
     return wished
 
 
+class TooShortError(InputError):
+    """A record is too short for the resolution that was asked for."""
+
+
 def check_resolution(resolution: float, duration: float, needed: float, what: str) -> None:
     """Check that a record is long enough for a resolution."""
     if not (math.isfinite(resolution) and resolution > 0.0):
         raise InputError(f"A resolution must be a positive number of rad/s, got {resolution!r}.")
     line = 2.0 * math.pi / duration
     if resolution < needed * line * (1.0 - 1e-9):
-        raise InputError(
+        raise TooShortError(
             f"{what} lasts {duration:.4g} s: too short for a resolution of {resolution:.4g} rad/s. Record at least "
             f"{needed * 2.0 * math.pi / resolution:.4g} s, or allow at least {needed * line:.4g} rad/s."
         )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
+from rigsight.frequency.signal_pair import TooShortError
 from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.identification import PathIdentification, RecordIdentification
 from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
@@ -121,7 +122,7 @@ def _motion(
             fit = _fit(seen, "pt2", options)
         return _judged(path, fit, physical), seen
     except InputError as error:
-        if options.resolution is not None and "too short for a resolution" in str(error):
+        if options.resolution is not None and isinstance(error, TooShortError):
             raise
         return replace(path, problem=str(error)), seen
 
@@ -176,7 +177,7 @@ def _dynamic_stiffness(record: Record, rig: Rig, options: EstimationOptions) -> 
             record, path.source, path.response, "pt2", options.method, options.resolution, "band_limited"
         )
     except InputError as error:
-        if options.resolution is not None and "too short for a resolution" in str(error):
+        if options.resolution is not None and isinstance(error, TooShortError):
             raise
         return replace(path, problem=str(error))
     return replace(path, measured=seen.response, coherence=seen.coherence)

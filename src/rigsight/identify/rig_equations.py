@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.effects.placed import ByIdentity
 from rigsight.effects.symbols import derivative
 from rigsight.records.record import Record
 from rigsight.rigs import Joint, Rig, applied_symbol
@@ -25,21 +25,19 @@ from rigsight.simulate.input_hold import HeldInput
 
 Floats = NDArray[np.float64]
 
-_KEPT = 32
-"""Number of rigs whose functions are cached: generating them takes a tenth of a second, and every fit needs them."""
 FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
 """Functions in the equations of effects and rigs that numpy does not have under these names."""
-_known: OrderedDict[int, tuple[Rig, RigEquations]] = OrderedDict()
 
 
 def equations_of(rig: Rig) -> RigEquations:
     """Return the equations of a rig as functions; repeated calls return the same object."""
-    found = _known.get(id(rig))
-    if found is None:
-        found = _known[id(rig)] = (rig, RigEquations(rig))
-        while len(_known) > _KEPT:
-            _known.popitem(last=False)
-    return found[1]
+    return _equations_of(ByIdentity(rig))
+
+
+# Generating them takes a tenth of a second, and every fit needs them.
+@lru_cache(maxsize=32)
+def _equations_of(key: ByIdentity[Rig]) -> RigEquations:
+    return RigEquations(key.value)
 
 
 class RigEquations:

@@ -3,5 +3,3 @@
 from rigsight.libraries.library_cache import cache_folder as cache_folder
 from rigsight.libraries.library_cache import is_kept as is_kept
 from rigsight.libraries.library_cache import library_file as library_file
-
-__all__ = ["cache_folder", "is_kept", "library_file"]

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
 from rigsight.records.channel_units import UnknownUnitError, factor
-from rigsight.records.clocks import Clock, increases, possible_clocks, shared_clock, with_clocks
+from rigsight.records.clocks import (
+    Clock,
+    increases,
+    possible_clocks,
+    refuse_one_dt,
+    shared_clock,
+    with_clocks,
+)
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.formats.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
 from rigsight.records.formats.channel_file import open_channels
@@ -282,10 +289,7 @@ def _refuse_other_clocks(
     if found and all(shown[signal] or channel.axis is not None for signal, channel in found.items()):
         clocks = _clocks(path, file, found, columns, time, False)
     if len(lengths) > 1 or (clocks and shared_clock(clocks.values()) is None):
-        raise InputError(
-            f"{path.name}: dt = {dt:g} cannot hold for signals that have clocks of their own or other lengths. Leave dt out, and "
-            'name the time of each where the file does not show it: { name = "...", time = "..." }.'
-        )
+        refuse_one_dt(path.name, dt, "clocks of their own or other lengths")
 
 
 def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> NDArray[np.float64]:

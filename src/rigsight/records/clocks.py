@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +118,14 @@ class Clock:
     stamps: NDArray[np.float64]  # time stamps, shape (n_samples,)
     unit: str | None = None  # stated by the file; None where it is that of the campaign
     origin: np.datetime64 | None = None  # moment from which they count; None where the file does not say
+
+
+def refuse_one_dt(file: str, dt: float, what: str) -> NoReturn:
+    """Refuse one sample time for signals that have several."""
+    raise InputError(
+        f"{file}: dt = {dt:g} cannot hold for signals that have {what}. Leave dt out, and name the time of each where the file "
+        'does not show it: { name = "...", time = "..." }.'
+    )
 
 
 def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock]) -> Columns:

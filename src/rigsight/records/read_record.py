@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypedDict, Unpack
+from typing import Literal
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from rigsight.errors import InputError, readable
 from rigsight.records.channel_table import read_channels, unread_time
 from rigsight.records.channel_units import si_mapping, units_of_columns
 from rigsight.records.clocks import TIME as TIME
-from rigsight.records.clocks import own_clocks, side_by_side
+from rigsight.records.clocks import own_clocks, refuse_one_dt, side_by_side
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
 from rigsight.records.conditioning import check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
@@ -33,89 +33,62 @@ from rigsight.records.sound_signals import (
 )
 from rigsight.records.stretches import between, one_stretch, stretches
 
+_DIALECT = ("separator", "decimal", "header", "comment")
+"""What may be said of a text."""
 
-class ReadingOptions(TypedDict, total=False):
-    """How a record is to be read, see `read_stretches`."""
 
-    columns: Mapping[str, ColumnMapping | str | int] | None
-    require_outputs: bool
-    required_outputs: Collection[str] | None
-    absent_inputs: Collection[str]
-    constant_inputs: Mapping[str, float] | None
-    moving_inputs: Collection[str]
-    name: str | None
-    role: Role
-    kind: Kind
-    amplitude: float | None
-    hold: Hold
-    dt: float | None
-    resample: float | None
-    start: float | None
-    end: float | None
-    separator: str | None
-    decimal: str | None
-    header: bool | int | None
-    comment: str | None
-    constants: Mapping[str, float] | None
-    gain: str
-    beside: Sequence[str]
-    other_units: Sequence[Mapping[str, str]]
+@dataclass(frozen=True)
+class ReadingOptions:
+    """How a record is to be read."""
+
+    columns: Mapping[str, ColumnMapping | str | int] | None = None
+    require_outputs: bool = True
+    # Of the outputs; None for the first.
+    required_outputs: Collection[str] | None = None
+    absent_inputs: Collection[str] = ()  # that may have no column
+    constant_inputs: Mapping[str, float] | None = None
+    moving_inputs: Collection[str] = ()
+    name: str | None = None
+    role: Role = "estimation"
+    kind: Kind = "operation"
+    amplitude: float | None = None
+    hold: Hold = "foh"
+    dt: float | None = None
+    resample: float | None = None
+    start: float | None = None
+    end: float | None = None
+    separator: str | None = None
+    decimal: str | None = None
+    header: bool | int | None = None
+    comment: str | None = None
+    constants: Mapping[str, float] | None = None
+    # Constant with which a drive of another unit is converted.
+    gain: str = ""
+    beside: Sequence[str] = ()  # signals that are read where they are there
+    other_units: Sequence[Mapping[str, str]] = ()  # in which all signals may be instead
 
 
 def read_record(
     path: Path,
     inputs: Sequence[NamedSignal],
     outputs: Sequence[NamedSignal],
-    **options: Unpack[ReadingOptions],
+    options: ReadingOptions = ReadingOptions(),
 ) -> Record:
-    """Read, check and repair one record.
-
-    Parameters
-    ----------
-    path, inputs, outputs, **options
-        As of `read_stretches`.
-
-    Raises
-    ------
-    InputError
-        As `read_stretches`, and if the time axis has gaps.
-    """
-    return read_stretches(path, inputs, outputs, at_pauses="refuse", **options)[0]
+    """Read, check and repair one record; one whose time axis has gaps is refused."""
+    return read_stretches(path, inputs, outputs, options, at_pauses="refuse")[0]
 
 
 def read_stretches(
     path: Path,
     inputs: Sequence[NamedSignal],
     outputs: Sequence[NamedSignal],
-    *,
-    columns: Mapping[str, ColumnMapping | str | int] | None = None,
-    require_outputs: bool = True,
-    required_outputs: Collection[str] | None = None,
-    absent_inputs: Collection[str] = (),
-    constant_inputs: Mapping[str, float] | None = None,
-    moving_inputs: Collection[str] = (),
-    name: str | None = None,
-    role: Role = "estimation",
-    kind: Kind = "operation",
-    amplitude: float | None = None,
-    hold: Hold = "foh",
-    dt: float | None = None,
-    resample: float | None = None,
-    start: float | None = None,
-    end: float | None = None,
-    separator: str | None = None,
-    decimal: str | None = None,
-    header: bool | int | None = None,
-    comment: str | None = None,
-    constants: Mapping[str, float] | None = None,
-    gain: str = "",
-    beside: Sequence[str] = (),
-    other_units: Sequence[Mapping[str, str]] = (),
+    options: ReadingOptions = ReadingOptions(),
     at_pauses: Literal["split", "refuse"] = "split",
 ) -> tuple[Record, ...]:
     """Read, check and repair the stretches of a record between gaps in its time axis; usually there is only one."""
+    beside, dt, kind, require_outputs = options.beside, options.dt, options.kind, options.require_outputs
     known = [TIME, *(signal.name for signal in (*inputs, *outputs)), *beside]
-    columns = checked_columns(path.name, columns or {}, known)
+    columns = checked_columns(path.name, options.columns or {}, known)
     time = columns.get(TIME, ColumnMapping(TIME))
     if time.scale is not None and time.scale < 0.0:
         raise InputError(f"{path.name}: the scale of time must be positive, got {time.scale:g}.")
@@ -129,18 +102,21 @@ def read_stretches(
             raise InputError(
                 f"{path.name}: the column of {signal} names a time of its own, but {why}; give one of the two."
             )
-    constant_inputs = constant_inputs or {}
+    constant_inputs = options.constant_inputs or {}
     recorded = [signal for signal in inputs if signal.name not in constant_inputs]
     names = [*(signal.name for signal in (*recorded, *outputs)), *beside]
     wanted = {name: columns.get(name, ColumnMapping(name)) for name in names}
-    needed = [signal.name for signal in outputs[:1]] if required_outputs is None else required_outputs
+    needed = (
+        [signal.name for signal in outputs[:1]]
+        if options.required_outputs is None
+        else options.required_outputs
+    )
     free = [output.name for output in outputs if not require_outputs or output.name not in needed]
     # A column that was mapped by hand is meant to be there.
-    spare = [signal for signal in (*absent_inputs, *free, *beside) if signal not in columns]
-    dialect = _Dialect(separator, decimal, header, comment)
-    table = _joint_table(path, {TIME: time, **wanted}, spare, dialect, dt, time_is_mapped=TIME in columns)
+    spare = [signal for signal in (*options.absent_inputs, *free, *beside) if signal not in columns]
+    table = _joint_table(path, {TIME: time, **wanted}, spare, options, TIME in columns)
     absent = [signal.name for signal in recorded if signal.name not in table.values]
-    may_rest = kind == "operation" and amplitude is None
+    may_rest = kind == "operation" and options.amplitude is None
     if absent:
         check_absent(path, absent, table, is_free=len(absent) == len(inputs) and may_rest)
     if require_outputs and outputs and not any(signal.name in table.values for signal in outputs):
@@ -153,7 +129,7 @@ def read_stretches(
     units = {TIME: "s"} | {signal.name: signal.unit for signal in (*inputs, *outputs)}
     # One that nothing is computed in has the unit that it was said to have.
     units |= {name: wanted[name].unit or "" for name in beside}
-    units, unit_notes = units_of_columns(path.name, units, other_units, table, {TIME: time, **wanted})
+    units, unit_notes = units_of_columns(path.name, units, options.other_units, table, {TIME: time, **wanted})
     to_si: dict[str, ColumnMapping] = {}
     for signal, label in table.labels.items():
         mapping = time if signal == TIME else wanted[signal]
@@ -164,11 +140,11 @@ def read_stretches(
             mapping,
             label,
             None if signal in beside else table.units.get(signal),
-            gain,
+            options.gain,
         )
         unit_notes += notes
-    if start is not None or end is not None:
-        table = between(path.name, TIME, table, to_si[TIME], start, end)
+    if options.start is not None or options.end is not None:
+        table = between(path.name, TIME, table, to_si[TIME], options.start, options.end)
     raw = {name: table.values[name] for name in names if name in table.values}
     # A few samples at rest are too few before they are a rest.
     check_long_enough(path.name, max(values.size for values in table.values.values()))
@@ -180,9 +156,11 @@ def read_stretches(
     if require_outputs:
         raw, still = moving(path, raw, table, needed, outputs)
         found += still
-        if role == "estimation":
-            must_move = moving_inputs if may_rest else [signal.name for signal in recorded]
-            found += rest_notes(path, raw, table, recorded, must_move, kind == "step" and not moving_inputs)
+        if options.role == "estimation":
+            must_move = options.moving_inputs if may_rest else [signal.name for signal in recorded]
+            found += rest_notes(
+                path, raw, table, recorded, must_move, kind == "step" and not options.moving_inputs
+            )
     # A command stands at its extremes on purpose.
     found += clipping_notes(path, {name: v for name, v in raw.items() if name not in beside}, table)
     found += [
@@ -202,13 +180,13 @@ def read_stretches(
     cut = stretches(path.name, TIME, table, measured)
     parts = (one_stretch(path.name, cut),) if at_pauses == "refuse" else cut.parts
     held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
-    holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
-    called, before = name or readable(path.stem), (*table.notes, *unit_notes, *cut.notes)
+    holds: dict[str, Hold] = {signal.name: options.hold for signal in inputs}
+    called, before = options.name or readable(path.stem), (*table.notes, *unit_notes, *cut.notes)
     records = []
-    sensors = {signal.name for signal in outputs}.union(moving_inputs)
+    sensors = {signal.name for signal in outputs}.union(options.moving_inputs)
     for number, stretch in enumerate(parts, 1):
         part, slow = between_readings(path, TIME, stretch, sensors.intersection(kept))
-        on_axis = _on_one_axis(path, part, kept, to_si[TIME], resample, holds)
+        on_axis = _on_one_axis(path, part, kept, to_si[TIME], options.resample, holds)
         samples = {signal: to_si[signal].to_si(own) for signal, own in on_axis.samples.items()}
         n_samples = next(iter(samples.values())).size
         samples = {signal: np.full(n_samples, value) for signal, value in held.items()} | samples
@@ -219,52 +197,38 @@ def read_stretches(
                 signals=samples,
                 units={signal: unit for signal, unit in units.items() if signal == TIME or signal in samples},
                 t0=on_axis.t0,
-                role=role,
+                role=options.role,
                 kind=kind,
-                amplitude=amplitude,
-                hold="band_limited" if on_axis.is_filtered else hold,
+                amplitude=options.amplitude,
+                hold="band_limited" if on_axis.is_filtered else options.hold,
                 clock_uncertainty=on_axis.clock_uncertainty,
                 source=path,
                 notes=(*before, *slow, *on_axis.notes, *found) if number == 1 else (*slow, *on_axis.notes),
-                constants=constants or {},
+                constants=options.constants or {},
             )
         )
     return tuple(records)
-
-
-@dataclass(frozen=True)
-class _Dialect:
-    """The format of a text, as far as specified."""
-
-    separator: str | None
-    decimal: str | None
-    header: bool | int | None
-    comment: str | None
 
 
 def _table(
     path: Path,
     columns: Mapping[str, ColumnMapping],
     spare: Sequence[str],
-    dialect: _Dialect,
-    dt: float | None,
-    *,
+    options: ReadingOptions,
     time_is_mapped: bool,
 ) -> Columns:
     """Return the numbers of a file of any format, as they stand there."""
+    dt, dialect = options.dt, {key: getattr(options, key) for key in _DIALECT}
     if file_format(path) is not None:
         _refuse_dialect(path, dialect)
         return read_channels(path, columns, TIME, time_is_mapped=time_is_mapped, optional=spare, dt=dt)
     own = {signal: column for signal, column in columns.items() if dt is None or signal != TIME}
-    table = read_csv(path, own, optional=spare, **vars(dialect))
+    table = read_csv(path, own, optional=spare, **dialect)
     if dt is None:
         return table
     clocks = own_clocks(table.names)
     if len({clocks.get(table.names.index(label)) for label in table.labels.values()}) > 1:
-        raise InputError(
-            f"{path.name}: dt = {dt:g} cannot hold for signals that have clocks of their own. Leave dt out, and name the time of "
-            'each where the file does not show it: { name = "...", time = "..." }.'
-        )
+        refuse_one_dt(path.name, dt, "clocks of their own")
     stamps = dt * np.arange(table.lines.size, dtype=np.float64)
     notes = unread_time(path, dt, [TIME] if TIME in table.names else [])
     return replace(
@@ -286,8 +250,8 @@ def _refuse_time_as_signal(file: str, table: Columns) -> None:
         )
 
 
-def _refuse_dialect(path: Path, dialect: _Dialect) -> None:
-    for key, value in vars(dialect).items():
+def _refuse_dialect(path: Path, dialect: Mapping[str, object]) -> None:
+    for key, value in dialect.items():
         if value is not None:
             raise InputError(f"{path.name} is not delimited text, so {key} does not apply; remove {key}.")
 
@@ -322,9 +286,7 @@ def _joint_table(
     path: Path,
     columns: Mapping[str, ColumnMapping],
     spare: Sequence[str],
-    dialect: _Dialect,
-    dt: float | None,
-    *,
+    options: ReadingOptions,
     time_is_mapped: bool,
 ) -> Columns:
     """Return the numbers of a record, of which signals may be in files of their own."""
@@ -333,18 +295,18 @@ def _joint_table(
         if column.file is not None and column.file != path:
             elsewhere.setdefault(column.file, {})[signal] = column
     if not elsewhere:
-        return _table(path, columns, spare, dialect, dt, time_is_mapped=time_is_mapped)
+        return _table(path, columns, spare, options, time_is_mapped)
     if TIME in {signal for own in elsewhere.values() for signal in own}:
         raise InputError(
             f"{path.name}: {TIME} cannot be in another file; each file has the time of its own signals."
         )
-    if dt is not None:
+    if options.dt is not None:
         raise InputError(
-            f"{path.name}: dt = {dt:g} cannot hold for signals of several files; each needs its time."
+            f"{path.name}: dt = {options.dt:g} cannot hold for signals of several files; each needs its time."
         )
     files = {path: {s: c for s, c in columns.items() if c.file is None or c.file == path}, **elsewhere}
     tables = {
-        file: _table(file, {TIME: columns[TIME], **own}, spare, dialect, None, time_is_mapped=time_is_mapped)
+        file: _table(file, {TIME: columns[TIME], **own}, spare, options, time_is_mapped)
         for file, own in files.items()
         if len(own) > 1 or file != path
     }

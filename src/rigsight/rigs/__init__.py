@@ -28,34 +28,3 @@ from rigsight.rigs.reading.rig_file import read_rig_file as read_rig_file
 from rigsight.rigs.reading.rig_file import rig_of_tables as rig_of_tables
 from rigsight.rigs.rig import Rig as Rig
 from rigsight.rigs.rig import joint_of as joint_of
-
-__all__ = [
-    "AXIS",
-    "ELEMENT",
-    "RIGS",
-    "ROLLING",
-    "RUNNING_GEAR",
-    "Coordinate",
-    "Drive",
-    "Follower",
-    "Joint",
-    "Motion",
-    "Rig",
-    "Sensor",
-    "Signal",
-    "acceleration",
-    "applied_symbol",
-    "declared_rig",
-    "evaluated",
-    "force_symbol",
-    "has_built_in_parameters",
-    "has_short_inverse",
-    "is_built_in_motion",
-    "joint_of",
-    "read_rig_file",
-    "reading_symbol",
-    "relative_slopes",
-    "rig_file_text",
-    "rig_of_tables",
-    "rotational",
-]

@@ -25,31 +25,3 @@ from rigsight.simulate.simulation import simulate as simulate
 from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
 from rigsight.simulate.substeps import Substeps as Substeps
 from rigsight.simulate.substeps import state_limits as state_limits
-
-__all__ = [
-    "FittedRecord",
-    "Structure",
-    "Substeps",
-    "cache_folder",
-    "carried_over",
-    "carries_tangents",
-    "choose_substeps",
-    "compose",
-    "differs_at_events",
-    "has_dry_friction",
-    "normal_equations",
-    "parameter_vector",
-    "record_input",
-    "record_values",
-    "rest_state",
-    "simulate",
-    "simulate_outputs",
-    "simulate_sets",
-    "simulate_tangents",
-    "special_values",
-    "state_limits",
-    "structure_named",
-    "structure_of_fit",
-    "tangent_equations",
-    "unique_names",
-]

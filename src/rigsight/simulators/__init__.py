@@ -10,16 +10,3 @@ from rigsight.simulators.leaf import simulated as simulated
 from rigsight.simulators.leaf import simulated_slope as simulated_slope
 from rigsight.simulators.mujoco_program import has_constraints as has_constraints
 from rigsight.simulators.python_program import give_function as give_function
-
-__all__ = [
-    "KINDS",
-    "Bodies",
-    "bodies_of",
-    "force_leaf",
-    "give_function",
-    "has_constraints",
-    "mass_leaf",
-    "place_of",
-    "simulated",
-    "simulated_slope",
-]

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Protocol
+from types import ModuleType
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,7 +135,7 @@ class Bodies:
             raise InputError(
                 f"{self.file}{included} has changed since this rig was read; read the rig again."
             )
-        program: Program = _openers()[self.kind](self)
+        program: Program = getattr(_module(self.kind), f"{self.kind.capitalize()}Program")(self)
         return program
 
 
@@ -214,15 +215,10 @@ def model_digest(kind: str, path: Path) -> str:
     except ValueError as error:
         raise InputError(f"{str(path)!r} is not a file name: {error}.") from None
     if kind == "mujoco":
-        from rigsight.simulators.mujoco_program import compiled_model
-
-        content = compiled_model(path)
+        content = _module(kind).compiled_model(path)
     return hashlib.sha256(content).hexdigest()
 
 
-def _openers() -> dict[str, Callable[[Bodies], Any]]:
-    from rigsight.simulators.fmu_program import FmuProgram
-    from rigsight.simulators.mujoco_program import MujocoProgram
-    from rigsight.simulators.python_program import PythonProgram
-
-    return {"mujoco": MujocoProgram, "fmu": FmuProgram, "python": PythonProgram}
+def _module(kind: str) -> ModuleType:
+    """Return the module of a program, which imports this one; its library is loaded only for rigs that use it."""
+    return import_module(f"rigsight.simulators.{kind}_program")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +23,7 @@ from rigsight.simulate import Structure, parameter_vector, record_input, record_
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.given_simulation import checked_numbers
+from rigsight.workflow.campaign.listed_records import options_of
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.units_of_record import in_units_of
 from rigsight.workflow.campaign.where import Where
@@ -68,13 +70,14 @@ def run_simulate(
         Path(record),
         rig.inputs,
         rig.outputs if estimated else (),
-        columns=columns,
-        require_outputs=estimated,
-        required_outputs=rig.required_outputs,
-        absent_inputs=rig.absent_inputs,
-        moving_inputs=rig.moving_inputs,
-        hold=read.hold,
-        constants=own,
+        replace(
+            options_of(rig),
+            columns=columns,
+            require_outputs=estimated,
+            beside=(),
+            hold=read.hold,
+            constants=own,
+        ),
     )
     simulated = simulate_model(read, driven, initial_state)
     if out is not None:

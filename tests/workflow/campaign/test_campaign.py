@@ -191,7 +191,7 @@ BROKEN: list[tuple[str, str, str, list[str]]] = [
     ("no records", RECORDS, "", ["records", "missing", "[[records]]"]),
     ("empty records", RECORDS, "", ["records: 0 given, 1 to 1000"]),
     ("records no list", "[[records]]\nfile", "[records]\nfile", ["campaign.toml", "begins with [[records]]"]),
-    ("path of Windows", '"sweep.csv"', '"C:\\data.csv"', ["campaign.toml", "Write paths with /"]),
+    ("path of Windows", '"sweep.csv"', '"C:\\data.csv"', ["campaign.toml", "a path with /"]),
     ("file missing", 'file = "sweep.csv"', "", ["record 1: file", "missing"]),
     (
         "file not there",

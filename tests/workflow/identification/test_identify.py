@@ -197,7 +197,7 @@ def test_nothing_half_written_is_left(tmp_path: Path, monkeypatch: pytest.Monkey
         raise OSError(28, "No space left on device")
 
     campaign = write_campaign(tmp_path / "c", [sweep("one", 0.5, seconds=12.0)])
-    monkeypatch.setattr("rigsight.workflow.run.results.os.fsync", broken)
+    monkeypatch.setattr(Path, "write_bytes", broken)
     with pytest.raises(InputError, match="disk is full"):
         run_identify(campaign, tmp_path / "new" / "out")
     assert not (tmp_path / "new").exists()

@@ -196,7 +196,7 @@ def test_a_package_with_another_thing_is_told(
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int | str | None:
     monkeypatch.setattr(sys, "argv", ["rigsight", *map(str, arguments)])
     try:
-        cli.command_line()
+        cli.main()
     except SystemExit as leaving:
         return leaving.code
     return 0

@@ -22,6 +22,7 @@ from rigsight.diagnose.pushes.measured_motion import Corrections
 from rigsight.diagnose.pushes.probes import PUSH_SIZE, motion_columns, push, signal_columns, with_probes
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
+from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.start.place_scales import scales_at_places
 from rigsight.records.record import Record
 from rigsight.simulate import compose, parameter_vector, record_input, record_values, simulate_sets
@@ -32,7 +33,7 @@ Floats = NDArray[np.float64]
 
 _STEP = 1e-3
 """Relative change of a parameter whose answer is taken by differences."""
-_DEPENDENT = 1e-7
+_ROUNDED_COLUMN = 1e-7
 """Part of a column outside the others below which it depends on them: squares are accurate to 1e-16."""
 
 
@@ -319,7 +320,7 @@ def orthonormal(columns: Floats) -> Floats:
     # From the squares, which takes a quarter of the time of a singular value decomposition of these tall columns; done twice,
     # the basis is orthonormal to rounding.
     for _ in range(2):
-        squares, directions = np.linalg.eigh(columns.T @ columns)
-        kept = squares > _DEPENDENT**2 * squares[-1]
+        squares, directions = symmetric_eigen(columns.T @ columns)
+        kept = squares > _ROUNDED_COLUMN**2 * squares[-1]
         columns = columns @ (directions[:, kept] / np.sqrt(squares[kept]))
     return columns

@@ -19,6 +19,7 @@ from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.pieces import Piece, Pieces, pseudo_inverse
 from rigsight.diagnose.trust.spectra import NoiseSpectra
 from rigsight.identify import DEFAULT_ACCURACY, SMOOTHED, sandwich_covariance, spectral_product
+from rigsight.identify.fit.covariance import symmetric_eigen
 
 Floats = NDArray[np.float64]
 
@@ -107,7 +108,7 @@ def _loosest(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> int 
         return None
     size = np.sqrt(np.diag(normal))
     size[size == 0.0] = 1.0
-    direction = np.abs(np.linalg.eigh(normal / np.outer(size, size))[1][:, 0])
+    direction = np.abs(symmetric_eigen(normal / np.outer(size, size))[1][:, 0])
     # Of two that take part alike the last one goes: rigs come before effects, and what an effect is first named for stands first.
     largest = np.flatnonzero(direction >= TRUST.in_order * np.max(direction))[-1]
     return int(np.flatnonzero(kept)[largest])

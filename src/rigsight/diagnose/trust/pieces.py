@@ -25,7 +25,7 @@ from rigsight.records.record import Record
 
 Floats = NDArray[np.float64]
 
-_DEPENDENT = 1e-7
+_UNDETERMINED = 1e-7
 """Share of the largest singular value below which a direction of the numbers is not told by a record."""
 _TOLERANCE = 1e-3
 """Initial states of windows follow from one linearization: near the best place is near enough."""
@@ -112,7 +112,7 @@ def pseudo_inverse(rows: Floats) -> Floats:
     size = np.linalg.norm(rows, axis=0)
     size[size == 0.0] = 1.0
     base, triangle = np.linalg.qr(rows / size)
-    return np.asarray(np.linalg.pinv(triangle, rcond=_DEPENDENT) @ base.T / size[:, None])
+    return np.asarray(np.linalg.pinv(triangle, rcond=_UNDETERMINED) @ base.T / size[:, None])
 
 
 def _asks_for_other_numbers(piece: Piece) -> bool:
@@ -179,5 +179,5 @@ def _basis(columns: Floats) -> Floats:
     base, triangle = np.linalg.qr(columns / size)
     turned, singular, _ = np.linalg.svd(triangle)
     return np.asarray(
-        base @ turned[:, singular > _DEPENDENT * max(float(np.max(singular, initial=0.0)), 1e-300)]
+        base @ turned[:, singular > _UNDETERMINED * max(float(np.max(singular, initial=0.0)), 1e-300)]
     )

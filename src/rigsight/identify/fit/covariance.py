@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import norm, t
 
-_DEPENDENT = 1e-14
+_ROUNDED_EIGENVALUE = 1e-14
 """Share of the largest eigenvalue below which the effect of a direction of the coordinates is rounding error."""
 _MARGIN = 3.0
 """Factor by which the influence of a direction must exceed the error of the derivatives to count as determined; an assumption."""
@@ -125,7 +125,7 @@ def sandwich_covariance(
     size = np.sqrt(np.diag(bread))
     size[size == 0.0] = 1.0
     eigenvalues, vectors = symmetric_eigen(bread / np.outer(size, size))
-    dependent = max(_DEPENDENT, (_MARGIN * derivative_error) ** 2)
+    dependent = max(_ROUNDED_EIGENVALUE, (_MARGIN * derivative_error) ** 2)
     seen = eigenvalues > dependent * max(float(eigenvalues[-1]), 1e-300)
     known = vectors[:, seen]
     inverse = (known / eigenvalues[seen]) @ known.T

@@ -77,13 +77,13 @@ def rig_state(
     # The state then does not depend on the values, so it is cached for all candidates.
     moving = [name for name in equations.sensor_names if name not in equations.of_own_states]
     known = _known.setdefault(record, {})
-    key = (id(equations), resting)
+    key = (equations, resting)
     if key not in known:
         known[key] = _rig_state(equations, record, values, resting, moving)
     return known[key].copy()
 
 
-_known: WeakKeyDictionary[Record, dict[tuple[int, int | None], Floats]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[Record, dict[tuple[RigEquations, int | None], Floats]] = WeakKeyDictionary()
 
 
 def _rig_state(

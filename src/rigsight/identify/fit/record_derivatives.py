@@ -15,7 +15,8 @@ from rigsight.identify.fit.grey_box import GreyBoxFit
 
 Floats = NDArray[np.float64]
 
-_DEPENDENT = 1e-6
+_LEAST_SLOPE = 1e-6
+"""Share of the largest influence below which a direction has none, however exact its derivatives are."""
 _MARGIN = 3.0
 """Factor of the error of the derivatives below which the influence of a direction counts as zero, as for covariances; no step is
 taken along it."""
@@ -133,7 +134,7 @@ def own_derivatives(
     for _ in range(most_steps):
         size = np.linalg.norm(slopes, axis=0)
         size[size == 0.0] = 1.0
-        smallest = max(_DEPENDENT, _MARGIN * evaluated.derivative_error)
+        smallest = max(_LEAST_SLOPE, _MARGIN * evaluated.derivative_error)
         scaled = slopes / size
         step = (
             -np.linalg.pinv(scaled.T @ scaled, rcond=smallest**2, hermitian=True)

@@ -28,7 +28,7 @@ many."""
 _LEAST_SHARE = 0.1
 _LESS, _MORE = 0.5, 1.5
 """Factors on the share of a step that is taken, if the step reverses and if it does not: the usual values, not tuned."""
-_DEPENDENT = 1e-7
+_LEAST_INFLUENCE = 1e-7
 """Share of the largest influence below which a combination of coordinates has none: squares are accurate to 1e-16."""
 _WIDEST = 0.1
 """Largest share of a coordinate's range that a difference spans."""
@@ -152,7 +152,7 @@ def _step(
     step = np.zeros(place.size)
     for _ in range(place.size):
         step = np.zeros(place.size)
-        step[free] = -np.linalg.lstsq(root[:, free], projection, rcond=_DEPENDENT)[0]
+        step[free] = -np.linalg.lstsq(root[:, free], projection, rcond=_LEAST_INFLUENCE)[0]
         beyond = free & ((place + step > bounds[1]) | (place + step < bounds[0]))
         if not np.any(beyond):
             break

@@ -31,7 +31,8 @@ _SETTLED = 1e-3
 """Share of a record's cost below which no further step is made."""
 _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Start values of limited states between the rounds of a search, as shares of their range."""
-_DEPENDENT = 1e-9
+_DEPENDENT_STATE = 1e-9
+"""Part of the response to an initial state outside that to the others below which they give it no more than rounding."""
 
 
 class VariableProjection(Problem):
@@ -179,5 +180,5 @@ def _projected(
     size = np.linalg.norm(states, axis=0)
     size[size == 0.0] = 1.0
     base, triangle = np.linalg.qr(states / size)
-    base = base[:, np.abs(np.diag(triangle)) > _DEPENDENT]
+    base = base[:, np.abs(np.diag(triangle)) > _DEPENDENT_STATE]
     return own - base @ (base.T @ own), residual - base @ (base.T @ residual)

@@ -13,19 +13,3 @@ from rigsight.identify.hysteresis.features import fitted_break_frequency as fitt
 from rigsight.identify.hysteresis.features import peak as peak
 from rigsight.identify.hysteresis.spectral_ratio import SpectralRatio as SpectralRatio
 from rigsight.identify.hysteresis.to_records import calibrate_to_records as calibrate_to_records
-
-__all__ = [
-    "Calibration",
-    "Derived",
-    "DerivedQuantities",
-    "LoopArea",
-    "Minimum",
-    "Peak",
-    "SpectralRatio",
-    "break_frequency",
-    "calibrate_to_records",
-    "derived_quantities",
-    "fitted_break_frequency",
-    "loop_area",
-    "peak",
-]

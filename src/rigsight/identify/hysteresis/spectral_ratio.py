@@ -61,11 +61,6 @@ class SpectralRatio:
             method=f"spectral ratio averaged over {self.width:g} of the frequency",
         )
 
-    def of_outputs(self, record: Record, outputs: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the responses, shape (n_frequencies, n_sets), for outputs of shape (n_samples, n_sets)."""
-        real, imaginary = np.split(self.rows(record) @ outputs, 2)
-        return np.asarray(real + 1j * imaginary)
-
     def rows(self, record: Record) -> NDArray[np.float64]:
         """Return the matrix from response samples to real parts, then imaginary parts, shape (2 n_frequencies, n_samples)."""
         n = record.n_samples

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from rigsight.errors import InputError
+from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.first_states import rig_state
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
@@ -203,7 +204,7 @@ def _reported(information: Floats, free: Sequence[str]) -> list[str]:
     """Return as many parameters as combinations are determined by the records; they are determined if the others are held."""
     if not np.all(np.isfinite(information)):
         return list(free)
-    values, vectors = np.linalg.eigh(information)
+    values, vectors = symmetric_eigen(information)
     root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     triangle, order = qr(root, mode="r", pivoting=True)
     rank = int(np.count_nonzero(np.abs(np.diag(triangle)) > _TOLD))

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.identify.start.linearized_responses import USABLE_BAND
+from rigsight.identify.start.projection import SIGNIFICANT_POWER
 from rigsight.records.record import Record
 
 _ITERATIONS = 20
 _TRANSIENT_ORDER = 2
-_SIGNIFICANT_POWER = 25.0
 _EXCITED = 1e-3
-_USABLE_BAND = 0.8
 _MIN_LINES = 20
 
 Term = tuple[int, NDArray[np.complex128]]
@@ -69,7 +69,7 @@ def spectra_of(record: Record, source: str, response: str) -> Spectra:
         hold = (sinc**2).astype(np.complex128)
     power = np.abs(spectrum) ** 2
     floor = np.median(power[int(0.9 * power.size) :])
-    significant = (power > _SIGNIFICANT_POWER * floor) & (omega < _USABLE_BAND * np.pi / record.dt)
+    significant = (power > SIGNIFICANT_POWER * floor) & (omega < USABLE_BAND * np.pi / record.dt)
     excited = np.abs(drive) > _EXCITED * np.max(np.abs(drive))
     keep = significant & excited
     if np.count_nonzero(keep) < _MIN_LINES:

@@ -20,14 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.rig_equations import RigEquations
+from rigsight.identify.start.projection import SIGNIFICANT_POWER
 from rigsight.records.record import Record
 from rigsight.simulate.equations.structure import input_symbols
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-_SIGNIFICANT_POWER = 25.0
-_USABLE_BAND = 0.8
+USABLE_BAND = 0.8
+"""Share of the band below half the sampling rate in which what an input does between samples hardly matters."""
 _MOST_LINES = 200
 """Number of lines of all records together, evenly chosen among the informative ones."""
 _RELATIVE_ERROR = 0.05
@@ -162,8 +163,8 @@ def _lines(equations: RigEquations, record: Record, p: Floats, most: int) -> _Li
     shown = np.array([_spectrum(record[equations.sensor_names[i]]) for i in seen]).reshape(len(seen), -1)
     power = np.abs(shown) ** 2
     floor = np.median(power[:, int(0.9 * omega.size) :], axis=1, keepdims=True) + 1e-300
-    usable = omega < _USABLE_BAND * np.pi / record.dt
-    kept = np.flatnonzero(np.any(power > _SIGNIFICANT_POWER * floor, axis=0) & usable)
+    usable = omega < USABLE_BAND * np.pi / record.dt
+    kept = np.flatnonzero(np.any(power > SIGNIFICANT_POWER * floor, axis=0) & usable)
     kept = kept if kept.size else np.flatnonzero(usable)
     kept = kept[:: max(1, kept.size // most)]
     weights = 1.0 / np.sqrt(floor + _RELATIVE_ERROR**2 * power[:, kept])

@@ -18,9 +18,9 @@ _STRETCHES = 4
 """Length of a record in units of a stretch; stretches overlap by half."""
 _SHORTEST = 64
 """Smallest number of samples of a stretch."""
-_SIGNIFICANT_POWER = 25.0
+SIGNIFICANT_POWER = 25.0
 """Power over that of the noise above which a line of a sensor is informative."""
-_USABLE_BAND = 0.5
+_BAND_OF_SUMS = 0.5
 """Share of the band below half the sampling rate in which sums approximate the integrals."""
 _LEAST_NOISE = 1e-6
 """Noise assumed for a sensor without visible noise, relative to its size."""
@@ -70,14 +70,14 @@ def projected(
             power = np.abs(every.of(record[name] - np.mean(record[name]))) ** 2
             quiet = power[line > 0.9 * (length // 2)]
             floors[i] = max(float(np.median(quiet)) / np.log(2.0), (_LEAST_NOISE**2) * float(np.mean(power)))
-            says |= power > _SIGNIFICANT_POWER * floors[i]
+            says |= power > SIGNIFICANT_POWER * floors[i]
     for source in equations.rig.inputs:
         power = np.abs(every.of(record[source.name] - np.mean(record[source.name]))) ** 2
-        says |= power > _SIGNIFICANT_POWER * _LEAST_NOISE * np.max(power)
+        says |= power > SIGNIFICANT_POWER * _LEAST_NOISE * np.max(power)
     # The first two lines of a signal that is known only up to a constant are not used; the window spreads the constant over them.
     first = 2 if measured.is_integrated else 0
-    kept = np.flatnonzero(says & (line >= first) & (omega < _USABLE_BAND * np.pi / record.dt))
+    kept = np.flatnonzero(says & (line >= first) & (omega < _BAND_OF_SUMS * np.pi / record.dt))
     if kept.size == 0:
-        kept = np.flatnonzero((line >= first) & (omega < _USABLE_BAND * np.pi / record.dt))
+        kept = np.flatnonzero((line >= first) & (omega < _BAND_OF_SUMS * np.pi / record.dt))
     kept = kept[:: max(1, kept.size // most)]
     return Projection(omega[kept], stretch[kept], line[kept], starts, length, record.dt), floors

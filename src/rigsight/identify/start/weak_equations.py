@@ -133,11 +133,6 @@ class WeakEquations:
         """Number of equations: one for each coordinate and own state."""
         return self._equations.n_states - self._equations.n_coordinates
 
-    @property
-    def n_errors(self) -> int:
-        """Length of the vector of errors."""
-        return sum(2 * block.omega.size for block in self._blocks) * self.n_equations
-
     def errors(self, values: Floats) -> Floats:
         """Return the weighted errors for values of the free parameters, shape (n_errors,): of size one if due to noise."""
         found = []

@@ -32,6 +32,10 @@ Load = Callable[[], NDArray[Any]]
 """Reads stored numbers as they are, shape (n_samples,), while the file is open."""
 
 
+class ReadingError(Exception):
+    """What a library raised over a file in a process of its own, by kind and text."""
+
+
 @dataclass(frozen=True, eq=False)
 class TimeAxis:
     """The time of a channel, where the file keeps one beside the samples."""

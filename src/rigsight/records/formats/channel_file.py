@@ -18,12 +18,13 @@ from rigsight.records.formats.channel import (
     Channel,
     ChannelFile,
     Load,
+    ReadingError,
     check_count,
     check_size,
     check_total,
     with_distinct_names,
 )
-from rigsight.records.formats.isolated_reader import ReadingError, open_isolated
+from rigsight.records.formats.isolated_reader import open_isolated
 from rigsight.records.formats.known import BY_SUFFIX, HEAD, PACKAGES, Format, reader_of, recognized
 from rigsight.records.formats.ordinary_file import file_size
 from rigsight.records.formats.stored_numbers import AS_STORED, Stored

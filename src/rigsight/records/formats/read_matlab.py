@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-import io
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.errors import InputError
-from rigsight.records.formats.channel import (
-    Channel,
-    ChannelFile,
-    Load,
-    Refused,
-    check_count,
-    columns_of,
-)
-from rigsight.records.formats.matlab_elements import (
-    HEADER,
-    DamagedError,
-    Variable,
-    begins_with_variable,
-    declared_variables,
-)
-from rigsight.records.formats.matlab_names import NUMERIC, why_no_signal
+from rigsight.records.formats.channel import Channel, ChannelFile, Refused, check_count, columns_of
+from rigsight.records.formats.matlab_names import why_no_signal
 
-Way = tuple[tuple[int, str], ...]
-"""Elements of structs and their fields, from a variable to what is inside."""
+_OF_SCIPY = ("__header__", "__version__", "__globals__", "__function_workspace__")
+_OBJECTS = {"MatlabOpaque": "opaque", "MatlabFunction": "function", "MatlabObject": "object"}
+_KINDS = {"U": "char", "S": "char", "c": "complex", "O": "cell"}
+"""Kind of scipy's arrays -> MATLAB class of what is no signal."""
 
 
 def open_matlab(path: Path) -> Iterator[ChannelFile]:
@@ -37,72 +23,44 @@ def open_matlab(path: Path) -> Iterator[ChannelFile]:
 
     MATLAB files state no units. Tables and timetables are objects that only MATLAB reads; they are refused by name.
     """
-    _check_first(path)
-    data = path.read_bytes()
-    read: dict[str, Any] = {}
-
-    def load(variable: str, way: Way) -> Load:
-        def numbers() -> NDArray[Any]:
-            if variable not in read:
-                # One at a time: packed variables together may be larger than any memory.
-                read.clear()
-                read[variable] = _read(data, variable)
-            content: NDArray[Any] = read[variable]
-            for element, field in way:
-                content = content.reshape(-1, order="F")[element][field]
-            return content
-
-        return numbers
+    from scipy.io import loadmat
 
     channels: list[Channel] = []
     refused: list[Refused] = []
-    try:
-        variables = list(declared_variables(data, path.name))
-    except InputError as error:
-        text = str(error)
-        raise InputError(text if text.startswith(path.name) else f"{path.name}: {text}") from None
-    for variable in variables:
-        for name, part, way in _parts(variable.name, variable, ()):
+    # Not in the types of MATLAB (mat_dtype): for those scipy drops imaginary parts.
+    for variable, content in loadmat(str(path), appendmat=False).items():
+        if variable in _OF_SCIPY:
+            continue
+        for name, part in _parts(variable, content):
             check_count(path.name, len(channels) + len(refused))
-            found = _channels(name, part, load(variable.name, way))
-            if isinstance(found, Refused):
-                # MATLAB keeps the workspace of functions and objects under an empty name.
-                refused += [found] if variable.name else []
+            kind = _kind(part)
+            found = columns_of(name, part.shape, _kept(part)) if kind is None else why_no_signal(kind)
+            if isinstance(found, list):
+                channels += found
             else:
-                channels.extend(found)
+                refused.append(found if isinstance(found, Refused) else Refused(name, found))
     yield ChannelFile(tuple(channels), tuple(refused))
 
 
-def _parts(name: str, variable: Variable, way: Way) -> Iterator[tuple[str, Variable, Way]]:
+def _parts(name: str, content: Any) -> Iterator[tuple[str, Any]]:
     """Yield a variable, or what is inside where it is a struct or an array of structs."""
-    count = math.prod(variable.shape)
-    if variable.kind != "struct" or not variable.fields:
-        yield name, variable, way
+    if _kind(content) != "struct" or content.size == 0:
+        yield name, content
         return
-    per_element = len(variable.fields) // count
-    for place, field in enumerate(variable.fields):
-        element = place // per_element
-        owner = name if count == 1 else f"{name}({element + 1})"
-        yield from _parts(f"{owner}/{field.name}", field, (*way, (element, field.name)))
+    for place, element in enumerate(content.reshape(-1, order="F"), 1):
+        owner = name if content.size == 1 else f"{name}({place})"
+        for field in content.dtype.names:
+            yield from _parts(f"{owner}/{field}", element[field])
 
 
-def _check_first(path: Path) -> None:
-    """Refuse a file that begins with no variable before all of it is read."""
-    with path.open("rb") as stream:
-        head = stream.read(HEADER + 8)
-    if len(head) == HEADER + 8 and not begins_with_variable(head):
-        raise DamagedError("it does not begin with a variable")
+def _kind(content: Any) -> str | None:
+    """Return the MATLAB class of what is no signal, None for numbers."""
+    if not isinstance(content, np.ndarray):
+        return "sparse"
+    if type(content).__name__ in _OBJECTS:
+        return _OBJECTS[type(content).__name__]
+    return "struct" if content.dtype.names else _KINDS.get(content.dtype.kind)
 
 
-def _channels(name: str, declared: Variable, load: Load) -> list[Channel] | Refused:
-    if declared.kind not in NUMERIC:
-        return Refused(name, why_no_signal(declared.kind))
-    return columns_of(name, declared.shape, load)
-
-
-def _read(data: bytes, variable: str) -> Any:
-    from scipy.io import loadmat
-
-    # The stream and not the path: what was checked is what is read.
-    stream: Any = io.BytesIO(data)
-    return loadmat(stream, variable_names=[variable])[variable]
+def _kept(content: NDArray[Any]) -> Any:
+    return lambda: content

@@ -36,14 +36,6 @@ class Stored:
     # Attributes that may be a conversion, as ``name = value``, but of no known convention.
     unclear: tuple[str, ...] = ()
 
-    @classmethod
-    def of_json(cls, content: Mapping[str, Any]) -> Stored:
-        """Return what `dataclasses.asdict` and JSON made of one: tuples are lists there."""
-        fields: dict[str, Any] = {
-            k: tuple(own) if isinstance(own, list) else own for k, own in content.items()
-        }
-        return cls(**fields)
-
     def quantity(self, stored: NDArray[Any]) -> NDArray[Any]:
         """Return the quantity, shape (n_samples,), NaN where the file says that a reading is missing or invalid."""
         if self == Stored(unclear=self.unclear):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -19,7 +18,7 @@ from rigsight.rigs.reading.declared_units import check_units_add_up
 from rigsight.rigs.reading.simulator import check_simulator, with_whole_path
 from rigsight.rigs.reading.sound_mechanism import check_mechanism
 from rigsight.rigs.reading.toml_places import Path as KeyPath
-from rigsight.rigs.reading.toml_places import Place, toml_error, value_places
+from rigsight.rigs.reading.toml_places import Place, toml_tables, value_places
 from rigsight.rigs.rig import Rig
 
 LARGEST_FILE = 1_000_000
@@ -46,15 +45,7 @@ def rig_of_text(
     text: str, source: str = "rig file", *, check_units: bool = True, folder: Path | None = None
 ) -> Rig:
     """Return the rig that a text declares."""
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}{toml_error(error)}") from None
-    except RecursionError:
-        raise InputError(f"{source}: is not valid TOML: its arrays are nested too deep.") from None
-    except ValueError:
-        # The only valid TOML that fails here is an integer with thousands of digits.
-        raise InputError(f"{source}: contains an integer with too many digits to be read.") from None
+    content = toml_tables(text, source)
     if folder is not None:
         content = with_whole_path(content, folder)
     return _rig_of(content, value_places(text), source, check_units)

@@ -1,10 +1,14 @@
-"""Line and column of the value of a key in a TOML file, which tomllib does not report."""
+"""A text in TOML -> its tables, and line and column of the value of each key, which tomllib does not report."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from rigsight.errors import InputError
 
 Path = tuple[str | int, ...]
 Place = tuple[int, int]
@@ -65,18 +69,29 @@ _REMEDIES = {
     "Cannot overwrite a value": "the key occurs twice in its table",
     "Cannot declare": "the table occurs twice",
     "Expected '=' after a key": "write the line as KEY = VALUE",
-    "Unescaped": "write a backslash in quotes twice",
+    "Expected newline or end of document after a statement": "numbers have a decimal point, texts are written in quotes",
+    "Unescaped": "write a backslash in quotes twice, or a path with /",
 }
 _POSITION = re.compile(r"(?P<what>.*) \(at (?P<place>line \d+, column \d+|end of document)\)", re.DOTALL)
 
 
-def toml_error(error: tomllib.TOMLDecodeError) -> str:
-    """Return ``", line 3, column 8: is not valid TOML: ..."`` with what to write, for behind the name of a file."""
-    found = _POSITION.fullmatch(str(error))
-    if found is None:
-        return f": is not valid TOML: {error}."
-    remedy = next((remedy for start, remedy in _REMEDIES.items() if found["what"].startswith(start)), "")
-    return f", {found['place']}: is not valid TOML: {found['what']}{f'; {remedy}' if remedy else ''}."
+def toml_tables(text: str, source: str, remedies: Mapping[str, str] = MappingProxyType({})) -> dict[str, Any]:
+    """Return what a text holds; `remedies` say what to write instead of what an error begins with."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        found = _POSITION.fullmatch(str(error))
+        place, what = ("", str(error)) if found is None else (f", {found['place']}", found["what"])
+        remedy = next(
+            (f"; {remedy}" for start, remedy in {**_REMEDIES, **remedies}.items() if what.startswith(start)),
+            "",
+        )
+        raise InputError(f"{source}{place}: is not valid TOML: {what}{remedy}.") from None
+    except RecursionError:
+        raise InputError(f"{source}: is not valid TOML: its arrays are nested too deep.") from None
+    except ValueError:
+        # The only valid TOML that fails here is an integer with thousands of digits.
+        raise InputError(f"{source}: contains an integer with too many digits to be read.") from None
 
 
 def _keys(written: str) -> Path:

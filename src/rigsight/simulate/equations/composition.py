@@ -9,6 +9,7 @@ from functools import lru_cache
 import sympy as sp
 
 from rigsight.effects import Effect, placed_dimension
+from rigsight.effects.placed import ByIdentity
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter
 from rigsight.records.record import Record
@@ -51,8 +52,8 @@ def compose(
     """
     chosen = tuple(sorted(effects, key=lambda e: (e.place.value, len(e.states), e.name)))
     return _compose(
-        _Key(rig),
-        _Key(chosen),
+        ByIdentity(rig),
+        ByIdentity(chosen),
         tuple(sorted((fixed or {}).items())),
         _in_order(rig, offsets),
         _in_order(rig, observed),
@@ -83,31 +84,15 @@ def structure_of_fit(structure: Structure, records: Iterable[Record]) -> Structu
     return compose(structure.rig, structure.effects, dict(structure.fixed), offsets, observed)
 
 
-class _Key:
-    """A cache key by identity, because declarations contain dictionaries and cannot be hashed."""
-
-    def __init__(self, value: Rig | tuple[Effect, ...]) -> None:
-        self.value = value
-        self._identity = tuple(map(id, value)) if isinstance(value, tuple) else (id(value),)
-
-    def __hash__(self) -> int:
-        return hash(self._identity)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self._identity == other._identity
-
-
 @lru_cache(maxsize=1024)
 def _compose(
-    rig_key: _Key,
-    effects_key: _Key,
+    rig_key: ByIdentity[Rig],
+    effects_key: ByIdentity[tuple[Effect, ...]],
     fixed: tuple[tuple[str, float], ...],
     offsets: tuple[str, ...],
     observed: tuple[str, ...],
 ) -> Structure:
     rig, effects = rig_key.value, effects_key.value
-    assert isinstance(rig, Rig)
-    assert isinstance(effects, tuple)
     _check_effects(rig, effects)
     unique = unique_names(rig, effects)
     late = {rig.acts_at(effect) for effect in effects if effect.reading_delay is not None}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -11,11 +10,16 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold, Kind, Role
 from rigsight.records.formats.ordinary_file import file_size
+from rigsight.rigs.reading.toml_places import toml_tables
 from rigsight.workflow.campaign.where import LISTS, Where
 
 MOST_RECORDS = 1000
 Offsets = Literal["shared", "per_record"]
 """Whether the offset of a sensor is the same in all records."""
+_TWICE = (
+    "every record begins with [[records]], in double brackets; its columns follow it under [records.columns]. Other tables and "
+    "keys may occur only once"
+)
 WHICH_RIG = 'model = "NAME" for a rig that rigsight rigs lists, or file = "my_rig.toml" for one of your own.'
 LARGEST_FILE = 10_000_000
 
@@ -116,20 +120,13 @@ def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
                 f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB, so it is not a campaign.toml."
             )
         text = path.read_text(encoding="utf-8-sig")
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path.name} is not valid TOML: {error}. {_remedy(str(error))}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
-    except InputError:
-        raise
-    except RecursionError:
-        raise InputError(f"{path.name} is nested too deeply for a campaign.toml.") from None
-    except ValueError:
-        # The only valid TOML that fails here is an integer with thousands of digits.
-        raise InputError(f"{path.name} contains an integer with too many digits to be read.") from None
+    data = toml_tables(
+        text, path.name, dict.fromkeys(("Cannot declare", "Cannot overwrite", "Cannot mutate"), _TWICE)
+    )
     where = Where.of_toml(path.name, text, data)
     return checked_file(where, data, CampaignTable), where
 
@@ -238,17 +235,3 @@ def _how_to_write(location: tuple[str | int, ...]) -> str:
         "records": ' Write [[records]] and file = "..." for every record.',
         "file": ' Write file = "name.csv".',
     }.get(str(location[-1]), "")
-
-
-def _remedy(error: str) -> str:
-    """Return a hint for the most frequent TOML errors in campaigns."""
-    if "Cannot declare" in error or "Cannot overwrite" in error or "Cannot mutate" in error:
-        return (
-            "Every record begins with [[records]], in double brackets; its columns follow it under [records.columns]. "
-            "Other tables and keys may occur only once."
-        )
-    if "Unescaped" in error and "\\" in error:
-        return "Write paths with / instead of \\."
-    if "after a statement" in error:
-        return "Numbers have a decimal point, such as 310.0; texts are written in quotes, names of tables in [brackets]."
-    return "Texts are written in quotes, names of tables in [brackets]."

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 from rigsight.errors import InputError, nearest, shown
-from rigsight.records import ColumnMapping, Record
+from rigsight.records import ColumnMapping, ReadingOptions, Record
 from rigsight.records.read_record import TIME, read_stretches
 from rigsight.records.reference import signals_beside
 from rigsight.rigs import Rig
@@ -68,34 +68,42 @@ def read_listed_record(
             file,
             rig.inputs,
             rig.outputs,
-            columns=columns,
-            required_outputs=rig.required_outputs,
-            absent_inputs=rig.absent_inputs,
-            constant_inputs=record.inputs,
-            moving_inputs=rig.moving_inputs,
-            name=record.name,
-            role=record.role,
-            kind=record.kind,
-            amplitude=record.amplitude,
-            hold=record.hold,
-            dt=record.dt,
-            resample=record.resample,
-            start=record.start,
-            end=record.end,
-            separator=record.separator,
-            decimal=record.decimal,
-            header=record.header,
-            comment=record.comment,
-            constants=constants,
-            gain=next(
-                (c.name for c in rig.constants if INPUT_UNIT in c.unit and c.name in {*given, *constants}), ""
+            replace(
+                options_of(rig, other),
+                columns=columns,
+                constants=constants,
+                constant_inputs=record.inputs,
+                gain=next(
+                    (
+                        c.name
+                        for c in rig.constants
+                        if INPUT_UNIT in c.unit and c.name in {*given, *constants}
+                    ),
+                    "",
+                ),
+                **{key: getattr(record, key) for key in _OF_RECORD},
             ),
-            beside=signals_beside(_own(rig)),
-            other_units=() if other is None else (other.signal_units,),
         )
     except InputError as error:
         # The error is in the record's file, which the message already names.
         raise InputError(f"{replace(where, data={}).at(*own)}: {error}") from None
+
+
+def options_of(rig: Rig, other: Rig | None = None) -> ReadingOptions:
+    """Return how records of a rig are read, of which `other` is the same in other units."""
+    return ReadingOptions(
+        required_outputs=rig.required_outputs,
+        absent_inputs=rig.absent_inputs,
+        moving_inputs=rig.moving_inputs,
+        beside=signals_beside(_own(rig)),
+        other_units=() if other is None else (other.signal_units,),
+    )
+
+
+_OF_RECORD = {field.name for field in fields(ReadingOptions)}.intersection(RecordTable.model_fields) - {
+    "columns",
+    "constants",
+}
 
 
 def _own(rig: Rig) -> list[str]:

@@ -1,12 +1,19 @@
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep, log_sweep
-from rigsight.frequency import track_harmonics
 from rigsight.records import Record
+
+from ..frequency.conftest import SecondOrder
+
+sys.path.append(str(Path(__file__).parents[2] / "experiments/distortion"))
+from harmonics import track_harmonics
 
 DT = 5e-3
 T = DT * np.arange(20_000)
@@ -37,8 +44,8 @@ def test_the_frequency_is_that_of_the_sweep_at_that_time() -> None:
     assert np.all(np.diff(track.omega) > 0.0)
 
 
-def test_a_linear_system_has_its_response_and_no_harmonics(second_order) -> None:
-    truth = second_order(D=0.5)
+def test_a_linear_system_has_its_response_and_no_harmonics() -> None:
+    truth = SecondOrder(D=0.5)
     track = track_harmonics(truth.record(noise=1e-3, rng=np.random.default_rng(18)), "u", "psi")
     expected = truth.response(track.omega)
     np.testing.assert_allclose(track.fundamental.values, expected, atol=0.05)

@@ -1,12 +1,20 @@
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rigsight.errors import InputError
 from rigsight.excitation import multisine, multisine_lines
-from rigsight.frequency import fast_best_linear_approximation, robust_best_linear_approximation
 from rigsight.records import Record
+
+sys.path.append(str(Path(__file__).parents[2] / "experiments/distortion"))
+from best_linear_approximation import (
+    fast_best_linear_approximation,
+    robust_best_linear_approximation,
+)
 
 DT, N = 5e-3, 2000
 CUBIC = 0.1
