@@ -35,6 +35,8 @@ NAME = "617"
 
 WATCHED = """
 import os, sys
+
+pytestmark = pytest.mark.slow
 forbidden = {forbidden!r}
 def watch(event, arguments):
     for argument in arguments:
@@ -83,6 +85,7 @@ def shortened(folder: BenchFolder) -> None:
         (place / f"{name}.csv").write_text("\n".join(lines[: n_samples + 1]) + "\n")
 
 
+@pytest.mark.slow
 def test_a_process_that_diagnoses_is_told_nothing_but_the_campaign(bench: BenchFolder) -> None:
     drawn = time.time() - 3600.0
     os.utime(bench.campaign(NAME) / "record_1.csv", (drawn, drawn))

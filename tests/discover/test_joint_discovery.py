@@ -19,6 +19,8 @@ from rigsight.report.discovery import discovery_rows
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
 
+pytestmark = pytest.mark.slow
+
 DT, SECONDS = 5e-3, 4.0
 T = DT * np.arange(round(SECONDS / DT))
 TRAIN = {"J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
@@ -60,6 +62,7 @@ def test_the_law_stands_in_the_equations_at_its_joint(found: Discovery) -> None:
     assert found.held_out_error < 1.1
 
 
+@pytest.mark.slow
 def test_its_numbers_are_as_far_off_as_they_say(found: Discovery) -> None:
     numbers = {**found.rig_parameters, **found.kept[0].coefficients}
     for name, value in {**TRAIN, "c_2": DAMPING}.items():

@@ -154,6 +154,7 @@ def test_points_give_the_same_equation_as_windows_where_noise_is_low(make_data: 
     assert found.kept[0].coefficients["k_3"].value == pytest.approx(values["k_3"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_terms_that_the_records_cannot_tell_apart_are_named(discovered: Discovered) -> None:
     found = discovered("cubic", 2e-5)[2]
     assert any("gravity_pendulum" in warning for warning in found.warnings)

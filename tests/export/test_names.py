@@ -208,6 +208,7 @@ def test_the_python_function_gives_the_outputs_of_the_engine(all_named: Named):
     assert all_named.worst(python_outputs(all_named)) <= 1e-6
 
 
+@pytest.mark.slow
 def test_the_control_system_gives_the_outputs_of_the_engine(all_named: Named):
     space: dict = {}
     exec(str(export_model(all_named.model, "control", source="rig")), space)

@@ -55,6 +55,7 @@ def _overlap(a: Bbox, b: Bbox) -> bool:
     return width > 1.0 and height > 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_every_coordinate_joint_drive_and_sensor_is_named(name: str) -> None:
     rig = rig_of(name)

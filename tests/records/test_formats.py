@@ -191,6 +191,7 @@ def test_odd_names(tmp_path: Path, write: Write) -> None:
     np.testing.assert_array_equal(record["y"], good["y"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("packed", [False, True])
 def test_structs_are_looked_into(tmp_path: Path, packed: bool) -> None:
     from scipy.io import savemat

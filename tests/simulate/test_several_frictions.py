@@ -192,6 +192,7 @@ def cart_mass(q: Floats) -> Floats:
     return np.array([[CART["m_c"] + CART["m_p"], coupling], [coupling, CART["I_p"]]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "levels", [{"track": 1.5}, {"track": 1.5, "tip": 0.5}], ids=["track", "track and tip"]
 )

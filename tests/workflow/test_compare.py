@@ -61,6 +61,7 @@ def linear_model(write_model: Callable[..., Path]) -> Path:
     return write_model(linear)
 
 
+@pytest.mark.slow
 def test_the_command_writes_tables_a_page_and_figures(gear: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     models = ["nominal", "iwan_tables", "mine=identified"]

@@ -30,6 +30,7 @@ CONTRACT_KEYS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_missing_cubic_spring_is_found_and_written_as_the_contract_says(
     axis_campaign: Path, tmp_path: Path
 ) -> None:
@@ -70,6 +71,7 @@ def test_a_given_simulation_that_cannot_be_run_is_told_with_its_records(axis_cam
         run_diagnose(axis_campaign, effects=FEW[:1], n_jobs=1)
 
 
+@pytest.mark.slow
 def test_the_written_model_alone_predicts_what_the_diagnosis_did(axis_campaign: Path, tmp_path: Path) -> None:
     diagnosis = run_diagnose(axis_campaign, tmp_path, effects=FEW[:1], n_jobs=1)
     predicted = run_simulate(tmp_path / "model.json", axis_campaign / "score.csv")
@@ -81,6 +83,7 @@ def test_the_written_model_alone_predicts_what_the_diagnosis_did(axis_campaign: 
     assert left == pytest.approx(gap.after, rel=0.1)
 
 
+@pytest.mark.slow
 def test_without_a_folder_nothing_is_written(
     axis_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -128,6 +128,7 @@ def test_friction_that_ends_a_decay_is_told_from_what_else_slows_it(tmp_path: Pa
     assert "m" not in best
 
 
+@pytest.mark.slow
 def test_ratios_are_identified_and_the_rest_is_said(tmp_path: Path) -> None:
     found = run_identify(campaign(tmp_path / "c"), tmp_path / "out")
     assert found.identifiability is not None
@@ -156,6 +157,7 @@ def test_a_given_mass_sets_the_measure(tmp_path: Path) -> None:
     assert found.values["d"] == pytest.approx(D, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_every_command_takes_a_decay(tmp_path: Path) -> None:
     folder = campaign(tmp_path / "c", 0.5)
     found = run_discover(folder, tmp_path / "discovered")

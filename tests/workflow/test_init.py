@@ -261,6 +261,7 @@ def test_nothing_is_written_where_there_is_nothing(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["broken.mat"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ['qu"ote.csv', "back\\slash.csv", "zeile\nzwei.csv", "ünï # hash.csv"])
 def test_odd_file_and_channel_names_are_written_as_they_are(tmp_path: Path, name: str) -> None:
     good = tmp_path / "good.parquet"

@@ -24,6 +24,7 @@ from rigsight.workflow.export import run_export
 from rigsight.workflow.simulate import run_simulate
 from rigsight.workflow.vary import run_vary
 
+from ..tiers import slow_but
 from .keys_of_campaigns import CHANGES, COMMANDS, TOLD, TRUTH, written
 
 PAGE = (Path(__file__).parents[2] / "docs/keys.md").read_text(encoding="utf-8")
@@ -127,7 +128,7 @@ def differing(one: Campaign, other: Found) -> set[str]:
     return found - {"source"} if "file" not in found else found
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", slow_but("identify", of=COMMANDS))
 @pytest.mark.parametrize("key", CHANGES)
 def test_a_key_of_a_campaign_is_used_or_refused(
     key: str, command: str, outcome: Callable[[str, str, bool], str]

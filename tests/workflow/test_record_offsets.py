@@ -102,6 +102,7 @@ def test_offsets_that_nobody_declared_are_told_before_a_second_effect_is_believe
     assert not any("offset" in name for name in found.model["parameters"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", slow_but(1.0, of=[1.0, 1e4]))
 def test_declared_offsets_leave_the_numbers_right(factor: float) -> None:
     found = diagnosed(campaign("per_record", factor=factor))

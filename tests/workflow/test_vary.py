@@ -193,6 +193,7 @@ def test_a_signal_that_the_rig_has_not_is_told(options: dict[str, str], message:
         run_vary(larger_model(tmp_path, "drive_train", values), ["k_s"], **options)
 
 
+@pytest.mark.slow
 def test_the_command_writes_pictures_and_numbers(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [

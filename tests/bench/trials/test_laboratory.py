@@ -274,6 +274,7 @@ def test_what_drifts_differs_more_from_cold_the_later_it_is_recorded() -> None:
     assert left[-1] > left[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_a_condition_does_what_it_is_called_after_and_nothing_else(condition: subjects.Condition) -> None:
     stand = "arm" if condition == "free_decay" else "stage"

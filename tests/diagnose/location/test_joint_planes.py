@@ -49,6 +49,7 @@ def hidden(train: Any) -> tuple[tuple[StatePart, ...], list[Trace]]:
     return joint_parts(context, reidentified, traces), traces
 
 
+@pytest.mark.slow
 def test_the_joint_of_the_friction_comes_first_and_lacks_it(
     hidden: tuple[tuple[StatePart, ...], list[Trace]],
 ) -> None:

@@ -96,6 +96,7 @@ def test_a_missing_effect_is_what_the_remainder_goes_with(
     assert asked(context, fitted(context, effects, values)).adequate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "values", "what"),
     [

@@ -53,6 +53,7 @@ def fitted(
     return bench.score((effect,), fit)
 
 
+@pytest.mark.slow
 def test_a_fit_that_stopped_elsewhere_is_taken_to_the_lowest_basin(bench: FitContext) -> None:
     stopped = fitted(bench, STRIBECK, {**TRUE, "T_c": 1e-3, "T_s": 5e-3, "w_s": 0.05}, 2)
     assert stopped.error_over_noise > 2.0

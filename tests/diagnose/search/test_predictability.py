@@ -49,6 +49,7 @@ def test_play_lets_a_disturbance_choose_another_motion() -> None:
     assert growth({"backlash": {"g": 5e-3}}) > 3.0
 
 
+@pytest.mark.slow
 def test_each_input_is_disturbed_and_each_sensor_looked_at(two_masses: Rig) -> None:
     """Nothing ties the masses together: only the second motor reaches the play, and only the second sensor shows it."""
     values = {"m": 1.0, "k": 40.0, "c": 0.0, "d": 1.0}

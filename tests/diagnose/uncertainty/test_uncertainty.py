@@ -73,6 +73,7 @@ def test_errors_of_friction_under_a_slow_force_are_wider_and_true() -> None:
     assert np.median(np.array(before) / np.array(after)) > 1.2
 
 
+@pytest.mark.slow
 def test_the_same_seed_draws_the_same() -> None:
     bench, fit = fitted((FRICTION,), {"T_c": 0.1}, 1e-4, 0.01, 10.0, 1)
     one, same, other = (uncertainty_of(bench, fit, np.random.default_rng(seed)) for seed in (5, 5, 6))
@@ -129,6 +130,7 @@ def test_an_observer_has_errors_of_the_size_that_fits_scatter_by(noise: float, f
     assert 0.6 < np.median(errors) / np.sqrt(np.mean(np.square(off))) < 1.7
 
 
+@pytest.mark.slow
 def test_an_observed_record_of_an_analog_input_has_errors_from_the_bootstrap() -> None:
     """Forces change faster than the input, so that they have more pieces in a sample."""
     bench, fit = _followed(AXIS, 1e-3, 0.02, seed=0, hold="band_limited")

@@ -152,6 +152,7 @@ def test_a_hardening_spring_is_seen_in_the_amplitudes(hardening: Identification)
     assert not {"l_0", "c_y"} & set(hardening.changing)
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(
     reason="The noise of a plain ratio holds smooth distortion: its misfit is 2.2 where that of a local response was 4.6."
 )
@@ -173,6 +174,7 @@ def test_no_set_serves_a_hardening_spring_and_its_lateral_part_stays_clean(harde
         assert hardening.model["parameters"][name] == joint.pooled.values[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", slow_but("thesis", of=["local_polynomial", "h1", "thesis"]))
 def test_every_method_comes_near_the_truth(method: str, linear_folder: Path) -> None:
     found = run_identify(linear_folder, method=method)

@@ -37,6 +37,7 @@ def arm() -> Identification:
         return identified(rig, records, {}, ARM, patch)
 
 
+@pytest.mark.slow
 def test_parameters_come_with_what_is_identifiable(arm: Identification) -> None:
     reported = arm.identifiability
     assert reported is not None
@@ -113,6 +114,7 @@ def test_the_terminal_says_it_too(arm: Identification) -> None:
     assert "damping ratio" in text
 
 
+@pytest.mark.slow
 def test_a_gain_and_all_it_scales_are_said_not_to_be_identifiable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,6 +169,7 @@ def test_a_method_for_one_input_is_refused() -> None:
         identify_campaign(campaign, checked_options("h1", None))
 
 
+@pytest.mark.slow
 def test_a_servo_is_identified_without_any_start_values() -> None:
     rng, rig = np.random.default_rng(10), RIGS["servo"]
     records = [

@@ -14,6 +14,7 @@ from rigsight.workflow.identify import run_identify
 from ..virtual_campaign import CONSTANTS, DT, TRUTH, Run, jump, sweep, write_campaign
 
 
+@pytest.mark.slow
 def test_a_record_that_never_drives_the_resonance_gives_its_numbers_by_its_free_motion(
     tmp_path: Path,
 ) -> None:

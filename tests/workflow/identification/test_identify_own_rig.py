@@ -53,6 +53,7 @@ unit = "rad"
 """
 
 
+@pytest.mark.slow
 def test_a_rig_without_inputs_has_poles_and_no_responses(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,6 +107,7 @@ unit = "m"
 """
 
 
+@pytest.mark.slow
 def test_one_mass_with_names_of_its_own_is_identified_from_files(tmp_path: Path) -> None:
     (tmp_path / "stage.toml").write_text(STAGE, "utf-8")
     rig, rng = read_rig_file(tmp_path / "stage.toml"), np.random.default_rng(6)
@@ -141,6 +143,7 @@ def test_an_estimator_for_built_in_rigs_alone_is_refused_with_the_reason() -> No
         identify_campaign(make_campaign(stage, [record]), checked_options("h1", None))
 
 
+@pytest.mark.slow
 def test_the_name_of_a_rig_changes_nothing() -> None:
     """The axis copied into a file of one's own, under a name of one's own, is still the axis."""
     rng, axis = np.random.default_rng(1), RIGS["axis"]
@@ -240,6 +243,7 @@ def test_an_axis_of_known_mass_and_unknown_gain_is_identified() -> None:
         assert found.joint.fit.fit.values[name] == pytest.approx(values[name], rel=0.01), name
 
 
+@pytest.mark.slow
 def test_a_record_may_have_the_word_window_in_its_name() -> None:
     rng, axis = np.random.default_rng(2), RIGS["axis"]
     values = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}

@@ -79,6 +79,7 @@ def test_the_page_shows_the_example_that_is_tested():
     assert shown.group(1) == EXAMPLE.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_the_example_wins_against_its_nearest_relatives(campaign: Path, tmp_path: Path, quintic: Effect):
     rivals = named(["cubic_stiffness", "quintic_stiffness"], [quintic])
     out = tmp_path / "out"

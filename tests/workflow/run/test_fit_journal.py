@@ -78,6 +78,7 @@ def test_it_is_said_once_that_a_diagnosis_goes_on(axis_campaign: Path, journals:
     assert not [step for step in fresh if step.stage.startswith("Continuing")]
 
 
+@pytest.mark.slow
 def test_fits_of_a_campaign_that_was_changed_since_are_not_told_of(
     axis_campaign: Path, journals: Path
 ) -> None:
@@ -91,6 +92,7 @@ def test_fits_of_a_campaign_that_was_changed_since_are_not_told_of(
     assert not [step for step in said if step.stage.startswith("Continuing")]
 
 
+@pytest.mark.slow
 def test_a_torn_or_foreign_line_is_not_read(axis_campaign: Path, journals: Path, counted: list[int]) -> None:
     with pytest.raises(KeyboardInterrupt):
         diagnosed(axis_campaign, stop_at="cubic_stiffness")
@@ -101,6 +103,7 @@ def test_a_torn_or_foreign_line_is_not_read(axis_campaign: Path, journals: Path,
     assert counted[-1] == 1
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written_stops_nothing(
     axis_campaign: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -27,6 +27,8 @@ from rigsight_bench.trials.handwritten.plants import (
 from rigsight_bench.trials.handwritten.shapes import Shape, Sizes, draw_shape
 from rigsight_bench.trials.waveforms import Multisine, Sweep, Waveform, samples
 
+pytestmark = pytest.mark.slow
+
 NUMBERS: dict[str, dict[str, float]] = {
     "axis": {"gain": 8.0, "m": 2.0, "d": 3.0, "k": 250.0, "x_off": 0.02, "force_off": 0.0},
     "drive_train": {

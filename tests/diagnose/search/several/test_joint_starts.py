@@ -60,6 +60,7 @@ def test_a_relative_gives_way_to_the_right_effect(context: FitContext, grown) ->
     assert best.fit.values["u_max"] == pytest.approx(HIDDEN["input_saturation"]["u_max"], rel=1e-2)
 
 
+@pytest.mark.slow
 def test_nothing_else_is_looked_for_where_noise_is_all_that_is_left(context: FitContext, grown) -> None:
     reidentified, singles, pair = grown
     assert with_joint_starts(context, reidentified, [pair], singles, [], lambda _: True) == [pair]

@@ -70,6 +70,7 @@ def test_an_effect_that_no_push_represents_is_tried_where_the_pushes_explain_too
     assert found.error_over_noise < VERDICT.at_floor
 
 
+@pytest.mark.slow
 def test_beside_a_model_near_the_floor_an_effect_is_tried_that_explains_all_but_noise() -> None:
     _, damped = beside_a_damping("torque_ripple")
     ripple = NOISE * np.sqrt(damped.error_over_noise**2 - 1.0)

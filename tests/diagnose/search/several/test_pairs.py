@@ -98,6 +98,7 @@ def test_a_more_general_law_that_led_alone_gives_way_to_its_special_case_in_a_pa
     assert set(found.effects) == {"coulomb_friction", "quadratic_damping"}
 
 
+@pytest.mark.slow
 def test_one_effect_stays_one():
     campaign = measured({"coulomb_friction": {"T_c": 0.1}}, seed=1)
     found = diagnose(campaign, [effect_named(name) for name in TRIED])
