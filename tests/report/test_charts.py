@@ -1,11 +1,12 @@
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,52 +16,46 @@ from rigsight.report.drawing.charts import (
     Curve,
     chart_data,
     curve_names,
-    packed,
     points_per_curve,
 )
 from rigsight.report.record_views import record_views
 
 
-def unpacked(content: dict[str, object]) -> np.ndarray:
-    whole = np.frombuffer(base64.b64decode(str(content["data"])), dtype="<i2").astype(float)
-    values = float(content["middle"]) + float(content["step"]) * whole
-    return np.where(whole == -32768, np.nan, values)
+def drawn(x: np.ndarray, y: np.ndarray, name: str = "m", title: str = "x") -> dict[str, Any]:
+    curve = Curve("measured", name, y)
+    data = chart_data(title, "time [s]", x, [ChartPanel("x", 1, [curve], (-1.0, 1.0))])
+    assert "<" not in data
+    return json.loads(data)
 
 
-@given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=50))
-def test_packed_numbers_come_back_to_a_65000th_of_their_range(numbers: list[float]) -> None:
-    values = np.array(numbers)
-    reach = float(np.ptp(values))
-    # Half a step, and the seven digits of middle and step.
-    assert np.max(np.abs(unpacked(packed(values)) - values)) <= reach / 131_000 + 1e-6 * np.max(
-        np.abs(values)
-    )
+@given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=50), st.floats(-1e6, 1e6))
+def test_numbers_keep_what_a_screen_shows_of_their_range(numbers: list[float], offset: float) -> None:
+    values = np.array(numbers) + offset
+    found = drawn(np.arange(values.size, dtype=float), values)["panels"][0]["curves"][0]["y"]
+    reach = np.ptp(values) or abs(values[0])
+    assert np.max(np.abs(found - values)) <= 1e-4 * reach
 
 
-def test_what_is_not_finite_comes_back_as_a_gap() -> None:
-    values = np.array([1.0, np.nan, 3.0, np.inf, -np.inf])
-    assert np.isnan(unpacked(packed(values))).tolist() == [False, True, False, True, True]
-    assert np.isnan(unpacked(packed(np.full(3, np.nan)))).all()
+def test_what_is_not_finite_is_a_gap() -> None:
+    x = np.arange(5.0)
+    for values, expected in (
+        (np.array([1.0, np.nan, 3.0, np.inf, -np.inf]), [1.0, None, 3.0, None, None]),
+        (np.full(5, np.nan), [None] * 5),
+        (np.zeros(5), [0.0] * 5),
+    ):
+        assert drawn(x, values)["panels"][0]["curves"][0]["y"] == expected
 
 
-def test_places_that_are_not_equally_spaced_come_back_finer_than_their_distance() -> None:
-    x = np.sort(np.random.default_rng(3).uniform(0.0, 100.0, 3000))
-    data = chart_data("x", ("t", "s"), [ChartPanel("x", 1, [Curve("measured", x, x)])], {"measured": "m"})
-    (curve,) = json.loads(data)["panels"][0]["curves"]
-    assert np.max(np.abs(unpacked(curve["x"]) - x)) < 0.1 * 100.0 / 3000
-    even = 2.5 + 0.005 * np.arange(10_000)
-    data = chart_data(
-        "x", ("t", "s"), [ChartPanel("x", 1, [Curve("measured", even, even)])], {"measured": "m"}
-    )
-    assert json.loads(data)["panels"][0]["curves"][0]["x"] == [2.5, 0.005]
+def test_neighbors_on_the_axis_stay_apart() -> None:
+    x = 1e3 + 1e-5 * np.arange(1000)
+    np.testing.assert_allclose(np.diff(drawn(x, x)["x"]), 1e-5, rtol=0.2)
 
 
 def test_no_text_can_end_the_script_that_holds_it() -> None:
-    x = np.arange(3.0)
     title = '</script><script>alert(1)</script> & "quoted"'
-    data = chart_data(title, ("t", "s"), [ChartPanel("x", 1, [Curve("measured", x, x)])], {"measured": "<b>"})
-    assert "<" not in data
-    assert json.loads(data)["title"] == title
+    content = drawn(np.arange(3.0), np.arange(3.0), "<b>", title)
+    assert content["title"] == title
+    assert content["panels"][0]["curves"][0]["name"] == "<b>"
 
 
 def test_curves_get_fewer_points_where_there_are_more_of_them() -> None:
@@ -87,10 +82,31 @@ def test_records_over_unix_time_are_drawn_from_their_first_stamp(diagnosis: Diag
     plain, late = (
         next(iter(record_views(replace(diagnosis, traces=(one,)), {}))).charts[0] for one in (trace, later)
     )
-    drawn, moved = (json.loads(chart.data) for chart in (plain, late))
+    at_zero, moved = (json.loads(chart.data) for chart in (plain, late))
     assert moved["label"].startswith("time [s] since 17000000")
-    assert drawn["label"] == "time [s]"
-    np.testing.assert_allclose(np.diff(moved["range"]), np.diff(drawn["range"]), rtol=1e-3)
-    for figure in late.drawings:
-        assert "time [s] since 17000000" in figure.image
-        assert "1.7e+09" not in figure.image
+    assert at_zero["label"] == "time [s]"
+    np.testing.assert_allclose(np.ptp(moved["x"]), np.ptp(at_zero["x"]), rtol=1e-3)
+    assert late.still is not None
+    assert "time [s] since 17000000" in late.still.image
+    assert "1.7e+09" not in late.still.image
+
+
+def test_a_long_record_is_drawn_with_its_peaks(diagnosis: Diagnosis) -> None:
+    (trace, *_) = diagnosis.traces
+    n = 50_000
+    t = 0.001 * np.arange(n)
+    psi = 0.05 * np.sin(t)
+    psi[31_234] = 0.15
+    off = 0.9 * psi
+    off[7_777] = -0.12
+    signals = {"measured": psi, "before": off, "reidentified": off, "after": psi}
+    made = replace(trace, t=t, inputs={"u": t}, **{name: {"psi": own} for name, own in signals.items()})
+    (view,) = record_views(replace(diagnosis, traces=(made,)), {})
+    content = json.loads(view.charts[0].data)
+    assert 2_000 < len(content["x"]) <= 6_000
+    above, below = (panel["curves"] for panel in content["panels"])
+    assert max(above[0]["y"]) == pytest.approx(150.0)
+    assert min(above[1]["y"]) == pytest.approx(-120.0)
+    assert above[0]["y"][content["x"].index(31.234)] == pytest.approx(150.0)
+    assert below[0]["name"] == "twice the noise floor"
+    assert f"Of {n} samples {len(content['x'])} are drawn" in view.charts[0].caption

@@ -28,6 +28,7 @@ from rigsight.plot.drawing import (
     shown_in,
     text_width,
 )
+from rigsight.records.stamps import time_label, time_origin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -268,7 +269,7 @@ def comparison(
     from matplotlib.ticker import MaxNLocator
 
     shown = window or slice(None)
-    t = trace.t[shown]
+    t = (trace.t - time_origin(trace.t))[shown]
     names = stages or {"before": "given simulation", "after": after_label}
     measured = np.asarray(trace.measured[output][shown], dtype=np.float64)
     errors: dict[Stage, NDArray[np.float64]] = {
@@ -293,7 +294,7 @@ def comparison(
         )
     top.set_ylabel(f"{output} [{unit}]")
     bottom.set_ylabel(f"error [{error_unit}]")
-    bottom.set_xlabel("time [s]")
+    bottom.set_xlabel(time_label(trace.t))
     for ax in (top, bottom):
         ax.grid()
         ax.margins(x=0.0)

@@ -153,26 +153,19 @@ def envelope(
     return t[keep], values[keep]
 
 
-def log_ticks(left: float, right: float) -> tuple[list[float], list[str]]:
-    """Return decades and, where they are few, numbers between, as people write them; scientific notation beyond 10^5."""
+def plain_log_ticks(ax: Axes, left: float, right: float) -> None:
+    """Label decades and, where they are few, numbers between, as people write them; scientific notation beyond 10^5."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
     decades = range(int(np.floor(np.log10(left))), int(np.ceil(np.log10(right))) + 1)
     span = np.log10(right / left)
     multiples = (1, 1.1, 1.2, 1.5, 2, 3, 5) if span < 0.7 else ((1, 2, 5) if span < 2.5 else (1,))
     ticks = [m * 10.0**d for d in decades for m in multiples]
     ticks = [tick for tick in ticks if left <= tick <= 1.15 * right]
-    step = max(1, len(ticks) // 8)
-    ticks = ticks[::step]
-    return ticks, [f"{tick:g}" if tick < 1e5 else f"1e{int(np.log10(tick))}" for tick in ticks]
-
-
-def plain_log_ticks(ax: Axes, left: float, right: float) -> None:
-    """Label a logarithmic axis by `log_ticks`."""
-    from matplotlib.ticker import FixedLocator, NullLocator
-
-    ticks, labels = log_ticks(left, right)
+    ticks = ticks[:: max(1, len(ticks) // 8)]
     ax.xaxis.set_major_locator(FixedLocator(ticks))
     ax.xaxis.set_minor_locator(NullLocator())
-    ax.set_xticks(ticks, labels)
+    ax.set_xticks(ticks, [f"{tick:g}" if tick < 1e5 else f"1e{int(np.log10(tick))}" for tick in ticks])
 
 
 def line(

@@ -138,9 +138,10 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "
             )
             values.append(panel.measured.magnitude_db)
             if panel.fitted is not None:
+                values.append(decibel(np.abs(panel.fitted.values)))
                 ax.plot(
                     panel.fitted.omega,
-                    decibel(np.abs(panel.fitted.values)),
+                    values[-1],
                     color=color,
                     linewidth=1.4,
                     linestyle=(0, (4, 2)),
@@ -236,15 +237,10 @@ def draw_phase(ax: Axes, panel: Panel) -> None:
 
 
 def limit(ax: Axes, values: NDArray[np.float64]) -> None:
-    """Give an axis the limits of `seen`."""
-    ax.set_ylim(*seen(values))
-
-
-def seen(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Return axis limits that are not determined by a few outliers or by a band that reaches zero."""
+    """Give an axis limits that are not determined by a few outliers or by a band that reaches zero."""
     low, high = np.percentile(values[np.isfinite(values)], [0.5, 100.0])
     margin = 0.08 * max(high - low, 3.0)
-    return float(low - margin), float(high + margin)
+    ax.set_ylim(float(low - margin), float(high + margin))
 
 
 def log_axis(ax: Axes, responses: Sequence[FrequencyResponse]) -> None:

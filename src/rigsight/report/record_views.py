@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from rigsight import plot
 from rigsight.diagnose.location.trace import STAGES, Stage, Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.metrics import nrmse
-from rigsight.records.stamps import time_label, time_origin, written_span
+from rigsight.records.stamps import time_label, time_origin
 from rigsight.report.drawing.charts import (
     Chart,
     ChartPanel,
@@ -24,8 +24,7 @@ from rigsight.report.drawing.charts import (
     curve_names,
     points_per_curve,
 )
-from rigsight.report.drawing.figures import PageFigure
-from rigsight.report.drawing.record_drawings import time_drawing, with_unit
+from rigsight.report.drawing.figures import page_figure
 from rigsight.report.drawing.response_charts import response_chart
 from rigsight.report.quantities import gap_percent
 from rigsight.report.responses import PathResponse
@@ -57,7 +56,7 @@ def record_views(
     names = curve_names(diagnosis)
     stages = stage_names(diagnosis)
     n_pictures = sum(len(trace.measured) for trace in diagnosis.traces)
-    most_points = points_per_curve((2 * len(names) - 1) * n_pictures)
+    most_points = points_per_curve(2 * len(names) * n_pictures)
     ordered = sorted(diagnosis.traces, key=lambda trace: trace.role != diagnosis.scored_on)
     for index, trace in enumerate(ordered, start=1):
         key = f"record-{index}"
@@ -105,110 +104,83 @@ def _time_chart(
     # A simulation that left the record by more than this is off the picture.
     worst = max((_largest(error, 2.0 * span) for error in errors.values()), default=0.0)
     error_scale = plot.display_scale(unit, worst)
-    floor = next((f.std for f in diagnosis.noise_floors if f.output == output), math.nan)
+    floor = 2.0 * next((f.std for f in diagnosis.noise_floors if f.output == output), math.nan)
+    kept = _kept([measured, errors[stages[0]], errors[stages[-1]]], most_points)
+    far = error_scale.factor * 2.0 * span
+    above = [Curve("measured", names["measured"], scale.factor * measured[kept])]
+    below = []
+    if math.isfinite(floor):
+        reach = error_scale.factor * floor
+        below.append(Curve("floor", "twice the noise floor", low=-reach, high=reach))
+    for stage, error in errors.items():
+        above.append(Curve(stage, names[stage], scale.factor * (measured + error)[kept]))
+        below.append(Curve(stage, names[stage], error_scale.factor * error[kept]))
     panels = [
         ChartPanel(
-            with_unit(output, scale.unit),
+            _with_unit(output, scale.unit),
             3,
-            [
-                _curve("measured", trace, measured * scale.factor, most_points),
-                *(_curve(s, trace, (measured + errors[s]) * scale.factor, most_points) for s in stages),
-            ],
-            cap=(scale.factor * (low - span), scale.factor * (high + span)),
+            above,
+            (scale.factor * (low - span), scale.factor * (high + span)),
         ),
-        ChartPanel(
-            with_unit("error", error_scale.unit),
-            2,
-            [_curve(s, trace, errors[s] * error_scale.factor, most_points) for s in stages],
-            cap=(-2.0 * span * error_scale.factor, 2.0 * span * error_scale.factor),
-            band=2.0 * floor * error_scale.factor if math.isfinite(floor) else None,
-        ),
+        ChartPanel(_with_unit("error", error_scale.unit), 2, below, (-far, far)),
     ]
-    window = plot.detail_window(trace, output)
-    is_step = plot.step_window(trace, output) is not None
-    origin = time_origin(trace.t)
-    begin, end = float(trace.t[window.start]) - origin, float(trace.t[window.stop - 1]) - origin
-    first = names[stages[0]]
-    detail = (
-        Detail(begin, end, "Step", "Show the step")
-        if is_step
-        else Detail(begin, end, "Largest error", f"Show where the error is largest, {first}")
-    )
-    title = f"Measured and simulated {output_label(diagnosis, output)}, record {trace.record}"
-    data = chart_data(
-        title,
-        ("t", "s"),
-        panels,
-        names,
-        detail=detail,
-        label=time_label(trace.t),
-    )
-    thinned = ""
-    if measured.size > most_points:
-        thinned = (
-            f" Shown are the minimum and maximum of every {-(-measured.size // (most_points // 2))} samples."
-        )
-    caption = (
-        f"{output_label(diagnosis, output)} over time; below, simulated minus measured, with a band of twice the noise "
-        "floor."
+    label = output_label(diagnosis, output)
+    thinned = (
+        f" Of {measured.size} samples {kept.size} are drawn, peaks among them."
+        if kept.size < measured.size
+        else ""
     )
     return Chart(
         key,
-        _drawings(diagnosis, trace, output, window, detail, key),
-        data,
-        f"{sentence_case(caption)}{thinned}",
+        chart_data(
+            f"Measured and simulated {label}, record {trace.record}",
+            time_label(trace.t),
+            (trace.t - time_origin(trace.t))[kept],
+            panels,
+            detail=_detail(trace, output, names[stages[0]]),
+        ),
+        sentence_case(f"{label} over time; below, simulated minus measured.{thinned}"),
+        page_figure(
+            record_drawing(diagnosis, trace, output), f"{key}-still", f"Measured and simulated {label}.", ""
+        )
+        if trace.role == diagnosis.scored_on
+        else None,
     )
 
 
-def _curve(of: str, trace: Trace, values: NDArray[np.float64], most_points: int) -> Curve:
-    x, y = plot.envelope(
-        trace.t - time_origin(trace.t), np.where(np.isfinite(values), values, np.nan), most_points // 2
+def _detail(trace: Trace, output: str, first: str) -> Detail:
+    window = plot.detail_window(trace, output)
+    begin, end = (float(trace.t[i]) - time_origin(trace.t) for i in (window.start, window.stop - 1))
+    if plot.step_window(trace, output) is not None:
+        return Detail(begin, end, "Step", "Show the step")
+    return Detail(begin, end, "Largest error", f"Show where the error is largest, {first}")
+
+
+def _kept(series: Sequence[NDArray[np.float64]], most_points: int) -> NDArray[np.int64]:
+    """Return the samples of a shorter line that keeps the peaks of these."""
+    places = np.arange(series[0].size, dtype=np.float64)
+    if places.size <= most_points:
+        return places.astype(np.int64)
+    n_bins = max(1, most_points // (2 * len(series)))
+    return np.unique(np.concatenate([plot.envelope(places, one, n_bins)[0] for one in series])).astype(
+        np.int64
     )
-    return Curve(of, x, y)
 
 
 def _largest(values: NDArray[np.float64], limit: float) -> float:
     return min(limit, float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)))
 
 
-def _drawings(
-    diagnosis: Diagnosis, trace: Trace, output: str, window: slice, detail: Detail, key: str
-) -> tuple[PageFigure, ...]:
-    """Return the static drawings: the whole record and, of steps and of records that were scored, a detail."""
-    drawn = _stages_drawn(diagnosis)
-    has_detail = trace.role == diagnosis.scored_on or plot.step_window(trace, output) is not None
-    what = f"{output_label(diagnosis, output)}, record {trace.record}"
-    whole = PageFigure(
-        f"{key}-whole",
-        time_drawing(
-            diagnosis, trace, output, drawn, f"{key}-whole",
-            f"Measured and simulated {what}, {' and '.join(drawn.values())}, with the errors below.",
-            marked=window if has_detail else None,
-        ),
-        "The black bar marks the detail." if has_detail else "",
-    )  # fmt: skip
-    if not has_detail:
-        return (whole,)
-    span = written_span(float(trace.t[window.start]), float(trace.t[window.stop - 1]))
-    near = PageFigure(
-        f"{key}-detail",
-        time_drawing(
-            diagnosis, trace, output, drawn, f"{key}-detail", f"Detail of {what} from {span}.", window=window
-        ),
-        sentence_case(f"{detail.title.removeprefix('Show ')}: {span}."),
-    )
-    return whole, near
+def _with_unit(name: str, unit: str) -> str:
+    return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
 def record_drawing(diagnosis: Diagnosis, trace: Trace, output: str) -> Figure:
     """Return measured and simulated output of a whole record, the first and the last simulation, with the errors below."""
-    return plot.comparison(diagnosis, trace, output, stages=_stages_drawn(diagnosis))
-
-
-def _stages_drawn(diagnosis: Diagnosis) -> dict[Stage, str]:
     names = stage_names(diagnosis)
     # First and last alone: on paper nothing can be taken away.
-    return {stage: names[stage] for stage in (next(iter(names)), list(names)[-1])}
+    drawn = {stage: names[stage] for stage in (next(iter(names)), list(names)[-1])}
+    return plot.comparison(diagnosis, trace, output, stages=drawn)
 
 
 def _facts(diagnosis: Diagnosis, trace: Trace) -> str:

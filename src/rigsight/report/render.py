@@ -46,7 +46,7 @@ from rigsight.simulate import compose
 from rigsight.simulate.printing.mathml import mathml_equation
 from rigsight.simulate.printing.shown import shown_equations
 
-_SCRIPT = files("rigsight.report") / "templates" / "chart.js"
+_TEMPLATES = files("rigsight.report") / "templates"
 
 
 def render_report(
@@ -73,7 +73,7 @@ def render_report(
     """
     known = known_effects(own_effects)
     responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
-    script = _SCRIPT.read_text(encoding="utf-8")
+    script = _script()
     return (
         environment()
         .get_template("report.html.jinja")
@@ -115,8 +115,8 @@ def render_report(
             advice=advice_sentences(diagnosis),
             findings=sections.finding_rows(diagnosis),
             notes=sections.other_notes(diagnosis),
-            script=Markup(f"\n{script}"),
-            script_hash=_content_hash(f"\n{script}"),
+            script=Markup(script),
+            script_hash=_content_hash(script),
             floors=sections.floor_rows(diagnosis),
             command=command,
             versions=versions,
@@ -124,6 +124,15 @@ def render_report(
             made=datetime.now(UTC),
         )
     )
+
+
+def _script() -> str:
+    """Return what the page runs: uPlot, below the license that must go with it, and what sets up its charts."""
+    terms, library, charts = (
+        (_TEMPLATES / name).read_text(encoding="utf-8")
+        for name in ("uplot/LICENSE", "uplot/uPlot.iife.min.js", "charts.js")
+    )
+    return f"\n/* {terms}*/\n{library}{charts}"
 
 
 def _content_hash(script: str) -> str:

@@ -1,4 +1,4 @@
-"""Drawings of the frequency responses of the records: each alone, and all amplitudes together."""
+"""Frequency responses of the records: each alone, and all amplitudes together."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight import plot
 from rigsight.diagnose.location.trace import STAGES, Stage
 from rigsight.diagnose.result import Diagnosis
 from rigsight.frequency import FrequencyResponse
 from rigsight.plot.frequency_responses import TWO_SIDED, decibel, thinned
 from rigsight.report.drawing.charts import Chart, ChartPanel, Curve, chart_data, curve_names
-from rigsight.report.drawing.figures import PageFigure
-from rigsight.report.drawing.record_drawings import overlaid_drawing, response_drawing
+from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.responses import PathResponse
 from rigsight.report.wording import sentence_case, unit_text
 
+_INTERVAL = "95 % interval"
+_DRAWN_LINES = 200
+"""Lines of a response in a drawing that does not zoom."""
 _BELOW = 3.0
 """Decibel below the lowest measured line that are still shown, and above the highest."""
 
@@ -26,46 +29,29 @@ def response_chart(record: str, response: PathResponse, names: Mapping[str, str]
     path = response.path.replace("->", "\u2192")
     stages = [stage for stage in STAGES if stage in names and stage in response.simulated]
     errors = [f"{names[stage]} {response.decibel[stage]:.2g} dB" for stage in stages]
-    said = f"RMS distance of the magnitudes from the measured ones: {', '.join(errors)}." if errors else ""
+    said = f" RMS distance of the magnitudes from the measured ones: {', '.join(errors)}." if errors else ""
     measured = thinned(response.measured)
     phase = np.degrees(np.unwrap(np.angle(measured.values)))
+    magnitudes = [Curve("measured", names["measured"], measured.magnitude_db)]
+    phases = [Curve("measured", names["measured"], phase)]
+    for stage in stages:
+        own = response.simulated[stage]
+        magnitudes.append(Curve(stage, names[stage], _at(measured, own, own.magnitude_db)))
+        turned = np.degrees(own.phase_next_to(measured.omega, measured.phase))
+        phases.append(Curve(stage, names[stage], _at(measured, own, turned)))
+    in_magnitude, in_phase = _bands(measured, phase)
+    reach = (float(phase.min()) - 90.0, float(phase.max()) + 90.0)
     panels = [
         ChartPanel(
-            f"magnitude [dB, {measured.unit}]",
-            3,
-            [
-                *_band(measured, measured.magnitude_db, degrees=False),
-                Curve("measured", measured.omega, measured.magnitude_db),
-                *(
-                    Curve(stage, curve.omega, curve.magnitude_db)
-                    for stage in stages
-                    for curve in (thinned(response.simulated[stage]),)
-                ),
-            ],
-            cap=_cap(measured.magnitude_db),
+            f"magnitude [dB, {measured.unit}]", 3, [*in_magnitude, *magnitudes], _cap(measured.magnitude_db)
         ),
-        ChartPanel(
-            "phase [deg]",
-            2,
-            [
-                *_band(measured, phase, degrees=True),
-                Curve("measured", measured.omega, phase),
-                *(_phase(stage, response.simulated[stage], measured) for stage in stages),
-            ],
-            cap=(float(phase.min()) - 90.0, float(phase.max()) + 90.0),
-            degrees=True,
-        ),
+        ChartPanel("phase [deg]", 2, [*in_phase, *phases], reach, degrees=True),
     ]
     title = f"Frequency response {path} on record {record}, measured and simulated"
-    drawing = response_drawing(
-        path, response, {stage: names[stage] for stage in stages}, f"{key}-drawing", f"{title}. {said}"
-    )
     return Chart(
         key,
-        (PageFigure(f"{key}-drawing", drawing, f"{title}."),),
-        chart_data(title, ("\u03c9", "rad/s"), panels, names, log=True),
-        f"Frequency response {path}, measured and simulated by the same estimator; the band is the 95 % interval of the "
-        f"measured one. {said}",
+        chart_data(title, "angular frequency [rad/s]", measured.omega, panels, log=True),
+        f"Frequency response {path}, measured and simulated by the same estimator.{said}",
     )
 
 
@@ -93,10 +79,17 @@ def _overlaid(
     labeled: list[tuple[str, PathResponse]], stage: Stage, name: str, arrow: str, key: str
 ) -> PageFigure:
     reported = ", ".join(f"{response.decibel[stage]:.2g} dB at {label}" for label, response in labeled)
-    alt = f"Magnitude of {arrow} at each amplitude, measured against {name}. RMS distance: {reported}."
-    return PageFigure(
+    panels = []
+    for label, response in labeled:
+        simulated = thinned(response.simulated[stage], _DRAWN_LINES)
+        fitted = plot.FittedCurve(simulated.omega, simulated.values, np.zeros(simulated.omega.size), "")
+        panels.append(
+            plot.Panel(sentence_case(name), thinned(response.measured, _DRAWN_LINES), fitted, label)
+        )
+    return page_figure(
+        plot.overlaid_responses([panels], "simulated"),
         key,
-        overlaid_drawing(sentence_case(name), labeled, stage, key, alt),
+        f"Magnitude of {arrow} at each amplitude, measured against {name}. RMS distance: {reported}.",
         f"Measured (solid) against {name} (dashed). RMS distance: {reported}.",
     )
 
@@ -121,26 +114,33 @@ def _by_amplitude(
     return found
 
 
-def _band(measured: FrequencyResponse, middle: NDArray[np.float64], *, degrees: bool) -> list[Curve]:
+def _at(
+    measured: FrequencyResponse, simulated: FrequencyResponse, values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return values at the lines of a measured response; a simulated one may lack some of them."""
+    found = np.full(measured.omega.size, np.nan)
+    kept = np.isin(simulated.omega, measured.omega)
+    found[np.searchsorted(measured.omega, simulated.omega[kept])] = values[kept]
+    return found
+
+
+def _bands(measured: FrequencyResponse, phase: NDArray[np.float64]) -> tuple[list[Curve], list[Curve]]:
+    """Return the 95 % intervals of magnitude and phase."""
     if measured.variance is None:
-        return []
+        return [], []
     # Half of the variance of a complex value lies along it, half across.
     reach = TWO_SIDED * np.sqrt(0.5 * measured.variance)
     size = measured.magnitude
-    if degrees:
-        turn = np.degrees(np.minimum(reach / size, np.pi))
-        return [Curve("measured", measured.omega, low=middle - turn, high=middle + turn)]
+    turn = np.degrees(np.minimum(reach / size, np.pi))
     # The lower limit of a line that drowns is zero, which no axis in decibels holds.
-    low = np.maximum(decibel(size - reach), middle - 40.0)
-    return [Curve("measured", measured.omega, low=low, high=decibel(size + reach))]
+    low = np.maximum(decibel(size - reach), measured.magnitude_db - 40.0)
+    return (
+        [Curve("measured", _INTERVAL, low=low, high=decibel(size + reach))],
+        [Curve("measured", _INTERVAL, low=phase - turn, high=phase + turn)],
+    )
 
 
 def _cap(values: NDArray[np.float64]) -> tuple[float, float]:
     low, high = np.percentile(values, [0.5, 100.0])
     reach = _BELOW + 0.5 * (high - low)
     return float(low - reach), float(high + reach)
-
-
-def _phase(stage: Stage, simulated: FrequencyResponse, measured: FrequencyResponse) -> Curve:
-    curve = thinned(simulated)
-    return Curve(stage, curve.omega, np.degrees(curve.phase_next_to(measured.omega, measured.phase)))
