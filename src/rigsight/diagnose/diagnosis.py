@@ -35,8 +35,9 @@ from rigsight.diagnose.result import (
 from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.uncertainty.bootstrap import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
+from rigsight.diagnose.verdict.families import families_at_places, shares_of_gap
 from rigsight.diagnose.verdict.main_cause import force_of_one_motion, forces_at_joints, traced_to
-from rigsight.diagnose.verdict.ranking import Grounds
+from rigsight.diagnose.verdict.ranking import Grounds, noise_vector
 from rigsight.diagnose.verdict.remainder import remainder_of
 from rigsight.diagnose.verdict.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
@@ -168,6 +169,20 @@ def _assembled(
     candidates = tuple(
         sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.error_over_noise))
     )
+    families = families_at_places(
+        rig,
+        reidentified,
+        judgement.model,
+        [
+            (model, probability, grounds.share)
+            for model, probability, grounds in zip(ranking.order, probabilities, ranking.grounds, strict=True)
+        ],
+        probability_not_tried(candidates),
+        noise_vector(
+            [signal.name for signal in rig.outputs], {name: floor.std for name, floor in noise.items()}
+        ),
+        rng.spawn(1)[0],
+    )
     chosen = judgement.model.effects if is_effect else ()
     likely = _likely(candidates, calibration.least_probability)
     rivals = _not_distinguished(candidates, likely, judgement.model.names) if is_effect else []
@@ -212,6 +227,10 @@ def _assembled(
         places=found.places,
         adequate=None if found.adequacy is None else found.adequacy.adequate,
         remainder=remainder,
+        families=families,
+        shares=None
+        if found.adequacy is None
+        else shares_of_gap(families, reidentified, judgement.model, found.adequacy.adequate),
         localization=localize(context, traces, scored_on, before, reidentified, after, rng, floors),
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}

@@ -16,6 +16,7 @@ from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.search.places import SuspectedPlace
 from rigsight.diagnose.trust.result import Trust
+from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
 from rigsight.diagnose.verdict.judgement import Verdict
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import Remainder
@@ -24,7 +25,7 @@ from rigsight.effects import kind_of
 
 StdMethod = Literal["bootstrap", "formula"]
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -166,6 +167,10 @@ class Diagnosis:
         Whether the residual of the diagnosed simulation is noise and disturbance; None where that could not be tested.
     remainder
         Its error above them; None as above.
+    families
+        The causes as families at places with their shares of the gap, the largest first, and probable rivals.
+    shares
+        How the squared gap of the re-identified equations divides into families, remainder and noise; None as above.
     likely
         The causes that the records do not exclude.
     error_of_choice
@@ -202,6 +207,8 @@ class Diagnosis:
     joint_forces: tuple[JointForce, ...] = ()
     adequate: bool | None = None
     remainder: Remainder | None = None
+    families: tuple[FamilyAtPlace, ...] = ()
+    shares: Shares | None = None
     likely: LikelyCauses = field(default_factory=LikelyCauses)
     error_of_choice: float | None = None
     trust: Trust | None = None
@@ -209,9 +216,15 @@ class Diagnosis:
 
     @property
     def probability(self) -> float:
-        """Probability of what the verdict states: the named effects, no missing effect, or for ``unknown`` a cause not tried."""
+        """Probability of what the verdict states: the families, no missing effect, or for ``unknown`` none of the families.
+
+        Which form of a family it is has a probability of its own, see `families`.
+        """
+        named = [own.probability for own in self.families if own.share > 0.0]
         if self.verdict == "unknown":
-            return probability_not_tried(self.candidates)
+            return max(0.0, 1.0 - max((own.probability for own in self.families), default=0.0))
+        if self.verdict == "effect" and named:
+            return min(named)
         return next((c.probability for c in self.candidates if c.effects == self.effects), 0.0)
 
     def to_json(self) -> dict[str, Any]:
@@ -224,6 +237,8 @@ class Diagnosis:
             "probability": _number(self.probability),
             "effects": list(map(kind_of, self.effects)),
             "where": list(self.where),
+            "families": [family.to_json() for family in self.families],
+            "shares": None if self.shares is None else asdict(self.shares),
             "adequate": self.adequate,
             "remainder": None if self.remainder is None else self.remainder.to_json(),
             "trust": None if self.trust is None else self.trust.to_json(),

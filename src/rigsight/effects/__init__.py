@@ -4,6 +4,7 @@ from rigsight.effects.catalogue import CATALOGUE as CATALOGUE
 from rigsight.effects.catalogue import effect_named as effect_named
 from rigsight.effects.effect import Effect as Effect
 from rigsight.effects.effect import Energy as Energy
+from rigsight.effects.effect import Family as Family
 from rigsight.effects.effect import GainTrend as GainTrend
 from rigsight.effects.effect import Place as Place
 from rigsight.effects.effect import Signature as Signature

@@ -15,7 +15,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
 from rigsight.effects.symbols import u
 from rigsight.parameters import Parameter
 
@@ -24,6 +24,7 @@ T_a, u_a = sp.symbols("T_a u_a", real=True)
 ACTUATOR_LAG = Effect(
     name="actuator_lag",
     place=Place.ACTUATOR,
+    family=Family.DELAY_OR_LAG,
     summary="The drive follows its command with a first-order lag.",
     parameters=(
         Parameter(

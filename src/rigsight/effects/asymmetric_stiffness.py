@@ -16,7 +16,7 @@ References: K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics*
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import x
 from rigsight.parameters import Parameter
 
@@ -25,6 +25,7 @@ k_2 = sp.Symbol("k_2", real=True)
 ASYMMETRIC_STIFFNESS = Effect(
     name="asymmetric_stiffness",
     place=Place.DYNAMICS,
+    family=Family.SPRING_LAW,
     summary="The spring is stiffer on one side than on the other.",
     parameters=(
         Parameter(

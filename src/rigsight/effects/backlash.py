@@ -18,7 +18,7 @@ M. Nordin and P.-O. Gutman, Automatica 38 (2002) 1633.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
 from rigsight.effects.symbols import v, x
 from rigsight.parameters import Parameter
 
@@ -27,6 +27,7 @@ g, z = sp.symbols("g z", real=True)
 BACKLASH = Effect(
     name="backlash",
     place=Place.DYNAMICS,
+    family=Family.PLAY_AND_STOPS,
     summary="There is play between the displacement and the spring; the play moves along with the motion.",
     parameters=(
         Parameter(

@@ -24,6 +24,7 @@ import sympy as sp
 from rigsight.effects.effect import (
     Effect,
     Energy,
+    Family,
     GainTrend,
     Place,
     Signature,
@@ -72,6 +73,7 @@ _FROM_PRESLIDING = Start(
 BOUC_WEN_HYSTERESIS = Effect(
     name="bouc_wen_hysteresis",
     place=Place.DYNAMICS,
+    family=Family.MEMORY,
     summary="Part of the spring torque depends on the history of the deflection (rounded hysteresis loops).",
     parameters=(
         Parameter("A", "scale of z, redundant", "", lower=1e-6, upper=1e6, default=1.0, fitted=False),

@@ -15,7 +15,7 @@ References: A. H. Wickens, *Fundamentals of Rail Vehicle Dynamics* (Swets & Zeit
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import creep_gain, creepage, lateral_displacement, lateral_feedback
 from rigsight.parameters import Parameter
 
@@ -24,6 +24,7 @@ y_n = sp.Symbol("y_n", real=True)
 CONICITY_VARIATION = Effect(
     name="conicity_variation",
     place=Place.LATERAL_DYNAMICS,
+    family=Family.CONTACT,
     summary="The wheel profile steepens away from the center, so that the restoring effect on the axle grows with displacement.",
     parameters=(
         Parameter(

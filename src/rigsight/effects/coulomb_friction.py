@@ -17,7 +17,7 @@ Righthand Sides* (Kluwer 1988), for sticking.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import v
 from rigsight.parameters import Parameter
 
@@ -26,6 +26,7 @@ T_c = sp.Symbol("T_c", real=True)
 COULOMB_FRICTION = Effect(
     name="coulomb_friction",
     place=Place.DYNAMICS,
+    family=Family.DRY_FRICTION,
     summary="Dry friction of constant size opposes the motion; the mass sticks while the torque is small.",
     parameters=(
         Parameter(

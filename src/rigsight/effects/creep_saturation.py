@@ -16,7 +16,7 @@ usual smooth form of the saturation.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import creep_gain, creepage
 from rigsight.parameters import Parameter
 
@@ -25,6 +25,7 @@ s = sp.Symbol("s", real=True)
 CREEP_SATURATION = Effect(
     name="creep_saturation",
     place=Place.LATERAL_DYNAMICS,
+    family=Family.CONTACT,
     summary="The rolling contact saturates: at large creepage the lateral rate grows less than the creepage.",
     parameters=(
         Parameter(

@@ -16,7 +16,7 @@ References: I. Kovacic and M. J. Brennan, *The Duffing Equation* (Wiley 2011).
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import x
 from rigsight.parameters import Parameter
 
@@ -25,6 +25,7 @@ k_3 = sp.Symbol("k_3", real=True)
 CUBIC_STIFFNESS = Effect(
     name="cubic_stiffness",
     place=Place.DYNAMICS,
+    family=Family.SPRING_LAW,
     summary="The spring hardens (or softens) with the cube of the deflection.",
     parameters=(
         Parameter(

@@ -22,7 +22,7 @@ direction.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
 from rigsight.effects.symbols import drive_size, v
 from rigsight.parameters import Parameter
 
@@ -31,6 +31,7 @@ T_fwd, T_bwd, T_c = sp.symbols("T_fwd T_bwd T_c", real=True)
 DIRECTIONAL_FRICTION = Effect(
     name="directional_friction",
     place=Place.DYNAMICS,
+    family=Family.DRY_FRICTION,
     summary="Dry friction is larger in one direction than in the other.",
     parameters=(
         Parameter(

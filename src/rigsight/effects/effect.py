@@ -21,6 +21,27 @@ class Place(StrEnum):
     SENSOR = "sensor"
 
 
+class Family(StrEnum):
+    """What kind of cause an effect is: records that show the family often leave open which of its forms it is."""
+
+    DRY_FRICTION = "dry_friction"
+    MEMORY = "memory"
+    VISCOELASTICITY = "viscoelasticity"
+    SPRING_LAW = "spring_law"
+    GRAVITY = "gravity"
+    DAMPING_LAW = "damping_law"
+    PLAY_AND_STOPS = "play_and_stops"
+    DELAY_OR_LAG = "delay_or_lag"
+    DRIVE_LIMIT = "drive_limit"
+    TONE_OR_RIPPLE = "tone_or_ripple"
+    RESONANCE = "resonance"
+    INERTIA = "inertia"
+    CONTACT = "contact"
+    SENSOR = "sensor"
+    CONTROLLER = "controller"
+    OWN = "own"
+
+
 class Energy(StrEnum):
     """What an effect does to the mechanical energy over a closed cycle."""
 
@@ -136,6 +157,8 @@ class Effect:
         What it does to mechanical energy over a closed cycle.
     signature
         How it shows in sine tests.
+    family
+        What kind of cause it is.
     torque
         Torque (force) that resists the motion, subtracted from the drive, of x, v, t.
     spring
@@ -183,6 +206,7 @@ class Effect:
     parameters: tuple[Parameter, ...]
     energy: Energy
     signature: Signature
+    family: Family = Family.OWN
     torque: sp.Expr | None = None
     spring: sp.Expr | None = None
     deflection: sp.Expr | None = None

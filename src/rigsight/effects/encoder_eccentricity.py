@@ -23,7 +23,7 @@ References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on shaft e
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import reading
 from rigsight.parameters import Parameter
 
@@ -32,6 +32,7 @@ e_sin, e_cos, kappa = sp.symbols("e_sin e_cos kappa", real=True)
 ENCODER_ECCENTRICITY = Effect(
     name="encoder_eccentricity",
     place=Place.SENSOR,
+    family=Family.TONE_OR_RIPPLE,
     summary="The reading has an error that is periodic in the position.",
     parameters=(
         Parameter(

@@ -18,7 +18,7 @@ References: S. W. Shaw and P. J. Holmes, J. Sound Vib. 90 (1983) 129.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import beyond, x
 from rigsight.parameters import Parameter
 
@@ -27,6 +27,7 @@ k_s, s = sp.symbols("k_s s", real=True)
 END_STOP = Effect(
     name="end_stop",
     place=Place.DYNAMICS,
+    family=Family.PLAY_AND_STOPS,
     summary="Beyond a clearance the mass meets a second, stiffer spring.",
     parameters=(
         Parameter(

@@ -18,7 +18,7 @@ References: J. P. Den Hartog, *Mechanical Vibrations* (McGraw-Hill 1956), on the
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start, State
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
 from rigsight.effects.symbols import m, time_size, v, x
 from rigsight.parameters import Parameter
 
@@ -36,6 +36,7 @@ def _at(ratio: float, share: float) -> Start:
 FLEXIBLE_MODE = Effect(
     name="flexible_mode",
     place=Place.DYNAMICS,
+    family=Family.RESONANCE,
     summary="A second mass is attached to the moving mass by a spring and adds a resonance.",
     parameters=(
         Parameter(

@@ -16,7 +16,7 @@ References: D. Tang, E. H. Dowell, AIAA J. 44 (2006), for free play in dynamic s
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import beyond, x
 from rigsight.parameters import Parameter
 
@@ -25,6 +25,7 @@ g = sp.Symbol("g", real=True)
 FREE_PLAY = Effect(
     name="free_play",
     place=Place.DYNAMICS,
+    family=Family.PLAY_AND_STOPS,
     summary="The spring has a gap around its rest position in which it does not act.",
     parameters=(
         Parameter(

@@ -16,7 +16,7 @@ References: A. H. Nayfeh and D. T. Mook, *Nonlinear Oscillations* (Wiley 1979), 
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
 from rigsight.effects.symbols import k, x
 from rigsight.parameters import Parameter
 
@@ -25,6 +25,7 @@ k_g, k_3 = sp.symbols("k_g k_3", real=True)
 GRAVITY_PENDULUM = Effect(
     name="gravity_pendulum",
     place=Place.DYNAMICS,
+    family=Family.GRAVITY,
     summary="Gravity restores with the sine of the angle.",
     parameters=(
         Parameter(

@@ -17,7 +17,7 @@ References: D. J. Ewins, *Modal Testing* (Research Studies Press 2000), on mass 
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import acceleration
 from rigsight.parameters import Parameter
 
@@ -26,6 +26,7 @@ m_e = sp.Symbol("m_e", real=True)
 INERTIA = Effect(
     name="inertia",
     place=Place.DYNAMICS,
+    family=Family.INERTIA,
     summary="A mass moves with the element, and its inertia force is part of the measured force.",
     parameters=(
         Parameter(

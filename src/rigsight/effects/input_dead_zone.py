@@ -15,7 +15,7 @@ References: H. K. Khalil, *Nonlinear Systems* (Prentice Hall 2002), section 1.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import beyond, u
 from rigsight.parameters import Parameter
 
@@ -24,6 +24,7 @@ u_0 = sp.Symbol("u_0", real=True)
 INPUT_DEAD_ZONE = Effect(
     name="input_dead_zone",
     place=Place.ACTUATOR,
+    family=Family.DRIVE_LIMIT,
     summary="Small drive inputs have no effect.",
     parameters=(
         Parameter(

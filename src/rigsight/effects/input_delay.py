@@ -16,7 +16,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.parameters import Parameter
 
 T_d = sp.Symbol("T_d", real=True)
@@ -24,6 +24,7 @@ T_d = sp.Symbol("T_d", real=True)
 INPUT_DELAY = Effect(
     name="input_delay",
     place=Place.ACTUATOR,
+    family=Family.DELAY_OR_LAG,
     summary="The drive acts later than commanded.",
     parameters=(
         Parameter(

@@ -15,7 +15,7 @@ References: H. K. Khalil, *Nonlinear Systems* (Prentice Hall 2002), section 1.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import clamp, u
 from rigsight.parameters import Parameter
 
@@ -24,6 +24,7 @@ u_max = sp.Symbol("u_max", real=True)
 INPUT_SATURATION = Effect(
     name="input_saturation",
     place=Place.ACTUATOR,
+    family=Family.DRIVE_LIMIT,
     summary="The drive cannot exceed a limit.",
     parameters=(
         Parameter(

@@ -25,7 +25,7 @@ F. Al-Bender, V. Lampaert and J. Swevers, IEEE Trans. Autom. Control 50 (2005) 1
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start, State
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
 from rigsight.effects.symbols import deflection_rate, k, spring_torque, x_size
 from rigsight.parameters import Parameter
 
@@ -71,6 +71,7 @@ _AGAIN = tuple(
 IWAN_HYSTERESIS = Effect(
     name="iwan_hysteresis",
     place=Place.DYNAMICS,
+    family=Family.MEMORY,
     summary="Part of the spring torque comes from many small friction sliders that slip one after the other.",
     parameters=(
         Parameter(

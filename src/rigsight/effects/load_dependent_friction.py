@@ -27,7 +27,7 @@ model M3; P. Hamon, M. Gautier and P. Garrec, IEEE/RSJ IROS (2010) 6187, on fric
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
 from rigsight.effects.symbols import drive_size, load, v
 from rigsight.parameters import Parameter
 
@@ -36,6 +36,7 @@ T_c, mu = sp.symbols("T_c mu", real=True)
 LOAD_DEPENDENT_FRICTION = Effect(
     name="load_dependent_friction",
     place=Place.DYNAMICS,
+    family=Family.DRY_FRICTION,
     summary="Dry friction grows with the load that the joint carries.",
     parameters=(
         Parameter(

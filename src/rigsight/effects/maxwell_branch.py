@@ -22,7 +22,7 @@ References: J. D. Ferry, *Viscoelastic Properties of Polymers* (Wiley 1980), cha
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start, State
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
 from rigsight.effects.symbols import drive_size, time_size, v, x_size
 from rigsight.parameters import Parameter
 
@@ -37,6 +37,7 @@ def _at(ratio: float) -> Start:
 MAXWELL_BRANCH = Effect(
     name="maxwell_branch",
     place=Place.DYNAMICS,
+    family=Family.VISCOELASTICITY,
     summary="A second spring in series with a damper acts in parallel to the spring and relaxes.",
     parameters=(
         Parameter(

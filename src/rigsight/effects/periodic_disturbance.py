@@ -19,7 +19,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), on periodic 
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
 from rigsight.parameters import Parameter
 
 T_p, w_p, phi = sp.symbols("T_p w_p phi", real=True)
@@ -27,6 +27,7 @@ T_p, w_p, phi = sp.symbols("T_p w_p phi", real=True)
 PERIODIC_DISTURBANCE = Effect(
     name="periodic_disturbance",
     place=Place.DISTURBANCE,
+    family=Family.TONE_OR_RIPPLE,
     summary="An external torque is periodic in time, independent of the drive.",
     parameters=(
         Parameter(

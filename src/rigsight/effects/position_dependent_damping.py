@@ -17,7 +17,7 @@ van der Pol equation has its negative.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import v, x
 from rigsight.parameters import Parameter
 
@@ -26,6 +26,7 @@ c_x = sp.Symbol("c_x", real=True)
 POSITION_DEPENDENT_DAMPING = Effect(
     name="position_dependent_damping",
     place=Place.DYNAMICS,
+    family=Family.DAMPING_LAW,
     summary="Damping that grows with the square of the displacement.",
     parameters=(
         Parameter(

@@ -20,7 +20,7 @@ References: K. L. Johnson, *Contact Mechanics* (Cambridge 1985), chapter 4, for 
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
 from rigsight.effects.symbols import drive_size, x, x_size
 from rigsight.parameters import Parameter
 
@@ -29,6 +29,7 @@ k_p, n, x_r, k_3 = sp.symbols("k_p n x_r k_3", real=True)
 POWER_LAW_STIFFNESS = Effect(
     name="power_law_stiffness",
     place=Place.DYNAMICS,
+    family=Family.SPRING_LAW,
     summary="A force parallel to the spring grows with a power of the deflection.",
     parameters=(
         Parameter(

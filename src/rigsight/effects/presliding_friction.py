@@ -25,7 +25,7 @@ References: P. R. Dahl, *A Solid Friction Model* (Aerospace Corporation TOR-0158
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start, State
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
 from rigsight.effects.symbols import drive_size, v, x_size
 from rigsight.parameters import Parameter
 
@@ -34,6 +34,7 @@ T_c, x_p, z = sp.symbols("T_c x_p z", real=True)
 PRESLIDING_FRICTION = Effect(
     name="presliding_friction",
     place=Place.DYNAMICS,
+    family=Family.DRY_FRICTION,
     summary="Dry friction deflects like a spring before it slides.",
     parameters=(
         Parameter(

@@ -15,7 +15,7 @@ References: K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics*
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import v
 from rigsight.parameters import Parameter
 
@@ -24,6 +24,7 @@ c_2 = sp.Symbol("c_2", real=True)
 QUADRATIC_DAMPING = Effect(
     name="quadratic_damping",
     place=Place.DYNAMICS,
+    family=Family.DAMPING_LAW,
     summary="Damping that grows with the square of the speed (fluid drag).",
     parameters=(
         Parameter(

@@ -17,7 +17,7 @@ References: K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems* (Prent
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.parameters import Parameter
 
 T_s = sp.Symbol("T_s", real=True)
@@ -25,6 +25,7 @@ T_s = sp.Symbol("T_s", real=True)
 SENSOR_DELAY = Effect(
     name="sensor_delay",
     place=Place.SENSOR,
+    family=Family.DELAY_OR_LAG,
     summary="The displacement is measured with a delay.",
     parameters=(
         Parameter(

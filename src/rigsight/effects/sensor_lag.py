@@ -16,7 +16,7 @@ References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on first-o
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
 from rigsight.effects.symbols import reading
 from rigsight.parameters import Parameter
 
@@ -25,6 +25,7 @@ T_m, x_m = sp.symbols("T_m x_m", real=True)
 SENSOR_LAG = Effect(
     name="sensor_lag",
     place=Place.SENSOR,
+    family=Family.DELAY_OR_LAG,
     summary="The displacement is measured through a first-order lag.",
     parameters=(
         Parameter(

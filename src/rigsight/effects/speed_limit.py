@@ -20,7 +20,7 @@ References: A. Hughes and B. Drury, *Electric Motors and Drives* (Newnes 2013), 
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
 from rigsight.effects.symbols import beyond, input_size, u, v, v_size
 from rigsight.parameters import Parameter
 
@@ -29,6 +29,7 @@ u_s, c_u, u_max = sp.symbols("u_s c_u u_max", real=True)
 SPEED_LIMIT = Effect(
     name="speed_limit",
     place=Place.ACTUATOR,
+    family=Family.DRIVE_LIMIT,
     summary="The largest drive input falls with speed.",
     parameters=(
         Parameter(

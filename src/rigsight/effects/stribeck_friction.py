@@ -22,7 +22,7 @@ References: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
 from rigsight.effects.symbols import drive_size, v, v_size
 from rigsight.parameters import Parameter
 
@@ -31,6 +31,7 @@ T_c, T_s, w_s = sp.symbols("T_c T_s w_s", real=True)
 STRIBECK_FRICTION = Effect(
     name="stribeck_friction",
     place=Place.DYNAMICS,
+    family=Family.DRY_FRICTION,
     summary="Dry friction that is larger at standstill and falls with speed.",
     parameters=(
         Parameter(

@@ -19,7 +19,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
 from rigsight.effects.symbols import time_size
 from rigsight.parameters import Parameter
 
@@ -28,6 +28,7 @@ T_x = sp.Symbol("T_x", real=True)
 TIME_SHIFT = Effect(
     name="time_shift",
     place=Place.SENSOR,
+    family=Family.DELAY_OR_LAG,
     summary="The time stamps of one signal are early or late relative to the others.",
     parameters=(
         Parameter(

@@ -24,7 +24,7 @@ References: T. M. Jahns and W. L. Soong, IEEE Trans. Ind. Electron. 43 (1996) 32
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.effects.symbols import position
 from rigsight.parameters import Parameter
 
@@ -33,6 +33,7 @@ T_sin, T_cos, kappa = sp.symbols("T_sin T_cos kappa", real=True)
 TORQUE_RIPPLE = Effect(
     name="torque_ripple",
     place=Place.DYNAMICS,
+    family=Family.TONE_OR_RIPPLE,
     summary="A torque is periodic in the position: cogging, gear teeth, an eccentric pulley.",
     parameters=(
         Parameter(

@@ -89,24 +89,19 @@ def judge(
         place = " at that place"
         if taken.equalled_by:
             place = f". Effects at other places explain the same part of it ({_listed(taken.equalled_by)})"
+        if taken.contradicted_by:
+            place = f". Effects at other places explain as much, but another part of it ({_listed(taken.contradicted_by)})"
         return Judgement(
             "effect",
             best,
             f"{nearest}: the main cause, or the most similar effect of the catalogue{place}. It leaves "
             f"{best.error_over_noise:.3g} times {floor}, and this error still correlates with a signal of the rig.",
         )
-    if taken.contradicted_by:
-        return Judgement(
-            "unknown",
-            best,
-            f"{nearest}, but effects at other places close as much and explain another part of it "
-            f"({_listed(taken.contradicted_by)}): the explanations contradict each other.",
-        )
     return Judgement(
         "unknown",
         best,
         f"The best candidate, {', '.join(best.names)}, explains {taken.share:.0%} of the squared gap (at least "
-        f"{taken.at_least:.0%} with 95 % confidence): a main cause must explain more than half.",
+        f"{taken.at_least:.0%} with 95 % confidence): a cause that is named explains more than half.",
     )
 
 

@@ -1,7 +1,7 @@
-"""Main cause: does one model certainly explain more than half of the gap, and no equally good model another part?
+"""Main cause: does one model explain more than half of the gap, and do others at other places explain the same part?
 
-Models at different places contradict each other if they explain different parts of the gap. If they explain the same part, such
-as a delayed drive and a delayed sensor, only the place of the cause is open.
+If they do, such as a delayed drive and a delayed sensor, only the place of the cause is open. What it leaves is the remainder:
+on a measured rig no law is exact, so a remainder does not refute a cause.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class MainCause:
 
     @property
     def clear(self) -> bool:
-        """True if the model certainly explains more than half and no equally good model contradicts it."""
-        return self.at_least > VERDICT.larger_part and not self.contradicted_by
+        """True if the model explains more than half."""
+        return self.share > VERDICT.larger_part
 
 
 def main_cause(

@@ -1,0 +1,190 @@
+"""The causes as families at places: how probable each is, which share of the gap it explains, and its forms.
+
+Records of a measured rig often show that friction is missing at a joint and leave open which of five laws of friction it is. So the
+family at its place is stated first, and each form with its probability within the family.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.noise.block_means import squared_errors
+from rigsight.effects import Effect, Family
+from rigsight.rigs import Rig
+
+_LIMITS = (0.025, 0.975)
+_LEAST = 0.01
+"""Smallest probability of a family that is listed although no named effect belongs to it."""
+
+Key = tuple[Family, str]
+"""A family and the place at which it acts."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """One form of a family, or several of its effects together."""
+
+    effects: tuple[str, ...]  # names without places
+    probability: float  # within the family
+
+
+@dataclass(frozen=True)
+class FamilyAtPlace:
+    """A family at a place as a cause of the gap."""
+
+    family: Family
+    where: str
+    probability: float  # that it is a true cause of the gap
+    # Of the squared gap that re-identification leaves, in the diagnosed model; 0 for a family that is not in it.
+    share: float
+    # 95 % limits over the stretches of the scored records; for a family that is not in the diagnosed model the upper one is what it
+    # would explain in its place.
+    interval: tuple[float, float]
+    forms: tuple[Form, ...]  # the most probable first
+
+    def to_json(self) -> dict[str, Any]:
+        """Return an entry of ``families`` in ``diagnosis.json``."""
+        return {
+            "family": str(self.family),
+            "where": self.where,
+            "probability": self.probability,
+            "share": {"value": self.share, "interval": list(self.interval)},
+            "forms": [{"effects": list(f.effects), "probability": f.probability} for f in self.forms],
+        }
+
+
+@dataclass(frozen=True)
+class Shares:
+    """How the squared gap that re-identification leaves divides into families, remainder and noise; the sum is one."""
+
+    families: float
+    remainder: float
+    noise: float
+
+
+def families_at_places(
+    rig: Rig,
+    reidentified: FittedModel,
+    diagnosed: FittedModel,
+    candidates: Sequence[tuple[FittedModel, float, float]],
+    outside: float,
+    noise: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> tuple[FamilyAtPlace, ...]:
+    """Return the families of the diagnosed model and of its probable rivals, the largest share first.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    reidentified
+        The equations without an effect.
+    diagnosed
+        The model whose families divide the gap.
+    candidates
+        Every scored model with its probability and its share of the ranking.
+    outside
+        Probability of a cause that has none of the forms tried. It belongs to a family as far as this explains the gap: a real
+        law is no exact form, and what it leaves does not refute it.
+    noise
+        Noise floor of each output.
+    rng
+        Source of the resampling.
+    """
+    usable = [
+        own
+        for own in candidates
+        if own[0].effects and own[0].residuals and math.isfinite(own[0].error_over_noise)
+    ]
+    if not usable:
+        return ()
+    models = [model for model, _, _ in usable]
+    squares = squared_errors([reidentified.residuals, *(m.residuals for m in models)], noise)
+    drawn = squares.resampled(squares.draws(rng))
+    explained = 1.0 - squares.mean[1:] / squares.mean[0]
+    explained_drawn = 1.0 - drawn[:, 1:] / drawn[:, :1]
+    keys = [frozenset(_keys(rig, model.effects)) for model in models]
+    own_keys = _keys(rig, diagnosed.effects)
+    of_sets = {key_set: [i for i, own in enumerate(keys) if own == key_set] for key_set in set(keys)}
+    found = []
+    for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
+        members = [i for i, own in enumerate(keys) if key in own]
+        listed = math.fsum(usable[i][1] for i in members)
+        beyond = math.fsum(usable[i][2] * min(1.0, max(0.0, explained[i])) for i in members)
+        probability = min(1.0, listed + outside * min(1.0, beyond))
+        if key in own_keys:
+            share = _share(key, own_keys, explained, of_sets)
+            ends = [_share(key, own_keys, row, of_sets) for row in explained_drawn]
+            low, high = (float(end) for end in np.quantile(ends, _LIMITS))
+        elif probability < _LEAST:
+            continue
+        else:
+            alone = [i for i in members if len(keys[i]) == 1] or members
+            best = max(alone, key=lambda i: explained[i])
+            share, low = 0.0, 0.0
+            high = float(np.clip(np.quantile(explained_drawn[:, best], _LIMITS[1]), 0.0, 1.0))
+        forms = _forms(rig, key, [usable[i] for i in members])
+        found.append(FamilyAtPlace(*key, probability, share, (low, high), forms))
+    return tuple(sorted(found, key=lambda own: (-own.share, -own.probability)))
+
+
+def shares_of_gap(
+    found: Sequence[FamilyAtPlace], reidentified: FittedModel, diagnosed: FittedModel, is_adequate: bool
+) -> Shares:
+    """Return how the squared gap divides; what an adequate model leaves counts as noise and disturbance."""
+    families = math.fsum(own.share for own in found)
+    gap, error = reidentified.error_over_noise, diagnosed.error_over_noise
+    above = 0.0 if is_adequate or not gap > 0.0 else max(error**2 - 1.0, 0.0) / max(gap**2, 1.0)
+    remainder = min(above, max(0.0, 1.0 - families))
+    return Shares(families, remainder, 1.0 - families - remainder)
+
+
+def _keys(rig: Rig, effects: Sequence[Effect]) -> tuple[Key, ...]:
+    return tuple(dict.fromkeys((effect.family, rig.where(effect)) for effect in effects))
+
+
+def _share(
+    key: Key,
+    of_model: Sequence[Key],
+    explained: NDArray[np.float64],
+    of_sets: Mapping[frozenset[Key], Sequence[int]],
+) -> float:
+    """Return what a family adds to what the others of its model explain, averaged over the orders of adding them.
+
+    A set that was not fitted explains as much as the best part of it that was (Shapley's value, as in `effect_shares`).
+    """
+
+    def worth(keys: frozenset[Key]) -> float:
+        return max(
+            (float(explained[i]) for own, at in of_sets.items() if own <= keys for i in at), default=0.0
+        )
+
+    steps = []
+    for order in itertools.permutations(of_model):
+        earlier = frozenset(order[: order.index(key)])
+        steps.append(max(0.0, worth(earlier | {key})) - max(0.0, worth(earlier)))
+    return float(np.mean(steps))
+
+
+def _forms(rig: Rig, key: Key, members: Sequence[tuple[FittedModel, float, float]]) -> tuple[Form, ...]:
+    weights: dict[tuple[str, ...], float] = {}
+    # Where no form is probable, because none is exact, the ranking alone tells them apart.
+    by_probability = math.fsum(probability for _, probability, _ in members) > 0.0
+    for model, probability, rank_share in members:
+        own = tuple(
+            effect.name.partition("@")[0]
+            for effect in model.effects
+            if (effect.family, rig.where(effect)) == key
+        )
+        weights[own] = weights.get(own, 0.0) + (probability if by_probability else rank_share)
+    whole = math.fsum(weights.values())
+    forms = [Form(own, weight / whole if whole > 0.0 else 0.0) for own, weight in weights.items()]
+    return tuple(sorted((f for f in forms if f.probability > 0.0), key=lambda f: -f.probability))
