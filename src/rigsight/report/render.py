@@ -102,6 +102,7 @@ def render_report(
             maps=[*location.output_maps(diagnosis), *location.joint_maps(diagnosis)],
             share_rows=location.share_rows(diagnosis),
             ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
+            family_rows=sections.family_rows(diagnosis),
             ranking_rows=sections.ranking_rows(diagnosis),
             outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
             parameters=sections.parameter_rows(diagnosis, known),

@@ -27,11 +27,14 @@ from rigsight.report.wording import (
     TIMES,
     effect_label,
     effects_label,
+    family_label,
+    forms_label,
     given_text,
     is_given,
     named_candidate,
     percent,
     sentence_case,
+    share_label,
     stages_reported,
 )
 
@@ -151,6 +154,18 @@ def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
         f"Bars of the error of each candidate in units of the noise floor: {', '.join(scored[:16])}.",
         f"Error of each candidate; shorter is better.{named}{hatched}",
     )
+
+
+def family_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
+    """Return each family with its probability, its share of the squared gap and its forms; then remainder and noise."""
+    rows = [
+        (sentence_case(family_label(own)), percent(own.probability), share_label(own), forms_label(own))
+        for own in diagnosis.families
+    ]
+    if rows and diagnosis.shares is not None:
+        rows.append(("Remainder", "", percent(diagnosis.shares.remainder), "explained by none of them"))
+        rows.append(("Noise and disturbance", "", percent(diagnosis.shares.noise), ""))
+    return rows
 
 
 def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:

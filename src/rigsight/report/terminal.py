@@ -20,12 +20,15 @@ from rigsight.report.wording import (
     ambiguity_sentence,
     basis_sentence,
     effects_label,
+    family_label,
     fault_sentences,
+    forms_label,
     given_text,
     missing_force_sentence,
     named_candidate,
     percent,
     remainder_sentence,
+    share_label,
     stages_reported,
     verdict_name,
     verdict_sentence,
@@ -98,6 +101,9 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
             f"gap in {output}",
             f"{stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
         )
+    for cause in diagnosis.families[:_RANKED]:
+        of_gap = f", {share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
+        yield family_label(cause), f"probability {percent(cause.probability)}{of_gap}: {forms_label(cause)}"
     if diagnosis.candidates:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
         if not diagnosis.effects:

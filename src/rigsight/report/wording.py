@@ -12,6 +12,7 @@ from rigsight.diagnose.location.gap_parts import GapPart
 from rigsight.diagnose.location.trace import Stage
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap
+from rigsight.diagnose.verdict.families import FamilyAtPlace
 from rigsight.discover import not_contradicted
 from rigsight.effects import AT
 from rigsight.report.quantities import gap_percent
@@ -42,8 +43,11 @@ _VERDICT_NAMES = {
 _STATED = {
     "parameters": "no missing effect",
     "none": "no missing effect",
-    "unknown": "a cause not tried",
+    "unknown": "a cause that is none of the families",
 }
+
+_FORMS = 4
+"""Number of forms of a family that are shown."""
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:
@@ -323,8 +327,31 @@ def _deviations(separation: float) -> str:
 
 
 def what_is_probable(diagnosis: Diagnosis) -> str:
-    """Return what the probability of a diagnosis is that of: the named effects, or ``"a cause not tried"``."""
-    return effects_label(diagnosis.effects) if diagnosis.effects else _STATED[diagnosis.verdict]
+    """Return what the probability of a diagnosis is that of: the named families, or no missing effect."""
+    named = [family_label(own) for own in diagnosis.families if own.share > 0.0]
+    return (
+        (listed(named) or effects_label(diagnosis.effects))
+        if diagnosis.effects
+        else _STATED[diagnosis.verdict]
+    )
+
+
+def family_label(own: FamilyAtPlace) -> str:
+    """Return a family with its place: ``"dry friction at gearbox"``."""
+    return f"{own.family.replace('_', ' ')} {place_label(own.where)}"
+
+
+def forms_label(own: FamilyAtPlace) -> str:
+    """Return the forms of a family with their probabilities within it: ``"Stribeck friction 60 %, Coulomb friction 40 %"``."""
+    return ", ".join(
+        f"{effects_label(form.effects)} {percent(form.probability)}" for form in own.forms[:_FORMS]
+    )
+
+
+def share_label(own: FamilyAtPlace) -> str:
+    """Return the share of the gap of a family with its interval: ``"81 % (74 % to 86 %)"``."""
+    low, high = map(percent, own.interval)
+    return f"{percent(own.share)} ({low} to {high})"
 
 
 def basis_sentence(diagnosis: Diagnosis) -> str:

@@ -1,7 +1,7 @@
 """The causes as families at places: how probable each is, which share of the gap it explains, and its forms.
 
-Records of a measured rig often show that friction is missing at a joint and leave open which of five laws of friction it is. So the
-family at its place is stated first, and each form with its probability within the family.
+Records of a measured rig often show that friction is missing at a joint and leave open which of five laws of friction it is. So
+the family at its place is stated first, and each form with its probability within the family.
 """
 
 from __future__ import annotations
@@ -43,10 +43,11 @@ class FamilyAtPlace:
     family: Family
     where: str
     probability: float  # that it is a true cause of the gap
-    # Of the squared gap that re-identification leaves, in the diagnosed model; 0 for a family that is not in it.
+    # Of the squared gap that re-identification leaves, in the diagnosed model; 0 for a family that is not
+    # in it.
     share: float
-    # 95 % limits over the stretches of the scored records; for a family that is not in the diagnosed model the upper one is what it
-    # would explain in its place.
+    # 95 % limits over the stretches of the scored records; for a family that is not in the diagnosed model
+    # the upper one is what it would explain in its place.
     interval: tuple[float, float]
     forms: tuple[Form, ...]  # the most probable first
 

@@ -20,6 +20,9 @@ from rigsight.simulate import has_dry_friction, parameter_vector, simulate_sets
 
 _STATE_RANGE = 20.0
 """Largest distance of an initial state from its first estimate, in units of its size."""
+_HIDDEN_RANGE = 3.0
+"""The same for a state of an effect, which no sensor shows and whose estimate is its equilibrium. Further off it would explain by
+a motion of its own what its equation does not: a resonance that begins at twenty times the motion of the mass that it hangs on."""
 
 
 Floats = NDArray[np.float64]
@@ -244,11 +247,14 @@ class SearchStart:
         own = coordinates.from_values(values)
         sizes = data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
         limited = data.limited
+        of_effects = tuple(f"{effect.name}." for effect in data.structure.effects)
+        hidden = [name.startswith(of_effects) for name in data.structure.state_names]
+        reach = np.where(hidden, _HIDDEN_RANGE, _STATE_RANGE)
         places = [np.where(limited, np.clip(s / sizes, -1.0, 1.0), s / sizes) for s in states]
         return cls(
             coordinates=coordinates,
             theta=np.concatenate([own, *places]),
             places=places,
-            lower=[np.where(limited, -1.0, place - _STATE_RANGE) for place in places],
-            upper=[np.where(limited, 1.0, place + _STATE_RANGE) for place in places],
+            lower=[np.where(limited, -1.0, place - reach) for place in places],
+            upper=[np.where(limited, 1.0, place + reach) for place in places],
         )
