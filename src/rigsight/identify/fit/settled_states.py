@@ -21,8 +21,8 @@ from rigsight.simulate import has_dry_friction, parameter_vector, simulate_sets
 _STATE_RANGE = 20.0
 """Largest distance of an initial state from its first estimate, in units of its size."""
 _HIDDEN_RANGE = 3.0
-"""The same for a state of an effect, which no sensor shows and whose estimate is its equilibrium. Further off it would explain by
-a motion of its own what its equation does not: a resonance that begins at twenty times the motion of the mass that it hangs on."""
+"""The same for a state of an effect, which no sensor shows and whose estimate is its equilibrium. Further off, its own motion
+would explain what its equation does not: a resonance that begins at twenty times the motion of the mass on which it hangs."""
 
 
 Floats = NDArray[np.float64]
