@@ -40,7 +40,7 @@ def test_a_missing_cubic_spring_is_found_and_written_as_the_contract_says(
     written = json.loads((out / "diagnosis.json").read_text())
     assert written == diagnosis.to_json()
     assert written.keys() >= CONTRACT_KEYS
-    assert written["schema_version"] == 1
+    assert written["schema_version"] == 2
     assert (written["verdict"], written["effects"]) == ("effect", ["cubic_stiffness"])
     assert written["where"] == ["dynamics"]
     for later in ("gap_by_record", "gap_by_band", "gap_by_amplitude", "gap_by_state"):

@@ -1,4 +1,4 @@
-"""A main cause takes the larger part of the gap in every stretch of the records, and nothing as good acts elsewhere."""
+"""A main cause explains the larger part of the gap; what explains as much elsewhere is reported with it."""
 
 from __future__ import annotations
 
@@ -38,8 +38,7 @@ def test_a_part_that_one_stretch_decides_is_not_sure(cause) -> None:
     left = np.random.default_rng(2).standard_normal(N)
     left[: N // 20] *= 28.0
     found = cause(left)
-    assert found.share > 0.5
-    assert not found.clear
+    assert found.at_least < 0.5 < found.share
 
 
 @pytest.fixture
@@ -59,7 +58,6 @@ def test_only_what_acts_elsewhere_and_takes_another_part_contradicts(cause, halv
     found = cause(left, ("actuator_lag",), others_left)
     assert [model.names for model in found.contradicted_by] == [("actuator_lag",)]
     assert not found.equalled_by
-    assert not found.clear
 
 
 def test_what_takes_the_same_part_from_elsewhere_leaves_the_place_open(cause) -> None:

@@ -1,0 +1,80 @@
+"""Families at places: probability over all their forms, shares that add up with remainder and noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose.verdict.families import families_at_places, shares_of_gap
+from rigsight.effects import CATALOGUE, Family
+from rigsight.rigs import AXIS
+
+N = 4000
+GAP = 10.0 * np.random.default_rng(0).standard_normal(N)
+NOISE = np.random.default_rng(2).standard_normal(N)
+
+
+@pytest.fixture
+def families(scored):
+    def of(*candidates: tuple[tuple[str, ...], np.ndarray, float, float], outside: float = 0.0):
+        models = [(scored(names, residuals=left), chance, share) for names, left, chance, share in candidates]
+        reidentified = scored((), residuals=GAP)
+        found = families_at_places(
+            AXIS, reidentified, models[0][0], models, outside, np.ones(1), np.random.default_rng(1)
+        )
+        return found, shares_of_gap(found, reidentified, models[0][0], is_adequate=False)
+
+    return of
+
+
+def test_every_effect_of_the_catalogue_has_a_family() -> None:
+    assert all(effect.family is not Family.OWN for effect in CATALOGUE)
+
+
+def test_forms_that_share_a_probability_make_a_certain_family(families) -> None:
+    found, shares = families(
+        (("coulomb_friction",), 3.0 * NOISE, 0.45, 0.5),
+        (("stribeck_friction",), 3.0 * NOISE, 0.3, 0.3),
+        (("directional_friction",), 3.1 * NOISE, 0.15, 0.2),
+        (("cubic_stiffness",), 6.0 * NOISE, 0.005, 0.0),
+    )
+    (friction,) = found
+    assert (friction.family, friction.where) == (Family.DRY_FRICTION, "dynamics")
+    assert friction.probability == pytest.approx(0.9)
+    assert friction.interval[0] < friction.share < friction.interval[1]
+    assert friction.share == pytest.approx(0.91, abs=0.01)
+    assert [form.effects for form in friction.forms] == [
+        ("coulomb_friction",), ("stribeck_friction",), ("directional_friction",),
+    ]  # fmt: skip
+    assert sum(form.probability for form in friction.forms) == pytest.approx(1.0)
+    assert shares.families + shares.remainder + shares.noise == pytest.approx(1.0)
+    assert shares.remainder == pytest.approx(0.08, abs=0.01)
+
+
+def test_a_law_that_is_no_exact_form_belongs_to_the_family_that_explains_the_gap(families) -> None:
+    left = 0.4 * GAP
+    found, _ = families(
+        (("coulomb_friction",), left, 0.004, 0.7), (("stribeck_friction",), left, 0.002, 0.3), outside=0.99
+    )
+    assert found[0].probability == pytest.approx(0.006 + 0.99 * (1.0 - 0.16), abs=0.01)
+
+
+def test_a_rival_has_no_share_in_the_model_but_says_what_it_would_explain(families) -> None:
+    found, _ = families(
+        (("coulomb_friction",), 3.0 * NOISE, 0.7, 0.7), (("input_delay",), 4.0 * NOISE, 0.3, 0.3)
+    )
+    assert [own.family for own in found] == [Family.DRY_FRICTION, Family.DELAY_OR_LAG]
+    assert (found[1].where, found[1].share) == ("actuator", 0.0)
+    assert 0.7 < found[1].interval[1] < 0.95
+
+
+def test_two_causes_divide_what_they_explain_together(families) -> None:
+    first = np.arange(N) % 100 < 60
+    found, shares = families(
+        (("coulomb_friction", "input_delay"), NOISE, 0.8, 0.9),
+        (("coulomb_friction",), np.where(first, NOISE, GAP), 0.0, 0.05),
+        (("input_delay",), np.where(first, GAP, NOISE), 0.0, 0.05),
+    )
+    assert [own.share for own in found] == pytest.approx([0.6, 0.4], abs=0.05)
+    assert shares.families == pytest.approx(0.99, abs=0.01)
+    assert shares.remainder == pytest.approx(0.0, abs=0.01)
