@@ -129,9 +129,7 @@ def _unit(effect: Effect, dimension: str, scales: Mapping[str, float]) -> float:
     return characteristic_value(placed_dimension(effect, dimension), scales)
 
 
-def strength_for(
-    gap: Callable[[float], float], wished: float, strongest: float = _STRONGEST
-) -> float:
+def strength_for(gap: Callable[[float], float], wished: float, strongest: float = _STRONGEST) -> float:
     """Return the strength at which a gap is close to the requested size, or the largest allowed strength.
 
     Parameters

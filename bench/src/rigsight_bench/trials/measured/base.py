@@ -67,7 +67,9 @@ class Base:
     def scales(self) -> dict[str, float]:
         """Size of each base quantity in the records."""
         own = {p.name: self.values[p.name] for p in (*self.rig.constants, *self.rig.parameters)}
-        return characteristic_scales(self.rig, [_complete(self.rig, r) for r in self.campaign.estimation], own)
+        return characteristic_scales(
+            self.rig, [_complete(self.rig, r) for r in self.campaign.estimation], own
+        )
 
     def added(self, changed: Sequence[Record], reference: Sequence[Record]) -> float:
         """Return what a change of records adds to the error of the equations, in units of what they leave without it.
@@ -87,19 +89,16 @@ class Base:
         )
         return float(np.max(before.unexplained(after, self.values, self.left) / self.left))
 
-    @cached_property
-    def force(self) -> float:
-        """RMS force of all drives together, or of the elements whose motion is prescribed."""
-        records = self.campaign.estimation
-        if not self.rig.is_driven:
-            return _pooled([record[s.name] for record in records for s in self.rig.outputs if s.name in record])
-        drives = [drive.name for drive in self.rig.mechanism.drives]
-        found = []
-        for motion in _motions(self.rig, records, self.values):
-            p = motion.equations.parameters(self.values, motion.record)
-            places = motion.equations.at_places(motion.z, motion.u, p)
-            found += [places[f"force@{name}"] for name in drives]
-        return _pooled(found)
+    def size(self, name: str) -> float:
+        """Return the RMS of an input or a reading in the records.
+
+        Parameters
+        ----------
+        name
+            Of the signal.
+        """
+        signals = [record[name] for record in self.campaign.estimation if name in record]
+        return float(np.sqrt(np.mean(np.concatenate(signals) ** 2))) if signals else 0.0
 
 
 def base_of(campaign: Campaign) -> Base:
@@ -145,7 +144,11 @@ def base_of(campaign: Campaign) -> Base:
 
 def held_numbers(rig: Rig) -> set[str]:
     """Return the names of the parameters that set the scale of all forces: those of the drives."""
-    read = {s.name for drive in rig.mechanism.drives for s in (drive.force.free_symbols | drive.signal.free_symbols)}
+    read = {
+        s.name
+        for drive in rig.mechanism.drives
+        for s in (drive.force.free_symbols | drive.signal.free_symbols)
+    }
     return {p.name for p in rig.parameters} & read
 
 
@@ -178,10 +181,6 @@ def _of_undriven(motions: Sequence[RecordMotion], values: Mapping[str, float]) -
     names = [parameter.name for parameter in rig.parameters]
     slopes = motion.slopes(values, names)
     return {name for name, own in zip(names, slopes, strict=True) if np.any(own[~driven])}
-
-
-def _pooled(signals: Sequence[Floats]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(signals) ** 2)))
 
 
 def _size(left: Floats, unit: Floats) -> float:
@@ -318,7 +317,9 @@ class _Fit:
     def _generalized(
         self, motion: RecordMotion, effect: Effect, own: Mapping[str, float], values: Mapping[str, float]
     ) -> Floats:
-        return generalized(motion, effect, own, values, joint_motion(motion, joint_of(self.rig, effect), values))
+        return generalized(
+            motion, effect, own, values, joint_motion(motion, joint_of(self.rig, effect), values)
+        )
 
 
 def generalized(

@@ -123,7 +123,9 @@ def _load(motion: RecordMotion, joint: Joint, numbers: Mapping[str, float]) -> F
         signals[signal.name] = motion.record[signal.name]
     carried = rig.mechanism.carried_by(joint)
     drives = {sp.Symbol(d.name, real=True): d.signal for d in rig.mechanism.drives}
-    carried = carried.xreplace(drives)
+    still = {c.rate: sp.S.Zero for c in rig.mechanism.coordinates}
+    own = joint.stiffness * (joint.motion - joint.rest) + joint.force.xreplace(still)
+    carried = (carried + own).xreplace(drives)
     names = sorted(symbol.name for symbol in carried.free_symbols)
     if not set(names) <= signals.keys():
         return np.full(motion.record.n_samples, np.nan)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import lfilter
 
 from rigsight.effects import kind_of
 from rigsight.effects import symbols as canonical
@@ -49,9 +49,7 @@ def whole_samples(spot: Spot, values: Mapping[str, float], dt: float) -> dict[st
     """
     if kind_of(spot.effect.name) not in DELAYS:
         return dict(values)
-    return {
-        name: math.copysign(max(round(abs(value) / dt), 1) * dt, value) for name, value in values.items()
-    }
+    return {name: math.copysign(max(round(abs(value) / dt), 1) * dt, value) for name, value in values.items()}
 
 
 def spiked(base: Base, spot: Spot, values: Mapping[str, float], record: Record) -> Record:
@@ -115,11 +113,11 @@ def _changed(base: Base, spot: Spot, values: Mapping[str, float], record: Record
         raise SimulationError(f"The sensors of the record '{record.name}' do not show the motion.")
     joint = joint_of(base.rig, spot.effect)
     force = effect_force(spot.effect, values, joint_motion(motion, joint, base.values))
-    if not float(np.sqrt(np.mean(force**2))) <= base.force:
+    added = force if spot.way == "force_in_reading" else force * _per_force(base, spot, motion)
+    if not float(np.sqrt(np.mean(added**2))) <= base.size(spot.signal):
         raise SimulationError(f"{spot.effect.name} would be stronger than what moves the rig.")
     if spot.way == "force_in_reading":
-        return record.with_signals(**{spot.signal: signal + force})
-    added = force * _per_force(base, spot, motion)
+        return record.with_signals(**{spot.signal: signal + added})
     if record.hold == "zoh":
         # An input that is held until the next sample: the mean of the force until then.
         added = 0.5 * (added + np.append(added[1:], added[-1]))
@@ -155,7 +153,8 @@ def _slow(record: Record, name: str, signal: Floats, time_constant: float) -> Re
     lost = math.ceil(_SETTLED * time_constant / record.dt)
     if lost > _MOST_LOST * record.n_samples:
         raise SimulationError(f"A lag of {time_constant:.3g} s is too long for the record '{record.name}'.")
-    system = tuple(np.array([[part]]) for part in (-1.0 / time_constant, 1.0 / time_constant, 1.0, 0.0))
-    a, b, c, d = (float(part[0, 0]) for part in cont2discrete(system, record.dt, method="foh")[:4])
-    slow = signal[0] + lfilter([d, c * b - d * a], [1.0, -a], signal - signal[0])
+    # Exact for a reading that is linear between its samples.
+    stays = math.exp(-record.dt / time_constant)
+    mean = (1.0 - stays) * time_constant / record.dt
+    slow = signal[0] + lfilter([1.0 - mean, mean - stays], [1.0, -stays], signal - signal[0])
     return record.with_signals(**{name: slow}).slice(lost, None)

@@ -65,7 +65,9 @@ def spots(base: Base) -> tuple[Spot, ...]:
 def _of_effect(base: Base, effect: Effect) -> list[Spot]:
     rig = base.rig
     found = []
-    for place in rig.places(effect.place) if effect.place is not Place.DISTURBANCE else rig.places(Place.DYNAMICS):
+    for place in (
+        rig.places(effect.place) if effect.place is not Place.DISTURBANCE else rig.places(Place.DYNAMICS)
+    ):
         at = placed(effect, place)
         if not rig.offers(at) or at.reads_inertia:
             continue
@@ -153,7 +155,5 @@ def _is_along(rig: Rig, joint: Joint, drive: Drive) -> bool:
         sp.Matrix([derivative(motion, c.symbol) for c in rig.mechanism.free])
         for motion in (joint.motion, drive.along)
     )
-    crossed = [
-        sp.simplify(mine[i] * its[j] - mine[j] * its[i]) for i in range(len(mine)) for j in range(i)
-    ]
+    crossed = [sp.simplify(mine[i] * its[j] - mine[j] * its[i]) for i in range(len(mine)) for j in range(i)]
     return any(mine) and any(its) and not any(crossed)

@@ -33,7 +33,8 @@ from rigsight_bench.trials.trial import Trial, as_given
 
 STRENGTHS = (2.0, 8.0)
 """What an effect adds to the error of the base equations, in units of what they leave of the records as they were measured."""
-_LEAST_OF_WISHED = 0.7
+_LEAST = 1.5
+"""Smallest strength that is accepted where a drawn one would be stronger than what moves the rig."""
 _STRONGEST = 30.0
 """Most that an effect may exceed the start values of its declaration: what a rough model leaves is large."""
 _MOST = 12.0
@@ -121,7 +122,7 @@ def _drawn(base: Base, spot: Spot, rng: np.random.Generator) -> tuple[dict[str, 
         values_at,
         functools.partial(added_error, base, spot),
         math.hypot(1.0, wished),
-        _LEAST_OF_WISHED * wished,
+        _LEAST,
         _STRONGEST,
     )
     if found.gap > _MOST:
@@ -187,7 +188,9 @@ def _trial(
         "noise_floor": {},
     }
     parameters = {p.name for p in compose(rig, base.modelled).parameters} - {p.name for p in rig.constants}
-    known = parameters - {p.name for p in rig.parameters if p.name not in base.free and p.name not in campaign.given}
+    known = parameters - {
+        p.name for p in rig.parameters if p.name not in base.free and p.name not in campaign.given
+    }
     given = as_given({name: base.values[name] for name in sorted(known)})
     return Trial(
         rig,
