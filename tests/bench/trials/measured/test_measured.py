@@ -25,7 +25,7 @@ from rigsight_bench.trials.measured.campaigns import campaign_files, measured_ba
 from rigsight_bench.trials.measured.families import family_of
 from rigsight_bench.trials.measured.spike import spiked, unspiked
 from rigsight_bench.trials.measured.spots import Spot, spots
-from rigsight_bench.trials.measured.trial import again, measured_cells
+from rigsight_bench.trials.measured.trial import again, base_beside, measured_cells
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -141,8 +141,9 @@ def test_a_changed_record_is_one_of_the_rig_with_the_effect(
     campaign: Campaign, base: Base, kind: str
 ) -> None:
     exact = replace(base, values=dict(TRUTH))
-    # Friction of the base and friction that is added are not told apart: of that family nothing is offered beside it.
+    # Friction of the base and friction that is added are not distinguished: the base is without it then.
     if family_of(kind) == "dry_friction":
+        assert base_beside(base, _spot(base, kind)).modelled == ()
         plain = replace(
             campaign,
             records=tuple(_record(n, [], {k: v for k, v in TRUTH.items() if k != "T_c"}) for n in (1, 2, 3)),
@@ -173,7 +174,11 @@ def test_every_family_of_an_axis_is_offered(base: Base) -> None:
         "tone_or_ripple",
         "resonance",
     }
-    assert "dry_friction" not in found, "it is modelled"
+    assert "dry_friction" in found
+    named = replace(base, without=None)
+    assert "dry_friction" not in {family_of(spot.effect.name) for spot in spots(named)}, (
+        "the campaign models it"
+    )
     names = {spot.effect.name for spot in spots(base)}
     assert not names & {"actuator_lag", "input_saturation", "speed_limit", "sensor_delay", "inertia"}
 
@@ -272,7 +277,7 @@ def test_a_key_tells_effect_place_family_and_strength(trial: Trial) -> None:
     assert key["family"] == family_of(key["effects"][0])
     assert 1.5 <= key["strength"] <= 12.0
     assert key["campaign"] == "axis/campaign.toml"
-    assert key["base"]["modelled"] == ["coulomb_friction"]
+    assert key["base"]["modelled"] == ([] if key["base"]["own_of_same_family"] else ["coulomb_friction"])
     assert set(key["own_values"]) <= {p.name for p in effect_named(key["effects"][0]).parameters}
 
 
@@ -281,8 +286,10 @@ def test_a_campaign_of_a_trial_can_be_read(tmp_path: Path, trial: Trial, folder:
     bench.settle("measured", 1, folder)
     bench.write_trial("000", trial)
     read = read_campaign(bench.campaign("000"))
-    assert [effect.name for effect in read.modelled] == ["coulomb_friction"]
-    assert read.given["T_c"] == pytest.approx(trial.key["base"]["values"]["T_c"], rel=1e-4)
+    modelled = trial.key["base"]["modelled"]
+    assert [effect.name for effect in read.modelled] == modelled
+    assert read.given["m"] == pytest.approx(trial.key["base"]["values"]["m"], rel=1e-4)
+    assert ("T_c" in read.given) == bool(modelled)
     assert [record.role for record in read.records] == ["estimation", "estimation", "validation"]
     text = "".join(path.read_text() for path in bench.campaign("000").glob("*.toml"))
     assert "axis/" not in text

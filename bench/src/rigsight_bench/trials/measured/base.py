@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +49,8 @@ class Base:
         Names of the numbers that the regression moves.
     left
         RMS of what they leave of each equation, in the band of the motion.
+    without
+        The same equations without the friction that was chosen, if one was.
     """
 
     campaign: Campaign
@@ -57,6 +59,7 @@ class Base:
     values: Mapping[str, float]
     free: tuple[str, ...]
     left: Floats
+    without: Base | None = None
 
     @property
     def rig(self) -> Rig:
@@ -139,7 +142,8 @@ def base_of(campaign: Campaign) -> Base:
         found = _fitted(campaign, motions, start, free, (effect,), is_chosen=True)
         if _size(found.left, plain.left) < min(_HELPS, _size(best.left, plain.left)):
             best = found
-    return best
+    # Strengths are in units of what the better equations leave.
+    return replace(best, without=replace(plain, left=best.left)) if best.is_chosen else best
 
 
 def held_numbers(rig: Rig) -> set[str]:

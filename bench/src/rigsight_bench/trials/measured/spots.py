@@ -56,10 +56,22 @@ def spots(base: Base) -> tuple[Spot, ...]:
     base
         Base equations of the campaign.
     """
-    rig = base.rig
-    taken = {(family_of(effect.name), rig.acts_at(effect)) for effect in base.modelled}
     found = [spot for effect in CATALOGUE for spot in _of_effect(base, effect)]
-    return tuple(spot for spot in found if (family_of(spot.effect.name), spot.place) not in taken)
+    return tuple(spot for spot in found if not is_beside_own(base, spot) or base.without is not None)
+
+
+def is_beside_own(base: Base, spot: Spot) -> bool:
+    """Return True for an effect at a joint at which the base equations already have one of its family.
+
+    Parameters
+    ----------
+    base
+        Base equations of the campaign.
+    spot
+        Effect and place.
+    """
+    taken = {(family_of(effect.name), base.rig.acts_at(effect)) for effect in base.modelled}
+    return (family_of(spot.effect.name), spot.place) in taken
 
 
 def _of_effect(base: Base, effect: Effect) -> list[Spot]:

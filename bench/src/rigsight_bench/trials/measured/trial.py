@@ -26,7 +26,7 @@ from rigsight_bench.trials.measured.campaigns import (
 )
 from rigsight_bench.trials.measured.families import family_of
 from rigsight_bench.trials.measured.spike import spiked, unspiked, whole_samples
-from rigsight_bench.trials.measured.spots import Spot
+from rigsight_bench.trials.measured.spots import Spot, is_beside_own
 from rigsight_bench.trials.passes import shuffled
 from rigsight_bench.trials.strength import draw_shape, scaled, sized
 from rigsight_bench.trials.trial import Trial, as_given
@@ -101,11 +101,27 @@ def draw_measured_trial(folder: Path, seed: int, trial: int) -> Trial:
         rng = np.random.default_rng([seed, trial, attempt])
         spot = offered[cell.spot if attempt < _SAME else int(rng.integers(len(offered)))]
         try:
-            own, strength = _drawn(base, spot, rng)
-            return _trial(folder, cell.path, base, spot, own, strength, {"seed": seed, "trial": trial})
+            equations = base_beside(base, spot)
+            own, strength = _drawn(equations, spot, rng)
+            return _trial(folder, cell.path, equations, spot, own, strength, {"seed": seed, "trial": trial})
         except SimulationError as error:
             reason = error
     raise SimulationError(f"Trial {trial} of seed {seed} cannot be drawn: {reason}")
+
+
+def base_beside(base: Base, spot: Spot) -> Base:
+    """Return the base equations beside an effect: without the friction that the records chose where more of it is added.
+
+    Then the family of the cause is known, and at least the strength that was added.
+
+    Parameters
+    ----------
+    base
+        Base equations of the campaign.
+    spot
+        Effect and place.
+    """
+    return base.without if is_beside_own(base, spot) and base.without is not None else base
 
 
 def _drawn(base: Base, spot: Spot, rng: np.random.Generator) -> tuple[dict[str, float], float]:
@@ -160,13 +176,16 @@ def _trial(
     with_it = compose(rig, [*base.modelled, spot.effect])
     named = {with_it.parameter_name(spot.effect, name): value for name, value in own.items()}
     of_base = compose(rig, base.modelled).names
+    whole = measured_base(path)
+    is_own = not isinstance(whole, str) and is_beside_own(whole, spot)
     key = {
         "schema_version": 2,
         "design": "measured",
         **numbers,
         "kind": "single",
         "effects": [kind_of(spot.effect.name)],
-        "where": [spot.place],
+        "where": [rig.where(spot.effect)],
+        "place": spot.place,
         "family": family_of(spot.effect.name),
         "strength": strength,
         "own_values": dict(own),
@@ -177,6 +196,7 @@ def _trial(
         "base": {
             "modelled": [effect.name for effect in base.modelled],
             "chosen_by_fit": base.is_chosen,
+            "own_of_same_family": is_own,
             "values": {name: base.values[name] for name in of_base},
             "force_residual": base.left.tolist(),
         },
@@ -244,7 +264,8 @@ def again(folder: Path, key: Mapping[str, Any]) -> list[Record]:
     base = measured_base(path)
     if isinstance(base, str) or digest_of(path) != key["source"]:
         raise InputError(f"{path} is not what it was when the trial was drawn.")
-    wanted = (key["effects"][0], key["where"][0])
-    same = replace(base, values={**base.values, **key["base"]["values"]})
+    wanted = (key["effects"][0], key["place"])
     spot = next(s for s in measured_spots(path) if (kind_of(s.effect.name), s.place) == wanted)
+    equations = base_beside(base, spot)
+    same = replace(equations, values={**equations.values, **key["base"]["values"]})
     return _handed(records_of(same, spot, key["own_values"]))
