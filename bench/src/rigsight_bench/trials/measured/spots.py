@@ -7,10 +7,11 @@ from typing import Literal
 
 import sympy as sp
 
-from rigsight.effects import CATALOGUE, Effect, Place, placed
+from rigsight.effects import Effect, Place, placed
 from rigsight.effects.symbols import derivative
 from rigsight.rigs import Drive, Joint, Rig, evaluated
 from rigsight.rigs.parts import force_symbol
+from rigsight_bench.trials.counted import counted_effects
 from rigsight_bench.trials.measured.base import Base
 from rigsight_bench.trials.measured.families import family_of
 
@@ -56,7 +57,7 @@ def spots(base: Base) -> tuple[Spot, ...]:
     base
         Base equations of the campaign.
     """
-    found = [spot for effect in CATALOGUE for spot in _of_effect(base, effect)]
+    found = [spot for effect in counted_effects() for spot in _of_effect(base, effect)]
     return tuple(spot for spot in found if not is_beside_own(base, spot) or base.without is not None)
 
 
