@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +18,10 @@ from rigsight.rigs import AXIS, ELEMENT, rig_of_tables
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.campaign.in_memory import make_campaign
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight_bench.running.files import BenchFolder
+from rigsight_bench import benches
+from rigsight_bench.report.markdown import blind_markdown
+from rigsight_bench.report.page import render_blind
+from rigsight_bench.running.files import RUN_FILE, BenchFolder
 from rigsight_bench.trials import Trial, draw_trial, n_trials
 from rigsight_bench.trials.measured.base import Base, base_of
 from rigsight_bench.trials.measured.campaigns import campaign_files, measured_base, measured_spots
@@ -313,6 +316,29 @@ def test_cells_are_of_every_campaign_that_can_be_used(folder: Path, tmp_path: Pa
         n_trials("measured")
     with pytest.raises(InputError, match="reads no folder"):
         n_trials("standard", folder)
+
+
+def test_a_bench_is_drawn_diagnosed_and_scored(
+    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diagnose(bench: BenchFolder, name: str, start: Sequence[str]) -> None:
+        bench.result(name).mkdir(parents=True)
+        (bench.result(name) / RUN_FILE).write_text(json.dumps({"seconds": 1.0, "message": "it failed"}))
+
+    monkeypatch.setattr(benches, "diagnose_trial", diagnose)
+    content = benches.run_blind(
+        tmp_path, start=(), design="measured", measured=folder, seed=1, only=[0], n_jobs=1
+    )
+    (found,) = content["trials"]
+    key = BenchFolder(tmp_path).read_key("000")
+    assert (found["design"], found["verdict"]) == ("measured", "failed")
+    assert found["families"] == (key["family"],)
+    assert (found["family_right"], found["family_probability"]) == (False, 0.0)
+    assert content["families"][key["family"]]["right"]["total"] == 1
+    (wrong,) = content["wrong"]
+    assert wrong["again"] == f"rigsight blind --design measured {folder} --seed 1 --trial 0 --out DIR"
+    assert "Known causes in measured records" in blind_markdown(content)
+    assert "Known causes in measured records" in render_blind(content)
 
 
 @pytest.mark.parametrize(
