@@ -192,7 +192,10 @@ class Steps:
             raise RigsightError("killed")
         self.done[step, name] += 1
 
-    def make(self, folder: BenchFolder, design: str, seed: int, number: int) -> None:
+    def make(
+        self, folder: BenchFolder, design: str, seed: int, number: int, measured: Path | None = None
+    ) -> None:
+        assert (measured is not None) == (design == "measured")
         name = trial_name(number)
         if not folder.drawn(name):
             self._count("make", name)

@@ -30,6 +30,7 @@ def run_blind(
     *,
     start: Sequence[str],
     design: Design = "standard",
+    measured: Path | None = None,
     trials: int | None = None,
     seed: int = 0,
     only: Sequence[int] = (),
@@ -48,7 +49,9 @@ def run_blind(
         Arguments with which Python starts the command line of a trial: ``rigsight_bench.trial_process.START``.
     design
         List of cells to draw from: ``"standard"``, ``"laboratory"`` for records as laboratories take them, or ``"handwritten"``
-        for plants that are composed from no declaration.
+        for plants that are composed from no declaration, or ``"measured"`` for known causes in measured records.
+    measured
+        Folder of the campaigns of design ``"measured"``; None with other designs.
     trials
         Number of trials; None for one of every cell.
     seed
@@ -76,14 +79,15 @@ def run_blind(
         If a trial cannot be drawn, or its diagnosis was ended from outside.
     """
     jobs = checked_jobs(n_jobs)
-    total = n_trials(design) if trials is None else trials
+    n_cells = n_trials(design, measured)
+    total = n_cells if trials is None else trials
     if total < 1 or any(not 0 <= number < total for number in only):
         raise InputError(
             f"Trials are numbered from 0 to {total - 1}, got {', '.join(map(str, only)) or total}."
         )
     folder = BenchFolder(Path(out).resolve())
     check_writable(folder.path)
-    folder.settle(design, seed)
+    folder.settle(design, seed, measured)
     numbers = list(only) or list(range(total))
     with TrialStore(folder.path / STORE_FILE) as store:
         scored = store.scored()
@@ -92,7 +96,7 @@ def run_blind(
         for number in numbers:
             if trial_name(number) in scored:
                 stage.finished(f"{number} (done before)")
-        run_one = functools.partial(_run_drawn, folder, design, seed, start)
+        run_one = functools.partial(_run_drawn, folder, design, seed, start, measured)
         for outcome in finished(run_one, waiting, jobs, cluster, folder=folder.path, say=_say(listener)):
             store.add([outcome])
             stage.finished(outcome.trial)
@@ -211,8 +215,10 @@ def rescore(
         return score_bench(folder.path, store, command)
 
 
-def _run_drawn(folder: BenchFolder, design: Design, seed: int, start: Sequence[str], number: int) -> Outcome:
-    make_trial(folder, design, seed, number)
+def _run_drawn(
+    folder: BenchFolder, design: Design, seed: int, start: Sequence[str], measured: Path | None, number: int
+) -> Outcome:
+    make_trial(folder, design, seed, number, measured)
     return _run(folder, start, trial_name(number))
 
 

@@ -17,6 +17,14 @@ from rigsight.workflow.run.progress_display import listening
 
 def blind(
     context: typer.Context,
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[FOLDER]",
+            show_default=False,
+            help="Folder with measured campaigns, for design measured and no other: every campaign*.toml in it or below it.",
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the bench.")] = Path(
         "blind"
     ),
@@ -32,11 +40,12 @@ def blind(
         ),
     ] = None,
     design: Annotated[
-        Literal["standard", "laboratory", "handwritten"],
+        Literal["standard", "laboratory", "handwritten", "measured"],
         typer.Option(
             help="Kinds of trials to draw. standard: effects of the catalogue on a running gear or an axis; laboratory: records "
             "with the imperfections of laboratory measurements (filters, feedback, stiction, ...), on several rigs; handwritten: "
-            "plants with equations written by hand, independent of the catalogue."
+            "plants with equations written by hand, independent of the catalogue; measured: a known cause is added to the "
+            "records of a campaign in FOLDER."
         ),
     ] = "standard",
     seed: Seed = 0,
@@ -87,7 +96,8 @@ def blind(
 ) -> None:
     """Diagnose trials whose true effect is withheld, and score the verdicts against sealed keys.
 
-    The rigs of the trials are drawn at random, or are those of existing campaigns (--campaigns, --keys). Each result is written
+    The rigs of the trials are drawn at random, or are those of measured campaigns to whose records a cause is added (--design
+    measured FOLDER), or those of existing campaigns as they are (--campaigns, --keys). Each result is written
     into DIR when its trial is finished, the score into DIR/blind.json and DIR/blind.html. After an interruption, the same command
     continues with the remaining trials.
     """
@@ -100,6 +110,11 @@ def blind(
 
         drawing = [f"--{name}" for name in ("trials", "design", "seed") if _is_given(context, name)]
         _check_together(campaigns, keys, merge or [], rescore, trial or [], drawing)
+        _check_folder(
+            folder,
+            design,
+            "--merge" if merge else "--rescore" if rescore else "--campaigns" if campaigns else "",
+        )
         running_in = [f"--{name}" for name in ("jobs", "cluster") if _is_given(context, name)]
         if merge and running_in:
             raise InputError(f"--merge runs no trials. Leave out {' and '.join(running_in)}.")
@@ -126,6 +141,7 @@ def blind(
                 out,
                 start=START,
                 design=design,
+                measured=folder,
                 trials=trials,
                 seed=seed,
                 only=_numbers(trial or []),
@@ -176,6 +192,20 @@ def _check_together(
     if asked and drawing:
         listed, them = " and ".join(drawing), "it" if len(drawing) == 1 else "them"
         raise InputError(f"{asked[0]} draws no rigs, so {listed} would have no effect. Leave {them} out.")
+
+
+def _check_folder(folder: Path | None, design: str, other: str) -> None:
+    """Refuse a folder of measured campaigns with anything but its design, and its absence with that."""
+    if folder is not None and (other or design != "measured"):
+        use = other or f"Design {design}"
+        raise InputError(
+            f"{use} reads no folder of measured campaigns. Leave out {folder}, or write --design measured."
+        )
+    if folder is None and design == "measured" and not other:
+        raise InputError(
+            "Design measured adds causes to the records of measured campaigns. Name their folder: "
+            "rigsight blind --design measured FOLDER"
+        )
 
 
 def _numbers(given: Sequence[str]) -> list[int]:

@@ -2,6 +2,7 @@
 
 from rigsight.effects.catalogue import CATALOGUE as CATALOGUE
 from rigsight.effects.catalogue import effect_named as effect_named
+from rigsight.effects.catalogue import family_of as family_of
 from rigsight.effects.effect import Effect as Effect
 from rigsight.effects.effect import Energy as Energy
 from rigsight.effects.effect import Family as Family

@@ -11,7 +11,7 @@ from rigsight.effects.coulomb_friction import COULOMB_FRICTION
 from rigsight.effects.creep_saturation import CREEP_SATURATION
 from rigsight.effects.cubic_stiffness import CUBIC_STIFFNESS
 from rigsight.effects.directional_friction import DIRECTIONAL_FRICTION
-from rigsight.effects.effect import Effect
+from rigsight.effects.effect import Effect, Family
 from rigsight.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
 from rigsight.effects.end_stop import END_STOP
 from rigsight.effects.flexible_mode import FLEXIBLE_MODE
@@ -86,3 +86,11 @@ def effect_named(name: str) -> Effect:
     kind, at, place = name.partition(AT)
     effect = effects[check_option("Effect", kind, effects)]
     return placed(effect, place) if at else effect
+
+
+def family_of(name: str) -> Family:
+    """Return the family of an effect, with or without its place; ``Family.OWN`` for one that is not in the catalogue."""
+    return _FAMILIES.get(name.partition(AT)[0], Family.OWN)
+
+
+_FAMILIES = {effect.name: effect.family for effect in CATALOGUE}

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from rigsight.effects import family_of
 from rigsight_bench.scoring import Outcome, ParameterError, WithheldError, outcome
 
 
@@ -51,6 +52,9 @@ def placed_diagnosis(*effects: tuple[str, str], looked_at: tuple[str, ...] = ("s
         "gap_by_place": [
             {"place": place, "share": 0.5, "looked_at": place in looked_at}
             for place in ("shaft", "load_bearing", "motor", "load_angle")
+        ],
+        "families": [
+            {"family": family_of(name), "where": place, "probability": 0.9} for name, place in effects
         ],
     }
 
@@ -253,3 +257,19 @@ def test_the_truth_among_what_cannot_be_told_apart_is_at_its_place() -> None:
     elsewhere = found | {"ambiguous_with": [["coulomb_friction@shaft"]]}
     assert held(placed_key(FRICTION), alike).right_within_set
     assert not held(placed_key(FRICTION), elsewhere).right_within_set
+
+
+def test_a_relative_at_its_place_is_of_the_right_family() -> None:
+    truth = placed_key(("coulomb_friction", "shaft"))
+    relative = held(truth, placed_diagnosis(("stribeck_friction", "shaft")))
+    elsewhere = held(truth, placed_diagnosis(("coulomb_friction", "load_bearing")))
+    with_another = held(truth, placed_diagnosis(("presliding_friction", "shaft"), ("backlash", "shaft")))
+    assert relative.families == ("dry_friction",)
+    assert (relative.right, relative.family_right, relative.family_probability) == (False, True, 0.9)
+    assert (elsewhere.family_right, elsewhere.family_probability) == (False, 0.0)
+    assert (with_another.right, with_another.family_right) == (False, True)
+
+
+def test_nothing_hidden_has_no_family() -> None:
+    found = held(key("none"), diagnosis("none"))
+    assert (found.families, found.family_right, found.family_probability) == ((), None, None)

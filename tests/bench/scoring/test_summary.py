@@ -160,3 +160,16 @@ def test_nothing_adds_up_to_nothing() -> None:
     assert found["goals"]["singles_right"]["share"] is None
     assert all(row["reached"] is None for row in found["targets"])
     assert found["by"]["kind"] == {}
+
+
+def test_families_are_counted_at_their_place(outcome_like: Callable[..., Outcome]) -> None:
+    rows = summary(
+        [
+            outcome_like(families=("memory",), family_right=True, family_probability=0.8),
+            outcome_like(families=("memory",), family_right=False, family_probability=0.2),
+            outcome_like(),
+        ]
+    )["families"]
+    assert list(rows) == ["all", "memory"]
+    assert (rows["memory"]["right"]["count"], rows["memory"]["right"]["total"]) == (1, 2)
+    assert rows["all"]["probability"] == 0.5

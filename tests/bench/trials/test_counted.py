@@ -53,7 +53,11 @@ def lines(design: Design) -> Iterator[str]:
         yield json.dumps([asdict(cell), [effect.name for effect in effects]], sort_keys=True)
 
 
-@pytest.mark.parametrize("design", get_args(Design))
+OF_A_FOLDER = ("measured",)
+"""Their trials depend on the campaigns of a folder as well."""
+
+
+@pytest.mark.parametrize("design", [design for design in get_args(Design) if design not in OF_A_FOLDER])
 def test_the_trials_are_those_that_were_counted(design: Design) -> None:
     drawn = list(lines(design))
     found = len(drawn), hashlib.sha256("\n".join(drawn).encode()).hexdigest()[:16]

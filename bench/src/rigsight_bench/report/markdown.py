@@ -41,6 +41,7 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         "Beside the goals:",
         _table(["Figure", "Found", "Trials", "95 % interval"], views.beside_rows(content)),
         *_conditions(content),
+        *_families(content),
         "## True causes and diagnosed causes",
     ]
     if rows := _confusion_rows(content):
@@ -78,6 +79,11 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         _wrong(content),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _families(content: Mapping[str, Any]) -> list[str]:
+    rows = views.family_rows(content)
+    return ["## Known causes in measured records", _table(list(views.FAMILY_HEADS), rows)] if rows else []
 
 
 def _conditions(content: Mapping[str, Any]) -> list[str]:

@@ -35,6 +35,8 @@ def render_blind(content: Mapping[str, Any]) -> str:
         condition_heads=conditions.CONDITION_HEADS,
         condition_words=conditions.CONDITION_WORDS,
         conditions=conditions.condition_rows(content),
+        family_heads=views.FAMILY_HEADS,
+        families=views.family_rows(content),
         held_out_median=views.number(content["goals"]["held_out_median"]),
         seconds={name: views.number(value) for name, value in content["seconds"].items()},
         hours=views.number(content["seconds"]["total"] / 3600.0),

@@ -18,7 +18,9 @@ from rigsight_bench.report.conditions import (
     screen_shares,
 )
 from rigsight_bench.report.views import (
+    FAMILY_HEADS,
     bench_text,
+    family_rows,
     hidden_text,
     named_text,
     number,
@@ -49,6 +51,7 @@ class BlindSummary:
             table.add_row(Text(words), Text(number(content["goals"][name])), Text(""), Text(""))
         yield table
         yield from _conditions(content)
+        yield from _families(content)
         yield Text("\nStated probability against share of right verdicts", "bold")
         bins = Table.grid(padding=(0, 2))
         for row in content["reliability"]:
@@ -77,6 +80,17 @@ def _conditions(content: Mapping[str, Any]) -> RenderResult:
     table = Table.grid(padding=(0, 2))
     for row in (CONDITION_HEADS, *rows):
         table.add_row(*(Text(cell, justify="right" if i else "left") for i, cell in enumerate(row)))
+    yield table
+
+
+def _families(content: Mapping[str, Any]) -> RenderResult:
+    rows = family_rows(content)
+    if not rows:
+        return
+    yield Text("\nKnown causes in measured records", "bold")
+    table = Table.grid(padding=(0, 2))
+    for row in (FAMILY_HEADS, *rows):
+        table.add_row(*map(Text, row))
     yield table
 
 

@@ -89,6 +89,7 @@ class GroupView:
     rows: dict[str, list[str]]
 
 
+FAMILY_HEADS = ("Family at its place", "Named", "Trials", "95 % interval", "Probability, mean")
 GROUP_HEADS = (
     "Trials", "Right", "95 % interval", "Effect right", "Right or indistinguishable", "Place right", "Place looked at",
     "Log score",
@@ -175,6 +176,16 @@ def beside_rows(content: Mapping[str, Any]) -> list[list[str]]:
     """Return the figures without a goal: words, share, counts and interval."""
     goals = content["goals"]
     return [[sentence_case(words), *share_cells(goals[name])] for name, words in _BESIDE.items()]
+
+
+def family_rows(content: Mapping[str, Any]) -> list[list[str]]:
+    """Return, by family, how often it was named at its place, of benches with measured rigs."""
+    if not any(bench["design"] == "measured" for bench in content["benches"]):
+        return []
+    return [
+        [sentence_case(name.replace("_", " ")), *share_cells(row["right"]), number(row["probability"])]
+        for name, row in content["families"].items()
+    ]
 
 
 def share_cells(share: Mapping[str, Any]) -> list[str]:

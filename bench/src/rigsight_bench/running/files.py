@@ -34,6 +34,7 @@ RUN_FILE = "run.json"
 EXTERNAL = "external"
 """Design of a bench whose campaigns were written by somebody else."""
 _OWNER_ONLY = 0o700
+_RIG_FILE = "rig.toml"
 
 
 @dataclass(frozen=True)
@@ -122,15 +123,24 @@ class BenchFolder:
             for record in read_listed_record(path, rig, number, table, file_inside(path, number, table))
         ]
 
-    def settle(self, design: Design, seed: int) -> None:
+    def settle(self, design: Design, seed: int, measured: Path | None = None) -> None:
         """Write down which bench this folder holds, or check that it is this one.
+
+        Parameters
+        ----------
+        design, seed
+            Of the bench.
+        measured
+            Folder of the campaigns of design ``measured``.
 
         Raises
         ------
         InputError
             If the folder holds another bench.
         """
-        wanted = {"schema_version": 1, "design": design, "seed": seed}
+        wanted: dict[str, Any] = {"schema_version": 1, "design": design, "seed": seed}
+        if measured is not None:
+            wanted["folder"] = str(measured.resolve())
         if self.settings.exists():
             found = read_json(self.settings)
             if found != wanted:
@@ -152,6 +162,8 @@ class BenchFolder:
         """
         files = {"campaign.toml": _campaign_toml(trial)}
         files |= {f"{record.name}.csv": _csv_text(trial, record) for record in trial.records}
+        if trial.rig_file is not None:
+            files[_RIG_FILE] = trial.rig_file
         write_together(self.campaign(name), files)
         withheld = {f"{name}_{record.name}.csv": record for record in trial.withheld}
         write_together(self.keys, {file: _csv_text(trial, record) for file, record in withheld.items()})
@@ -177,7 +189,8 @@ def described(settings: dict[str, Any]) -> str:
     """Return which bench it is, in words."""
     if settings.get("design") == EXTERNAL:
         return "existing campaigns"
-    return f"design {settings.get('design')} and seed {settings.get('seed')}"
+    of_folder = f" of {settings['folder']}" if "folder" in settings else ""
+    return f"design {settings.get('design')}{of_folder} and seed {settings.get('seed')}"
 
 
 def read_json(file: Path) -> dict[str, Any]:
@@ -212,24 +225,42 @@ def _amplitude_line(record: Record) -> str:
     return "" if record.amplitude is None else f"\namplitude = {record.amplitude!r}"
 
 
+def _constants_line(record: Record) -> str:
+    """Return the line of the constants of a record alone; empty where it has none."""
+    own = ", ".join(f"{name} = {value!r}" for name, value in record.constants.items())
+    return f"\nconstants = {{ {own} }}" if own else ""
+
+
+def _given(trial: Trial) -> dict[str, float]:
+    """Return the numbers of the given simulation, those of the rig in the order of its declaration."""
+    of_rig = [p.name for p in trial.rig.parameters if p.name in trial.given]
+    return {name: trial.given[name] for name in [*of_rig, *(n for n in trial.given if n not in of_rig)]}
+
+
 def _campaign_toml(trial: Trial) -> str:
     """Return the text of campaign.toml; for trials on one rig only the values differ."""
     rig = trial.rig
-    constants = "\n".join(f"{p.name} = {trial.values[p.name]!r}" for p in rig.constants)
-    parameters = "\n".join(f"{p.name} = {trial.given[p.name]!r}" for p in rig.parameters)
+    of_records = {name for record in trial.records for name in record.constants}
+    constants = "\n".join(
+        f"{p.name} = {trial.values[p.name]!r}" for p in rig.constants if p.name not in of_records
+    )
+    parameters = "\n".join(f"{name} = {value!r}" for name, value in _given(trial).items())
     records = "\n".join(
         f'''
 [[records]]
 file = "{record.name}.csv"
 role = "{record.role}"
 kind = "{record.kind}"{_amplitude_line(record)}
-hold = "{record.hold}"'''
+hold = "{record.hold}"{_constants_line(record)}'''
         for record in trial.records
     )
-    return f'''title = "Trial"
+    which = f'model = "{rig.name}"' if trial.rig_file is None else f'file = "{_RIG_FILE}"'
+    effects = f"\neffects = {json.dumps(list(trial.modelled))}" if trial.modelled else ""
+    offsets = '\noffsets = "per_record"' if trial.offsets_by_record else ""
+    return f'''title = "Trial"{offsets}
 
 [rig]
-model = "{rig.name}"
+{which}{effects}
 
 [rig.constants]
 {constants}

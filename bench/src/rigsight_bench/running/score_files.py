@@ -156,4 +156,6 @@ def _again(found: Outcome, settings: dict[str, Any]) -> str:
     if found.design == EXTERNAL:
         where = ["--campaigns", settings.get("campaigns", "DIR"), "--keys", settings.get("keys", "DIR")]
         return shlex.join(["rigsight", "blind", *where, "--trial", found.trial, "--out", "DIR"])
-    return f"rigsight blind --design {found.design} --seed {found.seed} --trial {int(found.trial)} --out DIR"
+    folder = f" {shlex.quote(settings['folder'])}" if "folder" in settings else ""
+    which = f"--seed {found.seed} --trial {int(found.trial)}"
+    return f"rigsight blind --design {found.design}{folder} {which} --out DIR"

@@ -19,7 +19,7 @@ from typing import Any, get_type_hints
 from rigsight.errors import InputError, MachineError
 from rigsight_bench.scoring import Outcome, ParameterError, WithheldError
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 _PATIENCE = 60.0
 """Time [s] to wait for another process that writes."""
 _OF_THE_DISK = ("SQLITE_FULL", "SQLITE_IOERR", "SQLITE_READONLY")
@@ -37,6 +37,7 @@ _FROM_TEXT: dict[str, Callable[[list[Any]], tuple[Any, ...]]] = {
     "places": tuple,
     "named": tuple,
     "named_places": tuple,
+    "families": tuple,
     "withheld": lambda rows: tuple(WithheldError(**row) for row in rows),
     "parameters": lambda rows: tuple(ParameterError(**row) for row in rows),
 }

@@ -37,8 +37,19 @@ MACHINE = 75
 """Exit code of a diagnosis that failed because of this machine: a full disk, too little memory."""
 
 
-def make_trial(folder: BenchFolder, design: Design, seed: int, number: int) -> None:
+def make_trial(
+    folder: BenchFolder, design: Design, seed: int, number: int, measured: Path | None = None
+) -> None:
     """Draw a trial and write it, unless that has been done.
+
+    Parameters
+    ----------
+    folder
+        The bench.
+    design, seed, number
+        Which trial.
+    measured
+        Folder of the campaigns of design ``measured``.
 
     Raises
     ------
@@ -47,7 +58,7 @@ def make_trial(folder: BenchFolder, design: Design, seed: int, number: int) -> N
     """
     name = trial_name(number)
     if not folder.drawn(name):
-        folder.write_trial(name, draw_trial(design, seed, number))
+        folder.write_trial(name, draw_trial(design, seed, number, measured))
 
 
 def diagnose_trial(folder: BenchFolder, name: str, start: Sequence[str]) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from rigsight.effects import AT
+from rigsight.effects import AT, family_of
 from rigsight.errors import InputError
 from rigsight.rigs import Rig, declared_rig
 from rigsight_bench.scoring.parameter_errors import ParameterError, parameter_errors
@@ -105,6 +105,13 @@ class Outcome:
         Why it failed.
     condition
         Under which the records of a laboratory were taken; empty elsewhere.
+    families
+        Of the hidden effects, in their order; empty where nothing is hidden.
+    family_right
+        An effect of the family of each hidden effect (of several: of the main one) is named at its place; None where nothing is
+        hidden.
+    family_probability
+        Stated probability of the least probable of these families at their places, 0 for one that is not listed; None as above.
     """
 
     design: str
@@ -139,6 +146,9 @@ class Outcome:
     seconds: float
     message: str = ""
     condition: str = ""
+    families: tuple[str, ...] = ()
+    family_right: bool | None = None
+    family_probability: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the outcome for ``blind.json``."""
@@ -203,6 +213,10 @@ def outcome(
     if truth and gap is not None and gap < 1.0:
         gap = None
     hides_a_place = bool(truth) and key["where"] is not None
+    wanted = _families(needed)
+    of_families = {
+        (one["family"], one["where"]): float(one["probability"]) for one in found.get("families", ())
+    }
     return Outcome(
         design=str(key["design"]),
         seed=int(key["seed"]),
@@ -236,6 +250,9 @@ def outcome(
         seconds=seconds,
         message=message,
         condition=str(key.get("condition", "")),
+        families=tuple(family_of(name) for name in _kinds(truth)),
+        family_right=wanted <= _families(named) if truth else None,
+        family_probability=min(of_families.get(one, 0.0) for one in wanted) if wanted else None,
     )
 
 
@@ -256,6 +273,11 @@ def effects_at_places(said: Mapping[str, Any], by_place: bool) -> frozenset[tupl
         said["where"] if by_place and len(said.get("where") or ()) == len(effects) else [""] * len(effects)
     )
     return frozenset(zip(effects, places, strict=True))
+
+
+def _families(effects: frozenset[tuple[str, str]]) -> frozenset[tuple[str, str]]:
+    """Return the family of each effect at its place."""
+    return frozenset((family_of(name), place) for name, place in effects)
 
 
 def _kinds(effects: frozenset[tuple[str, str]]) -> tuple[str, ...]:

@@ -46,6 +46,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "held_out": held_out(outcomes),
         "parameters": parameters(outcomes),
         "conditions": conditions(outcomes),
+        "families": families(outcomes),
         "by": {name: _grouped(outcomes, label) for name, label in _GROUPINGS.items()},
         "seconds": {
             "median": median([o.seconds for o in outcomes]),
@@ -89,6 +90,22 @@ def conditions(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
     }
     rows = {name: _under(found) for name, found in groups.items() if found}
     return {**rows, ALL: _under(taken)} if taken else {}
+
+
+def families(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
+    """Return, for each family of hidden effects and for all, how often it was named at its place."""
+    groups: dict[str, list[Outcome]] = {}
+    for found in outcomes:
+        if found.family_right is not None:
+            groups.setdefault(ALL, []).append(found)
+            groups.setdefault(" + ".join(sorted(set(found.families))), []).append(found)
+    return {
+        name: {
+            "right": share_of(groups[name], lambda o: bool(o.family_right)),
+            "probability": mean([o.family_probability or 0.0 for o in groups[name]]),
+        }
+        for name in sorted(groups, key=lambda name: (name != ALL, name))
+    }
 
 
 def _under(outcomes: Sequence[Outcome]) -> dict[str, Any]:

@@ -86,16 +86,30 @@ def _inner(parameter: Parameter, rng: np.random.Generator) -> float:
 
 
 def scaled(
-    effect: Effect, shape: Mapping[str, float], strength: float, scales: Mapping[str, float]
+    effect: Effect,
+    shape: Mapping[str, float],
+    strength: float,
+    scales: Mapping[str, float],
+    limits: Mapping[str, float] = _LIMITS,
 ) -> dict[str, float]:
-    """Return the parameters of an effect between its null (strength 0) and its full shape (1), or beyond."""
+    """Return the parameters of an effect between its null (strength 0) and its full shape (1), or beyond.
+
+    Parameters
+    ----------
+    effect, shape, strength
+        The effect, its parameters at full strength, and how strong it is.
+    scales
+        Size of each base quantity.
+    limits
+        Largest value of a growing parameter by its dimension, in units of the size of that.
+    """
     values = dict(shape)
     growing = [p for p in effect.parameters if p.null is not None and p.null < _NEVER and p.null != 1.0]
     # What grows stops together: static friction held at the limit of its sliding part would be Coulomb friction.
     most = [
-        _LIMITS[p.dimension] * _unit(effect, p.dimension, scales) / abs(shape[p.name])
+        limits[p.dimension] * _unit(effect, p.dimension, scales) / abs(shape[p.name])
         for p in growing
-        if p.dimension in _LIMITS and shape[p.name]
+        if p.dimension in limits and shape[p.name]
     ]
     growth = min([strength, *most])
     for p in effect.parameters:
@@ -115,7 +129,7 @@ def _unit(effect: Effect, dimension: str, scales: Mapping[str, float]) -> float:
     return characteristic_value(placed_dimension(effect, dimension), scales)
 
 
-def strength_for(gap: Callable[[float], float], wished: float) -> float:
+def strength_for(gap: Callable[[float], float], wished: float, strongest: float = _STRONGEST) -> float:
     """Return the strength at which a gap is close to the requested size, or the largest allowed strength.
 
     Parameters
@@ -124,8 +138,10 @@ def strength_for(gap: Callable[[float], float], wished: float) -> float:
         Gap over strength, rising; raises `SimulationError` where the plant cannot be simulated.
     wished
         The gap to reach.
+    strongest
+        Largest strength.
     """
-    low, high = _SMALLEST, _STRONGEST
+    low, high = _SMALLEST, strongest
     strength, best = 0.3, (math.inf, _SMALLEST)
     for _ in range(_TRIALS):
         try:
@@ -134,7 +150,7 @@ def strength_for(gap: Callable[[float], float], wished: float) -> float:
             reached = math.inf
         distance = abs(math.log(max(reached, 1e-12) / wished)) if math.isfinite(reached) else math.inf
         best = min(best, (distance, strength))
-        if distance < _CLOSE or (strength >= _STRONGEST and reached < wished):
+        if distance < _CLOSE or (strength >= strongest and reached < wished):
             break
         if reached > wished:
             high = min(high, strength)
@@ -144,7 +160,7 @@ def strength_for(gap: Callable[[float], float], wished: float) -> float:
         step = strength * wished / reached if 0.0 < reached < math.inf else 0.5 * strength
         inside = low < step < high
         strength = (
-            step if inside else (high if high == _STRONGEST and reached < wished else math.sqrt(low * high))
+            step if inside else (high if high == strongest and reached < wished else math.sqrt(low * high))
         )
     return best[1]
 
@@ -187,6 +203,7 @@ def sized(
     gap_of: Callable[[dict[str, float]], float],
     wished: float,
     least: float | None = None,
+    strongest: float = _STRONGEST,
 ) -> Sized:
     """Return an effect with the strength at which it causes a gap close to the requested size.
 
@@ -202,6 +219,8 @@ def sized(
         Gap to reach together with the noise, in units of the noise.
     least
         Smallest accepted gap; default is half of the requested one.
+    strongest
+        Largest strength.
 
     Raises
     ------
@@ -214,7 +233,7 @@ def sized(
         reached[strength] = gap_of(values_at(strength))
         return reached[strength]
 
-    strength = strength_for(gap, math.sqrt(wished**2 - 1.0))
+    strength = strength_for(gap, math.sqrt(wished**2 - 1.0), strongest)
     most = reached.get(strength, 0.0)
     if most < (_LEAST_OF_WISHED * wished if least is None else least):
         raise SimulationError(f"{name} causes a gap of at most {most:.2g} noise floors.")

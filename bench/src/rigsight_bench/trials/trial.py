@@ -33,6 +33,12 @@ class Trial:
         What it never sees.
     key
         The truth, ready for JSON.
+    modelled
+        Names of the effects that the given simulation has.
+    rig_file
+        Text of the rig's file; None for a built-in rig.
+    offsets_by_record
+        Whether each sensor has its own offset in each record.
     """
 
     rig: Rig
@@ -41,6 +47,9 @@ class Trial:
     records: tuple[Record, ...]
     withheld: tuple[Record, ...]
     key: dict[str, Any]
+    modelled: tuple[str, ...] = ()
+    rig_file: str | None = None
+    offsets_by_record: bool = False
 
 
 def off_by(rig: Rig, ends: tuple[float, float], rng: np.random.Generator) -> dict[str, float]:

@@ -1,0 +1,1 @@
+"""Design ``measured``: known causes are added to records that somebody measured."""

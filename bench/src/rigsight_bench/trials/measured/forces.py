@@ -1,0 +1,206 @@
+"""Force of an effect at a joint along a measured motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.effects import Effect, Place, effect_named, kind_of
+from rigsight.effects import symbols as canonical
+from rigsight.records import Record
+from rigsight.rigs import Joint, Rig, evaluated, rig_of_tables
+from rigsight.simulate import compose, simulate
+from rigsight_bench.trials.measured.motion import RecordMotion
+
+Floats = NDArray[np.float64]
+
+_AT_REST = 0.01
+"""Share of a large velocity (98th percentile) below which a velocity is noise and has no direction."""
+_LARGE = 98.0
+_ROUNDS = 60
+"""Rounds in which friction and the load that it depends on settle; each shortens the difference by the friction coefficient."""
+_ACCURACY = 1e-7
+_ELEMENT: dict[str, Any] = {
+    "name": "measured_joint",
+    "summary": "A joint moves as it was measured.",
+    "inputs": {"x": {"unit": "m"}},
+    "parameters": {
+        "k": {"unit": "N/m", "lower": -1e18},
+        "x_off": {"unit": "m", "default": 0.0, "lower": -1e9},
+        "m_j": {"unit": "kg", "default": 0.0, "lower": 0.0},
+    },
+    "coordinates": {"stroke": {"unit": "m", "prescribed_by": "x"}},
+    "joints": {"joint": {"motion": "stroke", "stiffness": "k", "rest": "x_off", "inertia": "m_j"}},
+    "sensors": {"force": {"reads": "force(joint)", "unit": "N"}},
+}
+"""A joint whose motion is prescribed: effects with a history are simulated on it."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotion:
+    """Motion of one joint along a record: from its rest `x`, velocity `v`, acceleration, and the joint's own numbers."""
+
+    record: Record
+    x: Floats
+    v: Floats
+    acceleration: Floats
+    rest: float
+    stiffness: float
+    load: Floats
+
+    @property
+    def directed(self) -> Floats:
+        """The velocity; where it is noise, small and in the direction of the motion before, until the next one begins."""
+        least = _AT_REST * float(np.percentile(np.abs(self.v), _LARGE))
+        signs = np.sign(self.v)
+        moving = np.flatnonzero(np.abs(self.v) >= least)
+        for left, right in pairwise(moving):
+            if right - left > 1:
+                there = signs[left + 1 : right]
+                turned = np.flatnonzero(there == signs[left])
+                last = left + 1 + (int(turned[-1]) + 1 if turned.size else 0)
+                signs[left + 1 : right] = signs[left]
+                if signs[right] != signs[left]:
+                    signs[last:right] = signs[right]
+        if moving.size:
+            signs[: moving[0]], signs[moving[-1] :] = signs[moving[0]], signs[moving[-1]]
+        return np.asarray(signs * np.maximum(np.abs(self.v), 1e-12 * least))
+
+
+def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]) -> JointMotion:
+    """Return the motion of a joint of a rig along a record.
+
+    Parameters
+    ----------
+    motion
+        Of the rig.
+    joint
+        One of its joints.
+    values
+        Constants and parameters of the rig by name.
+    """
+    equations, rig, record = motion.equations, motion.equations.rig, motion.record
+    numbers = {**values, **record.constants}
+    p = equations.parameters(values, record)
+    places = equations.at_places(motion.z, motion.u, p)
+    x, v = places[f"motion@{joint.name}"], places[f"rate@{joint.name}"]
+    along = equations.slopes_along(motion.z, motion.u, p)[joint.name] if equations.n_coordinates else None
+    if along is None:
+        # Of a joint along the prescribed coordinates themselves.
+        acceleration = np.gradient(v, record.dt)
+        for i, c in enumerate(rig.mechanism.prescribed):
+            if joint.motion == c.symbol:
+                acceleration = motion.u[3 * i + 2]
+    else:
+        acceleration = np.einsum("ik,ik->k", along, motion.a)
+    return JointMotion(
+        record,
+        x,
+        v,
+        acceleration,
+        evaluated(joint.rest, numbers),
+        evaluated(joint.stiffness, numbers),
+        _load(motion, joint, numbers),
+    )
+
+
+def _load(motion: RecordMotion, joint: Joint, numbers: Mapping[str, float]) -> Floats:
+    """Return what the joint carries with the drives as they are recorded."""
+    rig, equations = motion.equations.rig, motion.equations
+    signals: dict[str, Any] = dict(numbers)
+    for i, c in enumerate(rig.mechanism.free):
+        signals |= {c.symbol.name: motion.z[i], c.rate.name: motion.z[equations.n_coordinates + i]}
+    for i, c in enumerate(rig.mechanism.prescribed):
+        signals |= {c.symbol.name: motion.u[3 * i], c.rate.name: motion.u[3 * i + 1]}
+    for signal in rig.inputs:
+        signals[signal.name] = motion.record[signal.name]
+    carried = rig.mechanism.carried_by(joint)
+    drives = {sp.Symbol(d.name, real=True): d.signal for d in rig.mechanism.drives}
+    still = {c.rate: sp.S.Zero for c in rig.mechanism.coordinates}
+    own = joint.stiffness * (joint.motion - joint.rest) + joint.force.xreplace(still)
+    carried = (carried + own).xreplace(drives)
+    names = sorted(symbol.name for symbol in carried.free_symbols)
+    if not set(names) <= signals.keys():
+        return np.full(motion.record.n_samples, np.nan)
+    function = sp.lambdify([sp.Symbol(name, real=True) for name in names], carried, "numpy")
+    return np.asarray(np.broadcast_to(function(*(signals[name] for name in names)), motion.record.n_samples))
+
+
+def effect_force(effect: Effect, values: Mapping[str, float], motion: JointMotion) -> Floats:
+    """Return what an effect resists a joint with, beyond what its spring does, shape (n_samples,).
+
+    Parameters
+    ----------
+    effect
+        Of dynamics or disturbance.
+    values
+        Its parameters by their own names.
+    motion
+        Of the joint.
+    """
+    plain = effect_named(kind_of(effect.name))
+    if plain.place is Place.DISTURBANCE:
+        return _periodic(plain, values, motion)
+    if plain.states:
+        return _simulated(plain, values, motion)
+    if plain.deflection is not None:
+        return motion.stiffness * (_along(plain.deflection, values, motion, motion.load) - motion.x)
+    assert plain.torque is not None
+    if not plain.reads(canonical.load):
+        return _along(plain.torque, values, motion, motion.load)
+    # A drive that overcomes friction loads the joint with it.
+    force = np.zeros_like(motion.load)
+    for _ in range(_ROUNDS):
+        force = _along(plain.torque, values, motion, motion.load + force)
+    return force
+
+
+def _along(expression: sp.Expr, values: Mapping[str, float], motion: JointMotion, load: Floats) -> Floats:
+    signals = (motion.x, motion.directed, motion.x + motion.rest, motion.acceleration, load)
+    found = _compiled(expression, tuple(values))(*signals, *values.values())
+    return np.array(np.broadcast_to(found, motion.x.shape), dtype=np.float64)
+
+
+@cache
+def _compiled(expression: sp.Expr, names: tuple[str, ...]) -> Any:
+    plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2)
+    signals = (canonical.x, canonical.v, canonical.position, canonical.acceleration, canonical.load)
+    own = [sp.Symbol(name, real=True) for name in names]
+    return sp.lambdify((*signals, *own), plain, "numpy", cse=True)
+
+
+def _periodic(effect: Effect, values: Mapping[str, float], motion: JointMotion) -> Floats:
+    """Return the force of an effect of the time alone, whose phase is zero at the first sample of every record."""
+    assert effect.torque is not None
+    phases = {state.symbol: state.rate * canonical.t for state in effect.states}
+    own = {sp.Symbol(name, real=True): value for name, value in values.items()}
+    force = sp.lambdify(canonical.t, effect.torque.xreplace(phases).xreplace(own), "numpy")
+    return np.asarray(force(motion.record.dt * np.arange(motion.record.n_samples)))
+
+
+@cache
+def _element() -> Rig:
+    return rig_of_tables(_ELEMENT, "Measured joint")
+
+
+def _simulated(effect: Effect, values: Mapping[str, float], motion: JointMotion) -> Floats:
+    """Return the force of an effect with a history, from equilibrium at the first sample on."""
+    record = Record(
+        name=motion.record.name,
+        dt=motion.record.dt,
+        signals={"x": motion.x + motion.rest},
+        units={},
+        hold="foh",
+    )
+    structure, base = compose(_element(), [effect]), compose(_element())
+    own = {"k": motion.stiffness, "x_off": motion.rest, "m_j": 0.0}
+    named = {structure.parameter_name(effect, name): value for name, value in values.items()}
+    with_it = simulate(structure, {**own, **named}, record, accuracy=_ACCURACY)["force"]
+    return np.asarray(with_it - simulate(base, own, record, accuracy=_ACCURACY)["force"])

@@ -1,0 +1,137 @@
+"""Smooth motion of a rig along a measured record, and what its equations leave of the forces there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from rigsight.identify.rig_equations import RigEquations, equations_of
+from rigsight.identify.start.measured_states import measured_states, sensor_factors
+from rigsight.records import Record
+from rigsight.rigs import Rig
+from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
+
+Floats = NDArray[np.float64]
+
+_OF_MOTION = 0.99
+"""Share of the power of all velocities below the end of the band of a motion."""
+_WIDER = 3.0
+"""End of the band in which forces are compared, in units of that of the motion: forces hold overtones of it."""
+_HIGHEST = 0.8
+"""Share of the Nyquist frequency above which nothing is filtered."""
+_ORDER = 4
+
+
+@dataclass(frozen=True, eq=False)
+class RecordMotion:
+    """States, accelerations and inputs of a rig along one record.
+
+    Attributes
+    ----------
+    equations
+        Of the rig.
+    record
+        The record, with every input of the rig.
+    z, a, u
+        States (n_states, n_samples), second derivatives of the coordinates (n_coordinates, n_samples) and inputs with their
+        derivatives (3 n_inputs, n_samples).
+    """
+
+    equations: RigEquations
+    record: Record
+    z: Floats
+    a: Floats
+    u: Floats
+
+    @property
+    def sensors(self) -> list[int]:
+        """Numbers of the sensors that the record holds."""
+        names = self.equations.sensor_names
+        return [number for number, name in enumerate(names) if name in self.record]
+
+    def left(self, values: Mapping[str, float]) -> Floats:
+        """Return what the equations of motion need beside their forces, shape (n_equations, n_samples).
+
+        Where every motion is prescribed: the model of each force less its reading.
+
+        Parameters
+        ----------
+        values
+            Constants and parameters by name.
+        """
+        p = self.equations.parameters(values, self.record)
+        if self.equations.n_coordinates:
+            missing = self.a - self.equations.accelerations(self.z, self.u, p)
+            return np.asarray(np.einsum("kij,jk->ik", self.equations.mass(self.z, self.u, p), missing))
+        shown = self.equations.readings(self.z, self.u, p)
+        return np.array([shown[i] - self.record[self.equations.sensor_names[i]] for i in self.sensors])
+
+    def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> Floats:
+        """Return the derivatives of `left` by parameters, shape (n_names, n_equations, n_samples).
+
+        Parameters
+        ----------
+        values
+            Constants and parameters by name.
+        names
+            The parameters.
+        """
+        equations = self.equations
+        p = equations.parameters(values, self.record)
+        rows = equations.changes_of_equations(self.z, self.u, p, self.a)[1]
+        n, n_own = equations.n_coordinates, equations.n_states - 2 * equations.n_coordinates
+        chosen = list(range(n)) if n else [n_own + i for i in self.sensors]
+        columns = [equations.structure.names.index(name) for name in names]
+        return np.moveaxis(rows[chosen][:, columns], 0, 1)
+
+    def filtered(self, rows: Floats) -> Floats:
+        """Return rows (.., n_samples) without what is faster than the motion."""
+        n = self.equations.n_coordinates
+        speeds = self.z[n : 2 * n] if n else self.u[1::3]
+        power = np.sum(np.abs(np.fft.rfft(speeds * np.hanning(speeds.shape[1]))) ** 2, axis=0)
+        below = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
+        # In units of the Nyquist frequency.
+        end = _WIDER * 2.0 * float(np.searchsorted(below, _OF_MOTION) + 1) / speeds.shape[1]
+        if end >= _HIGHEST or rows.shape[-1] < 10 * _ORDER:
+            return rows
+        return np.asarray(sosfiltfilt(butter(_ORDER, end, output="sos"), rows, axis=-1))
+
+
+def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> RecordMotion | None:
+    """Return the motion of a rig along a record, or None if its sensors do not show it.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    record
+        Measured; an input that it does not hold is zero.
+    values
+        Constants and parameters; sensors must not depend on other ones.
+    """
+    equations = equations_of(rig)
+    still = {s.name: np.zeros(record.n_samples) for s in rig.inputs if s.name not in record}
+    complete = record.with_signals(**still) if still else record
+    u = equations.inputs_of(complete)[1]
+    n = equations.n_coordinates
+    if not equations.n_states:
+        nothing = np.zeros((0, record.n_samples))
+        return RecordMotion(equations, complete, nothing, nothing, u)
+    unknown = frozenset(p.name for p in rig.parameters if p.name not in values)
+    filled = {**{p.name: 1.0 for p in rig.parameters}, **values}
+    found = measured_states(
+        equations, complete, equations.parameters(filled, complete), sensor_factors(equations, unknown)
+    )
+    if found is None:
+        return None
+    z, a = found.z.copy(), np.zeros((n, record.n_samples))
+    for i in range(n):
+        if np.any(found.by_integral[i]):
+            z[n + i], a[i] = smooth_motion(z[n + i], record.dt)
+        else:
+            z[i], z[n + i], a[i] = accelerated_motion(z[i], record.dt)
+    return RecordMotion(equations, complete, z, a, u)
