@@ -29,14 +29,14 @@ from rigsight_bench.trial_process import START
 from rigsight_bench.trials import Trial, n_trials
 from rigsight_bench.trials.standard.subjects import standard_subject_of
 
+pytestmark = pytest.mark.slow
+
 SEED = 4711
 NAME = "617"
 """A number that would be seen wherever it leaks."""
 
 WATCHED = """
 import os, sys
-
-pytestmark = pytest.mark.slow
 forbidden = {forbidden!r}
 def watch(event, arguments):
     for argument in arguments:

@@ -31,6 +31,8 @@ TOLERANCES = {
     "_SMALL": "finite difference",
     "_STEP": "finite difference",
     "_DEPENDENT": "rank",
+    "_UNDETERMINED": "rank",
+    "_ROUNDED_COLUMN": "rank",
     "_DETERMINED": "rank",
     "_SINGULAR": "rank",
     "_AT_BOUND": "equality of floats",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -111,4 +112,6 @@ def _numbers(values: NDArray[np.float64]) -> list[float | None]:
     known = values[np.isfinite(values)]
     reach = float(np.ptp(known)) or abs(float(known[0])) if known.size else 0.0
     places = _DIGITS - math.ceil(math.log10(reach)) if reach else 0
-    return [value if math.isfinite(value) else None for value in np.round(values, places).tolist()]
+    # Numpy multiplies by a power of ten before it rounds, which overflows for the smallest floats.
+    shown = np.round(values, places) if places < sys.float_info.max_10_exp else values
+    return [value if math.isfinite(value) else None for value in shown.tolist()]
