@@ -301,7 +301,7 @@ def case(request: pytest.FixtureRequest) -> Case:
 
 @pytest.fixture(
     params=slow_but(
-        "flexible_mode", "end_stop", "maxwell_branch", "linear axis", "a saturated control law", "a mass matrix of coordinates",
+        "end_stop", "linear axis", "a saturated control law", "a mass matrix of coordinates",
         of=WRITTEN,
     )
 )  # fmt: skip
