@@ -104,7 +104,10 @@ def test_no_text_names_a_module_of_a_package_above() -> None:
     found = []
     for module in (ROOT / "src" / "rigsight").rglob("*.py"):
         own = module.relative_to(ROOT / "src" / "rigsight").with_suffix("").parts[0]
-        tree = ast.parse(module.read_text(encoding="utf-8"))
+        source = module.read_text(encoding="utf-8")
+        if not re.search(r"^(?!from |import ).*rigsight\.", source, re.MULTILINE):
+            continue
+        tree = ast.parse(source)
         reported = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in reported:

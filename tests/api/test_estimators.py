@@ -50,7 +50,14 @@ def test_unfitted_it_predicts_nothing(estimator: type, campaign: rs.Campaign) ->
         estimator().predict(campaign.records[0])
 
 
-@pytest.mark.parametrize("name", ["diagnoser", "identifier", "discoverer"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "identifier",
+        pytest.param("diagnoser", marks=pytest.mark.slow),
+        pytest.param("discoverer", marks=pytest.mark.slow),
+    ],
+)
 def test_fitting_leaves_a_result_and_a_model_that_predicts(
     name: str, campaign: rs.Campaign, request: pytest.FixtureRequest
 ) -> None:

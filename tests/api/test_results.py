@@ -121,6 +121,7 @@ def test_campaign_record_and_model_are_one_line_each(campaign: rs.Campaign, diag
     assert repr(diagnoser.model_) == "Model(rig='axis', effects=['cubic_stiffness'], hold='foh')"
 
 
+@pytest.mark.slow
 def test_a_page_quotes_what_made_it(diagnoser: rs.Diagnoser, tmp_path: Path) -> None:
     diagnoser.diagnosis_.save(tmp_path)
     page = unescape((tmp_path / "report.html").read_text("utf-8"))

@@ -17,7 +17,12 @@ def rigsight(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-    "arguments", [(), ("--design", "laboratory", "--trials", "3"), ("--merge", "a", "b")]
+    "arguments",
+    [
+        (),
+        pytest.param(("--design", "laboratory", "--trials", "3"), marks=pytest.mark.slow),
+        pytest.param(("--merge", "a", "b"), marks=pytest.mark.slow),
+    ],
 )
 def test_a_bench_that_is_not_installed_says_how_it_is(arguments: tuple[str, ...]) -> None:
     ran = rigsight("blind", *arguments)

@@ -22,6 +22,7 @@ def figures(run: Run, folder: Path) -> dict[str, object]:
     return {key: diagnosis[key] for key in ("verdict", "effects", "candidates", "gap", "gap_by_band")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("suffix", "write"),
     [pytest.param(".mat", write_matlab_packed, marks=pytest.mark.slow), (".tdms", write_tdms)],

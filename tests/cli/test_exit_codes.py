@@ -69,6 +69,7 @@ def test_a_path_that_cannot_exist_is_told(
         assert "defect" not in stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
 @pytest.mark.parametrize(
     ("stage", "candidates"),

@@ -135,6 +135,7 @@ def test_a_model_of_the_robot_is_written_back(tmp_path: Path, run: Run) -> None:
     assert "friction: 0.2" in (tmp_path / "cart.yaml").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_bodies_are_left_to_mujoco_with_what_binds_them(tmp_path: Path, run: Run) -> None:
     model, folder = tmp_path / "robot.xml", tmp_path / "stage"
     limited = CART.read_text("utf-8").replace('damping="0.5"', 'damping="0.5" range="-1 1" limited="true"')

@@ -77,6 +77,7 @@ def test_support_and_coefficients_are_recovered(truth: str, noise: float, discov
             assert term.inclusion < 0.5, term.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "there", "rival"),
     [

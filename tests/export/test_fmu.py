@@ -130,7 +130,7 @@ the exported C, as is tested with its sources, and every model is held to the en
 
 @pytest.mark.parametrize("target", VERSIONS)
 @pytest.mark.parametrize(
-    "name", slow_but("all delays", "one effect twice", "a prescribed road", of=ALL_THAT_A_WRAPPER_TELLS)
+    "name", slow_but("one effect twice", "a prescribed road", of=ALL_THAT_A_WRAPPER_TELLS)
 )
 def test_it_gives_the_outputs_of_the_engine_to_rounding(name: str, target: str, case_named, tmp_path: Path):
     case = case_named(name)
@@ -140,7 +140,9 @@ def test_it_gives_the_outputs_of_the_engine_to_rounding(name: str, target: str, 
 
 
 @pytest.mark.parametrize("target", VERSIONS)
-@pytest.mark.parametrize("name", ["axis held constant", "all delays", "jumps into kinks"])
+@pytest.mark.parametrize(
+    "name", slow_but("all delays", of=["axis held constant", "all delays", "jumps into kinks"])
+)
 def test_fmpy_simulates_a_constant_hold_by_itself(name: str, target: str, case_named, tmp_path: Path):
     case = case_named(name)
     signal = np.array(list(zip(case.t, case.inputs[0], strict=True)), dtype=[("time", float), ("u", float)])

@@ -130,6 +130,7 @@ def test_where_functions_cost_or_friction_is_dry_derivatives_are_carried_along()
         assert not carries_tangents(compose(AXIS, map(effect_named, others)))
 
 
+@pytest.mark.slow
 def test_a_late_sensor_is_fitted_late_whichever_it_is() -> None:
     rig = RIGS["cart_pendulum"]
     t = DT * np.arange(N_SAMPLES)

@@ -158,6 +158,7 @@ def test_a_matlab_variable_without_its_parts_is_refused(
     assert ("damaged" in message) == (not is_sound)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bomb", BOMBS)
 def test_a_matlab_file_that_declares_more_than_it_holds_is_refused(tmp_path: Path, bomb: str) -> None:
     path = tmp_path / "run.mat"

@@ -14,6 +14,8 @@ from rigsight.records import ColumnMapping, ReadingOptions, Record, read_record
 from rigsight.records.formats.channel_file import open_channels
 from rigsight.records.formats.stored_numbers import Stored, stored_by
 
+from ..tiers import slow_but
+
 
 @dataclass(frozen=True)
 class Named:
@@ -82,7 +84,10 @@ def test_bytes_that_are_unsigned_are_read_so() -> None:
     assert stored.quantity(np.array([-1, 1], dtype=np.int8)).tolist() == [510.0, 2.0]
 
 
-@pytest.mark.parametrize("name", ["scale", "gain", "Factor", "cal_slope", "scaling_factor", "offset"])
+@pytest.mark.parametrize(
+    "name",
+    slow_but("Factor", "offset", of=["scale", "gain", "Factor", "cal_slope", "scaling_factor", "offset"]),
+)
 def test_an_attribute_of_no_convention_is_asked_about(tmp_path: Path, name: str) -> None:
     path = write_hdf5(tmp_path / "run.h5", COUNTS, **{name: 0.25})
     with pytest.raises(InputError) as caught:

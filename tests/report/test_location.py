@@ -63,6 +63,7 @@ def test_amplitudes_that_are_one_record_each_are_not_drawn_twice(diagnosis: Diag
     assert "0.25 A sweep_A0.25.csv; 0.75 A sweep_A0.75.csv." in maps.figures[2].caption
 
 
+@pytest.mark.slow
 def test_without_a_force_the_map_of_states_shows_the_residual_alone(diagnosis: Diagnosis) -> None:
     blind = tuple(replace(part, force_mean=math.nan) for part in diagnosis.localization.by_state)
     where = replace(diagnosis.localization, by_state=blind)
@@ -71,6 +72,7 @@ def test_without_a_force_the_map_of_states_shows_the_residual_alone(diagnosis: D
     assert "force missing in the equations" not in str(maps.figures[1].image)
 
 
+@pytest.mark.slow
 def test_the_budget_shows_its_intervals(page_of: Callable[[str], str]) -> None:
     page = words(page_of("effect"))
     assert "39 % to 45 %" in page

@@ -10,6 +10,8 @@ import pytest
 
 from rigsight.diagnose.result import Diagnosis
 
+from ..tiers import slow_but
+
 VOID = {"meta", "br", "img", "input", "link", "hr", "col"}
 VARIANTS = (
     "effect", "two effects", "own effect", "parameters", "none", "unknown", "no candidates", "not finite", "no validation",
@@ -51,7 +53,9 @@ class Page(HTMLParser):
         return " ".join(" ".join(self.text).split())
 
 
-@pytest.fixture(params=VARIANTS)
+@pytest.fixture(
+    params=slow_but("effect", "two effects", "unknown", "none", "not finite", "hostile", of=VARIANTS)
+)
 def html(request: pytest.FixtureRequest, page_of: Callable[[str], str]) -> str:
     return page_of(request.param)
 

@@ -72,6 +72,7 @@ def test_numbers_that_are_the_same_need_no_experiment(diagnosis: Diagnosis) -> N
     assert "next experiment" not in page(found)
 
 
+@pytest.mark.slow
 def test_where_it_was_not_asked_nothing_is_said(diagnosis: Diagnosis) -> None:
     without = replace(diagnosis, trust=None)
     assert trust_line(without) == ""

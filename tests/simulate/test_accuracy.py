@@ -61,6 +61,7 @@ def truths(hysteresis_sets, sweep):
     return {name: hysteretic_truth(hysteresis_sets[name], sweep) for name in SETS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_default_accuracy_is_met_on_the_published_hysteresis(
     name, hysteretic, hysteresis_sets, sweep, truths, make_record, error_of

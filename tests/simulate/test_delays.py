@@ -110,7 +110,7 @@ def assert_same(found: Floats, expected: Floats) -> None:
         ("sensor_delay@angle", 0.013, "saturated", "zoh"),
         pytest.param("input_delay@motor", 0.013, "within range", "zoh", marks=pytest.mark.slow),
         pytest.param("input_delay@motor", 0.013, "saturated", "foh", marks=pytest.mark.slow),
-        ("input_delay@motor", 0.0017, "saturated", "zoh"),
+        pytest.param("input_delay@motor", 0.0017, "saturated", "zoh", marks=pytest.mark.slow),
     ],
 )
 def test_a_delay_within_a_loop(effect: str, delay: float, goal: str, hold: Hold) -> None:

@@ -28,6 +28,7 @@ def test_noise_is_smoothed_as_by_exact_cross_validation(noise):
     assert np.std(value - clean) < 0.5 * noise
 
 
+@pytest.mark.slow
 def test_threads_smooth_more_motions_than_are_kept(monkeypatch):
     interval = sys.getswitchinterval()
     monkeypatch.setattr("rigsight.simulate.prescribed_motion._CACHED_SAMPLES", 100)

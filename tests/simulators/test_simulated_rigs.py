@@ -18,6 +18,8 @@ from rigsight.simulate import compose, parameter_vector, record_input, simulate,
 from rigsight.simulate.side_by_side import simulate_tangents
 from rigsight.simulators import give_function
 
+from ..tiers import slow_but
+
 _SPEC = importlib.util.spec_from_file_location("cart_pendulum", Path(__file__).parent / "cart_pendulum.py")
 cart = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(cart)
@@ -57,7 +59,7 @@ def rig_of(way: str, folder: Path):
 @pytest.mark.parametrize(
     ("way", "effects"),
     [
-        *((way, ()) for way in WAYS),
+        *slow_but(("fmu 3.0", ()), ("python", ()), of=[(way, ()) for way in WAYS]),
         pytest.param("mujoco", ("coulomb_friction",), marks=pytest.mark.slow),
         pytest.param("fmu 2.0", ("coulomb_friction",), marks=pytest.mark.slow),
         ("mujoco", ("backlash", "input_delay")),
@@ -108,6 +110,7 @@ def test_parameter_sets_side_by_side_do_not_get_into_each_others_way(way, folder
         np.testing.assert_allclose(out[:, 1, i], one["angle"], rtol=0.0, atol=1e-5 * np.ptp(one["angle"]))
 
 
+@pytest.mark.slow
 def test_contacts_limits_and_tendons_stay_in_mujoco(folder):
     import mujoco
 

@@ -126,6 +126,7 @@ def test_a_memory_beside_offsets_is_named_alone() -> None:
     assert len(reported(found)) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effects",
     [

@@ -63,6 +63,7 @@ def test_the_joint_of_the_friction_comes_first_and_lacks_it(
     assert own[0].units["force_mean"] == "N m"
 
 
+@pytest.mark.slow
 def test_the_cells_of_each_plane_add_up_to_the_gap(hidden: tuple[tuple[StatePart, ...], list[Trace]]) -> None:
     parts, (trace,) = hidden
     for joint in ("shaft", "motor_bearing", "load_bearing"):

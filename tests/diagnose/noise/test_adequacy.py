@@ -261,6 +261,7 @@ def test_noise_that_only_motion_makes_is_no_noise_of_a_sensor() -> None:
     assert found.goes_with == "how far dynamics moves"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("disturbance", slow_but(0.5, of=[0.0, 0.5]))
 def test_noise_and_disturbance_are_as_large_where_nothing_moves(disturbance: float) -> None:
     adequate = []

@@ -150,13 +150,13 @@ CASES = [
 ]  # fmt: skip
 
 
-ONE_OF_EACH_PLACE = {"speed_limit on axis", "power_law_stiffness on axis", "inertia on element"}
+ONE_OF_EACH_RIG = {"power_law_stiffness on axis", "inertia on element"}
 
 
 @pytest.mark.parametrize(
     "case",
     [
-        pytest.param(case, id=str(case), marks=() if str(case) in ONE_OF_EACH_PLACE else pytest.mark.slow)
+        pytest.param(case, id=str(case), marks=() if str(case) in ONE_OF_EACH_RIG else pytest.mark.slow)
         for case in CASES
     ],
 )

@@ -32,6 +32,7 @@ def plausible(structure, values, scales):
 AXIS_SCALES = {"x": 0.02, "force": 1.0, "drive": 1.0, "input": 1.0, "time": 0.1, "length": 0.01}
 
 
+@pytest.mark.slow
 def test_all_effects_together(hysteresis_sets, make_record):
     structure = compose(RUNNING_GEAR, [effect for effect in CATALOGUE if RUNNING_GEAR.offers(effect)])
     scales = {"x": 0.02, "force": 0.8, "drive": 0.8, "input": 1.0, "time": 0.1, "length": 0.01}

@@ -162,6 +162,7 @@ def test_a_hardening_spring_is_said_to_exceed_the_order_of_the_model(hardening: 
     )
 
 
+@pytest.mark.slow
 def test_no_set_serves_a_hardening_spring_and_its_lateral_part_stays_clean(hardening: Identification) -> None:
     joint = hardening.joint
     assert joint.statement.startswith("No single parameter set fits all 3")

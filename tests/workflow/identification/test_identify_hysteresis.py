@@ -103,6 +103,7 @@ def check_recovered(found: Identification, truth: Mapping[str, float], expected:
         assert one.value == pytest.approx(true, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_hysteresis_of_an_axis_comes_back(axis: Identification) -> None:
     check_recovered(axis, OF_AXIS, {"m", "k", "d", "x_off", "a", "beta", "gamma", "n"})
 

@@ -47,6 +47,7 @@ def diagnosed(campaign: Path, stop_at: str | None = None, said: list[Step] | Non
     return run_diagnose(campaign, None, effects=CANDIDATES, n_jobs=1, listener=listener)
 
 
+@pytest.mark.slow
 def test_finished_fits_are_recalled_and_the_result_is_the_same(
     axis_campaign: Path, journals: Path, counted: list[int]
 ) -> None:
