@@ -19,12 +19,11 @@ from rigsight.effects import kind_of
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import SimulationError
+from rigsight.inverse import RecordMotion, effect_force, joint_motion, record_motion
 from rigsight.records import Record
 from rigsight.rigs import evaluated
 from rigsight.rigs.rig import joint_of
 from rigsight_bench.trials.measured.base import Base
-from rigsight_bench.trials.measured.forces import effect_force, joint_motion
-from rigsight_bench.trials.measured.motion import RecordMotion, record_motion
 from rigsight_bench.trials.measured.spots import DELAYS, Spot
 
 Floats = NDArray[np.float64]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ _WIDER = 3.0
 _HIGHEST = 0.8
 """Share of the Nyquist frequency above which nothing is filtered."""
 _ORDER = 4
+_ABOVE = 1.2
+"""Sampling rate of filtered rows, in units of twice the end of their band."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,17 +91,52 @@ class RecordMotion:
         columns = [equations.structure.names.index(name) for name in names]
         return np.moveaxis(rows[chosen][:, columns], 0, 1)
 
-    def filtered(self, rows: Floats) -> Floats:
-        """Return rows (.., n_samples) without what is faster than the motion."""
+    def with_reading_changed(
+        self, name: str, change: Floats, values: Mapping[str, float]
+    ) -> tuple[Floats, Floats] | None:
+        """Return the changes of `z` and `a` by a small change of one reading; None where it reads no coordinate or rate alone.
+
+        The change is smooth: it is differentiated as it is.
+        """
+        equations, n, dt = self.equations, self.equations.n_coordinates, self.record.dt
+        p = equations.parameters(values, self.record)
+        slopes = equations.readings_by_state(self.z, self.u, p)[self.sensors]
+        own = [equations.sensor_names[i] for i in self.sensors].index(name)
+        reads_place, reads_rate = np.any(slopes[own, :n]), np.any(slopes[own, n : 2 * n])
+        if reads_place == reads_rate or np.any(slopes[own, 2 * n :]):
+            return None
+        first = 0 if reads_place else n
+        by_reading = np.linalg.pinv(np.moveaxis(slopes[:, first : first + n], 2, 0))[:, :, own].T * change
+        z = np.zeros_like(self.z)
+        z[first : first + n] = by_reading
+        if reads_place:
+            z[n : 2 * n] = np.gradient(by_reading, dt, axis=1)
+        else:
+            z[:n] = dt * np.cumsum(by_reading, axis=1)
+        return z, np.gradient(z[n : 2 * n], dt, axis=1)
+
+    def moved_by(self, change: tuple[Floats, Floats], step: float) -> RecordMotion:
+        """Return the motion with a multiple of a change of `z` and `a`."""
+        return replace(self, z=self.z + step * change[0], a=self.a + step * change[1])
+
+    @cached_property
+    def band(self) -> float:
+        """End of the band in which forces are compared, in units of the Nyquist frequency."""
         n = self.equations.n_coordinates
         speeds = self.z[n : 2 * n] if n else self.u[1::3]
         power = np.sum(np.abs(np.fft.rfft(speeds * np.hanning(speeds.shape[1]))) ** 2, axis=0)
         below = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
-        # In units of the Nyquist frequency.
-        end = _WIDER * 2.0 * float(np.searchsorted(below, _OF_MOTION) + 1) / speeds.shape[1]
-        if end >= _HIGHEST or rows.shape[-1] < 10 * _ORDER:
+        return float(_WIDER * 2.0 * (np.searchsorted(below, _OF_MOTION) + 1) / speeds.shape[1])
+
+    def filtered(self, rows: Floats) -> Floats:
+        """Return rows (.., n_samples) without what is faster than the motion."""
+        if self.band >= _HIGHEST or rows.shape[-1] < 10 * _ORDER:
             return rows
-        return np.asarray(sosfiltfilt(butter(_ORDER, end, output="sos"), rows, axis=-1))
+        return np.asarray(sosfiltfilt(butter(_ORDER, self.band, output="sos"), rows, axis=-1))
+
+    def thinned(self, rows: Floats) -> Floats:
+        """Return filtered rows at those samples only that are nearly independent."""
+        return self.filtered(rows)[..., :: max(1, int(1.0 / (_ABOVE * self.band)))]
 
 
 def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> RecordMotion | None:

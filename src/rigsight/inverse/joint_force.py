@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from rigsight.effects import Effect, Place, effect_named, kind_of
 from rigsight.effects import symbols as canonical
+from rigsight.inverse.measured_motion import RecordMotion
 from rigsight.records import Record
 from rigsight.rigs import Joint, Rig, evaluated, rig_of_tables
 from rigsight.simulate import compose, simulate
-from rigsight_bench.trials.measured.motion import RecordMotion
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class JointMotion:
     stiffness: float
     load: Floats
 
-    @property
+    @cached_property
     def directed(self) -> Floats:
         """The velocity; where it is noise, small and in the direction of the motion before, until the next one begins."""
         least = _AT_REST * float(np.percentile(np.abs(self.v), _LARGE))

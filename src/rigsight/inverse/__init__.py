@@ -1,0 +1,18 @@
+"""Inverse dynamics along the measured motion: which forces the equations lack, before anything is simulated."""
+
+from rigsight.inverse.equation_fit import EquationFit as EquationFit
+from rigsight.inverse.equation_fit import generalized as generalized
+from rigsight.inverse.equation_fit import held_numbers as held_numbers
+from rigsight.inverse.equation_fit import matters as matters
+from rigsight.inverse.equation_fit import of_undriven as of_undriven
+from rigsight.inverse.equation_fit import record_motions as record_motions
+from rigsight.inverse.equation_fit import size_in as size_in
+from rigsight.inverse.equation_fit import with_all_inputs as with_all_inputs
+from rigsight.inverse.joint_force import JointMotion as JointMotion
+from rigsight.inverse.joint_force import effect_force as effect_force
+from rigsight.inverse.joint_force import joint_motion as joint_motion
+from rigsight.inverse.measured_motion import RecordMotion as RecordMotion
+from rigsight.inverse.measured_motion import record_motion as record_motion
+from rigsight.inverse.proposal import Proposal as Proposal
+from rigsight.inverse.proposal import ProposedCause as ProposedCause
+from rigsight.inverse.proposal import propose as propose

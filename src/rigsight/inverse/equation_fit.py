@@ -1,0 +1,239 @@
+"""Numbers of the equations of motion by regression along the measured motion, and the forces that they leave unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from rigsight.effects import Effect
+from rigsight.errors import SimulationError
+from rigsight.inverse.joint_force import JointMotion, effect_force, joint_motion
+from rigsight.inverse.measured_motion import RecordMotion, record_motion
+from rigsight.records import Record
+from rigsight.rigs import Joint, Rig
+from rigsight.rigs.rig import joint_of
+from rigsight.simulate import compose
+
+Floats = NDArray[np.float64]
+
+_ROUNDS = 12
+_SETTLED = 1e-6
+_RANK = 1e-9
+
+
+def held_numbers(rig: Rig) -> set[str]:
+    """Return the names of the parameters that set the scale of all forces: those of the drives."""
+    read = {
+        s.name
+        for drive in rig.mechanism.drives
+        for s in (drive.force.free_symbols | drive.signal.free_symbols)
+    }
+    return {p.name for p in rig.parameters} & read
+
+
+def with_all_inputs(rig: Rig, record: Record) -> Record:
+    """Return a record with every input of a rig; what it does not hold is zero."""
+    still = {s.name: np.zeros(record.n_samples) for s in rig.inputs if s.name not in record}
+    return record.with_signals(**still) if still else record
+
+
+def record_motions(rig: Rig, records: Sequence[Record], known: Mapping[str, float]) -> list[RecordMotion]:
+    """Return the motion along each record; raises `SimulationError` where the sensors do not show it."""
+    found = [record_motion(rig, record, known) for record in records]
+    motions = [motion for motion in found if motion is not None]
+    if len(motions) < len(records):
+        raise SimulationError(f"The sensors of a record do not show the whole motion of {rig.name}.")
+    return motions
+
+
+def matters(motions: Sequence[RecordMotion], values: Mapping[str, float], name: str) -> bool:
+    """Return True if a parameter has an influence on the equations along the motions."""
+    return any(bool(np.any(motion.slopes(values, [name]))) for motion in motions)
+
+
+def of_undriven(motions: Sequence[RecordMotion], values: Mapping[str, float]) -> set[str]:
+    """Return the names of the parameters in equations of motion that no drive enters."""
+    motion = motions[0]
+    equations, rig = motion.equations, motion.equations.rig
+    if not equations.n_coordinates:
+        return set()
+    p = equations.parameters(values, motion.record)
+    along = equations.slopes_along(motion.z, motion.u, p)
+    driven = np.any([np.any(along[drive.name], axis=1) for drive in rig.mechanism.drives], axis=0)
+    names = [parameter.name for parameter in rig.parameters]
+    slopes = motion.slopes(values, names)
+    return {name for name, own in zip(names, slopes, strict=True) if np.any(own[~driven])}
+
+
+class EquationFit:
+    """The error of equations along motions as a function of their numbers."""
+
+    def __init__(
+        self, rig: Rig, motions: Sequence[RecordMotion], modelled: Sequence[Effect], free: Sequence[str]
+    ) -> None:
+        self.rig, self.motions, self.modelled, self.free = rig, motions, modelled, list(free)
+        self.structure = compose(rig, modelled)
+        parameters = {p.name: p for p in self.structure.parameters}
+        self.bounds = [(parameters[name].lower, parameters[name].upper) for name in free]
+
+    def rows(self, values: Mapping[str, float]) -> list[Floats]:
+        """Return the residual of each equation along each motion, in the band of the motion."""
+        return [motion.filtered(self.residual(motion, values)) for motion in self.motions]
+
+    def residual(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
+        """Return the residual of each equation along one motion in its whole band, shape (n_equations, n_samples)."""
+        own = motion.left(values)
+        for effect in self.modelled:
+            own = own + self._along(motion, effect, self._own(effect, values), values)
+        return own
+
+    def left(self, values: Mapping[str, float]) -> Floats:
+        """Return the RMS of each equation."""
+        return _rms(self.rows(values))
+
+    def settled(self, start: Mapping[str, float]) -> tuple[dict[str, float], Floats]:
+        """Return the numbers with the smallest residual near a start, and its RMS in each equation.
+
+        Raises
+        ------
+        SimulationError
+            If the equations cannot be evaluated along the motions, or leave nothing at all.
+        """
+        values, left = dict(start), self.left(start)
+        for _ in range(_ROUNDS):
+            moved, _ = self.step(values, left)
+            now = self.left(moved)
+            better = size_in(now, left)
+            if not better < 1.0:
+                break
+            values, left = moved, now
+            if better > 1.0 - _SETTLED:
+                break
+        if not np.all(np.isfinite(left)) or np.any(left <= 0.0):
+            raise SimulationError(f"The equations of {self.rig.name} have no residual along these records.")
+        return values, left
+
+    def step(self, values: Mapping[str, float], unit: Floats) -> tuple[dict[str, float], Floats]:
+        """Return numbers that are better where the equations are linear in them, and what these would leave there."""
+        rows = self.rows(values)
+        by = [motion.filtered(self.slopes(motion, values)) for motion in self.motions]
+        weight = np.where(unit > 0.0, unit, 1.0)[:, None]
+        target = np.concatenate([(own / weight).ravel() for own in rows])
+        matrix = np.concatenate([(own / weight).reshape(len(self.free), -1) for own in by], axis=1).T
+        size = np.sqrt(np.mean(matrix**2, axis=0))
+        size[size == 0.0] = 1.0
+        now = np.array([values[name] for name in self.free])
+        ends = np.array(self.bounds).reshape(-1, 2)
+        q, r = np.linalg.qr(matrix / size)
+        # Directions that nothing determines stay where they are.
+        held = _RANK * float(np.max(np.abs(r), initial=0.0)) * np.eye(r.shape[1])
+        low, high = (ends[:, 0] - now) * size, (ends[:, 1] - now) * size
+        narrow = high <= low
+        high = np.where(narrow, low + 1e-12 * np.maximum(1.0, np.abs(low)), high)
+        if self.free:
+            change = lsq_linear(
+                np.concatenate([r, held]), -np.r_[q.T @ target, np.zeros(len(held))], (low, high)
+            ).x
+        else:
+            change = np.zeros(0)
+        moved = dict(zip(self.free, map(float, now + change / size), strict=True))
+        after = target + (matrix / size) @ change
+        parts, first = [], 0
+        for own in rows:
+            parts.append(after[first : first + own.size].reshape(own.shape) * weight)
+            first += own.size
+        return {**values, **moved}, _rms(parts)
+
+    def unexplained(self, changed: EquationFit, values: Mapping[str, float], unit: Floats) -> Floats:
+        """Return the RMS of the change of each equation that no numbers of these equations explain.
+
+        Parameters
+        ----------
+        changed
+            The same equations along changed motions.
+        values
+            Numbers at which both are evaluated.
+        unit
+            Of each equation.
+        """
+        pairs = zip(self.rows(values), changed.rows(values), strict=True)
+        changes = [after - before for before, after in pairs]
+        weight = unit[:, None]
+        target = np.concatenate([(own / weight).ravel() for own in changes])
+        if self.free:
+            by = [motion.filtered(self.slopes(motion, values)) / weight for motion in self.motions]
+            matrix = np.concatenate([own.reshape(len(self.free), -1) for own in by], axis=1).T
+            size = np.sqrt(np.mean(matrix**2, axis=0))
+            matrix = matrix / np.where(size > 0.0, size, 1.0)
+            target = target - matrix @ np.linalg.lstsq(matrix, target, rcond=_RANK)[0]
+        parts, first = [], 0
+        for own in changes:
+            parts.append(target[first : first + own.size].reshape(own.shape) * weight)
+            first += own.size
+        return _rms(parts)
+
+    def slopes(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
+        """Return the derivatives of `residual` by the free numbers along one motion, shape (n_free, n_equations, n_samples)."""
+        of_rig = [name for name in self.free if name in motion.equations.structure.names]
+        found = list(motion.slopes(values, of_rig)) if of_rig else []
+        for effect in self.modelled:
+            for p in effect.parameters:
+                if self.structure.parameter_name(effect, p.name) in self.free:
+                    # Dry friction, which is linear in its number.
+                    found.append(self._along(motion, effect, {p.name: 1.0}, values))
+        return np.array(found) if found else np.zeros((0, 1, motion.record.n_samples))
+
+    def _own(self, effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
+        return {p.name: values[self.structure.parameter_name(effect, p.name)] for p in effect.parameters}
+
+    def _along(
+        self, motion: RecordMotion, effect: Effect, own: Mapping[str, float], values: Mapping[str, float]
+    ) -> Floats:
+        return generalized(
+            motion, effect, own, values, joint_motion(motion, joint_of(self.rig, effect), values)
+        )
+
+
+def generalized(
+    motion: RecordMotion,
+    effect: Effect,
+    own: Mapping[str, float],
+    values: Mapping[str, float],
+    moved: JointMotion,
+) -> Floats:
+    """Return what an effect adds to `RecordMotion.left`.
+
+    Parameters
+    ----------
+    motion
+        Of the rig.
+    effect
+        At a joint.
+    own
+        Its parameters by their own names.
+    values
+        Constants and parameters of the rig.
+    moved
+        Motion of the joint.
+    """
+    equations = motion.equations
+    joint: Joint = joint_of(equations.rig, effect)
+    force = effect_force(effect, own, moved)
+    if equations.n_coordinates:
+        p = equations.parameters(values, motion.record)
+        return np.asarray(equations.slopes_along(motion.z, motion.u, p)[joint.name] * force)
+    reading = [s.name for s in equations.rig.mechanism.sensors if f"force({joint.name})" in str(s.reads)]
+    names = [equations.sensor_names[i] for i in motion.sensors]
+    return np.array([force if name in reading else np.zeros_like(force) for name in names])
+
+
+def size_in(left: Floats, unit: Floats) -> float:
+    """Return residuals of equations in units of other ones, as one number."""
+    return float(np.sqrt(np.mean((left / unit) ** 2)))
+
+
+def _rms(rows: Sequence[Floats]) -> Floats:
+    return np.asarray(np.sqrt(np.mean(np.concatenate(rows, axis=1) ** 2, axis=1)))
