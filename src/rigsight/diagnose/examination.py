@@ -88,11 +88,11 @@ def examine(
         freed = with_offsets_free(campaign)
         again = examine(freed, effects, rng, n_jobs, say, prepare, memory, at_rest)
         return replace(again, quality=replace(again.quality, findings=(asked, *again.quality.findings)))
-    models = with_several_effects(campaign, noise, alone, effects, lower_bound, allowed, rng, say, ready)
+    models = with_several_effects(campaign, noise, alone, lower_bound, allowed, rng, say, ready)
     context, before, reidentified = models.alone.context, models.alone.before, models.alone.reidentified
     checks = models.checks
     vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)
-    ranking, imitations = _ranked(models, effects, vector, allowed, rng)
+    ranking, imitations = _ranked(models, alone.effects, vector, allowed, rng)
     is_usable = bool(ranking.order) and bool(ranking.order[0].residuals) and ranking.probabilities[0] > 0.0
     best, tied = (ranking.order[0], ranking.tied) if is_usable else (reidentified, ())
     judgement = judge(

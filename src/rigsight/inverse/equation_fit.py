@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 _ROUNDS = 12
 _SETTLED = 1e-6
 _RANK = 1e-9
+_DEPENDENT = 1e-6
 
 
 def held_numbers(rig: Rig) -> set[str]:
@@ -146,6 +147,15 @@ class EquationFit:
             parts.append(after[first : first + own.size].reshape(own.shape) * weight)
             first += own.size
         return {**values, **moved}, _rms(parts)
+
+    def independent(self, values: Mapping[str, float]) -> tuple[str, ...]:
+        """Return the free numbers whose influence is not a sum of the influences of those before them."""
+        slopes = [motion.filtered(self.slopes(motion, values)) for motion in self.motions]
+        matrix = np.concatenate([own.reshape(len(self.free), -1) for own in slopes], axis=1).T
+        size = np.sqrt(np.mean(matrix**2, axis=0))
+        own = np.abs(np.diag(np.linalg.qr(matrix / np.where(size > 0.0, size, 1.0), mode="r")))
+        enough = _DEPENDENT * float(np.max(own, initial=0.0))
+        return tuple(name for name, part in zip(self.free, own, strict=True) if part > enough)
 
     def unexplained(self, changed: EquationFit, values: Mapping[str, float], unit: Floats) -> Floats:
         """Return the RMS of the change of each equation that no numbers of these equations explain.

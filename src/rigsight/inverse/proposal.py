@@ -43,6 +43,9 @@ _MOST_CAUSES = 5
 _WORTH = 0.03
 """Least share of the residual that a further family must remove from stretches that it was not fitted to."""
 _SMOOTH = 1e-9
+_DECISIVE = 0.25
+_NEAR = 0.5
+"""Share of what the best family explains from which on another one may be the cause."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,19 @@ class Proposal:
     judged: frozenset[str]  # names of the effects that are terms of this regression
     # Share of the squared residual that those taken remove together.
     explained: float
+
+    @property
+    def is_decisive(self) -> bool:
+        """Whether one family alone explains a good part of what the equations leave."""
+        return bool(self.alone) and self.alone[0].share >= _DECISIVE
+
+    def candidates(self, rig: Rig, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the effects worth fitting: of families that were taken or explain nearly as much, and those not judged."""
+        if not self.is_decisive:
+            return list(effects)
+        near = {(c.family, c.where) for c in self.alone if c.share >= _NEAR * self.alone[0].share}
+        near |= {(cause.family, cause.where) for cause in self.taken}
+        return [e for e in effects if e.name not in self.judged or (e.family, rig.where(e)) in near]
 
 
 def propose(campaign: Campaign, known: Mapping[str, float], effects: Sequence[Effect]) -> Proposal | None:
@@ -103,7 +119,11 @@ def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit
     motions = record_motions(rig, campaign.records, start)
     held |= of_undriven(motions, start)
     free = tuple(p.name for p in rig.parameters if p.name not in held and matters(motions, start, p.name))
-    fit = EquationFit(rig, motions, campaign.modelled, free)
+    # A constant force and the rest of a spring do the same: the rest stays where it is known.
+    of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
+    ordered = sorted(free, key=lambda name: name in of_rest)
+    fit = EquationFit(rig, motions, campaign.modelled, ordered)
+    fit = EquationFit(rig, motions, campaign.modelled, fit.independent(start))
     return fit, fit.settled(start)[0]
 
 

@@ -24,6 +24,7 @@ from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
+from rigsight.inverse import Proposal, propose
 from rigsight.simulate import Structure
 
 
@@ -38,6 +39,9 @@ class SingleModels:
     reidentified: FittedModel
     singles: list[FittedModel]  # every effect by itself
     search: Search  # where and for which effects was searched
+    # What the motion says of the missing force before any fit; None where the sensors do not show the motion.
+    proposal: Proposal | None
+    effects: tuple[Effect, ...]  # candidates that are worth fitting
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,10 @@ def single_models(
             f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
     say("re-identified")
+    proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects)
+    if proposal is not None:
+        effects = proposal.candidates(campaign.rig, effects)
+        say("missing force")
     while True:
         context = _with_known_motion(campaign, context, reidentified)
         search, singles = _singles(context, reidentified, effects, say, prepare)
@@ -83,7 +91,7 @@ def single_models(
     before = _before(campaign, context, reidentified)
     if campaign.given:
         say("given simulation")
-    return SingleModels(windowing, context, before, reidentified, singles, search)
+    return SingleModels(windowing, context, before, reidentified, singles, search, proposal, tuple(effects))
 
 
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:
@@ -126,7 +134,6 @@ def with_several_effects(
     campaign: Campaign,
     noise: Mapping[str, float],
     models: SingleModels,
-    effects: Sequence[Effect],
     lower_bound: bool,
     allowed: float,
     rng: np.random.Generator,
@@ -146,7 +153,7 @@ def with_several_effects(
             return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms)
     checks = Checks(context, rng, VERDICT.at_floor, most_remainder)
     found = several_effects(
-        context, models.reidentified, models.singles, effects, forms, checks, lower_bound, prepare
+        context, models.reidentified, models.singles, models.effects, forms, checks, lower_bound, prepare
     )
     models = replace(models, singles=refit_singles(context, models.singles, found))
     if whole and not is_predictable(context, models.reidentified, found, allowed, rng):
@@ -169,7 +176,14 @@ def _in_windows(campaign: Campaign, noise: Mapping[str, float], models: SingleMo
     reidentified = reidentify(context, models.reidentified.fit.values)
     singles = fitted_in_windows(context, reidentified, models.singles)
     before = _before(campaign, context, reidentified) if reidentified.residuals else models.before
-    return SingleModels(windowing, context, before, reidentified, singles, models.search)
+    return replace(
+        models,
+        windowing=windowing,
+        context=context,
+        before=before,
+        reidentified=reidentified,
+        singles=singles,
+    )
 
 
 def _explained(cut: SingleModels, models: Sequence[FittedModel], at_floor: float) -> bool:

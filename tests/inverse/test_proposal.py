@@ -1,0 +1,96 @@
+"""Does the regression along the measured motion name the family and the place of what the equations lack?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigsight.campaign import Campaign
+from rigsight.diagnose.fitting.placed_effects import candidates_on
+from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.inverse import Proposal, propose
+from rigsight.records import Record
+from rigsight.rigs import AXIS, RIGS, Rig
+from rigsight.simulate import compose, simulate
+
+DT = 2e-3
+T = DT * np.arange(4000)
+AXIS_VALUES = {"gain": 1.0, "m": 1.0, "d": 4.0, "k": 400.0, "x_off": 0.0, "force_off": 0.0}
+TRAIN = {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
+NOISE = 1e-3
+
+
+def campaign(
+    rig: Rig, values: Mapping[str, float], effects: Sequence[Effect], amplitudes: Sequence[float]
+) -> Campaign:
+    structure, rng = compose(rig, effects), np.random.default_rng(0)
+    (u,) = rig.inputs
+    records = []
+    for i, amplitude in enumerate(amplitudes):
+        drive = amplitude * np.sin(i + 2.0 * np.pi * (0.3 * T + 0.4 * T**2))
+        run = simulate(structure, values, Record(f"run {i}", DT, {u.name: drive}, {}, hold="foh"))
+        noisy = {
+            s.name: run[s.name] + NOISE * np.std(run[s.name]) * rng.standard_normal(T.size) for s in rig.outputs
+        }
+        records.append(run.with_signals(**noisy))
+    own = {p.name for p in rig.parameters}
+    constants = {p.name: values[p.name] for p in rig.constants if p.name in values}
+    return Campaign("test", rig, constants, {n: v for n, v in values.items() if n in own}, tuple(records))
+
+
+def proposed(own: Campaign, effects: Sequence[Effect] = CATALOGUE) -> Proposal:
+    found = propose(own, {**own.constants, **own.given}, candidates_on(own.rig, effects))
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "family"),
+    [
+        ("coulomb_friction", {"T_c": 3.0}, "dry_friction"),
+        ("cubic_stiffness", {"k_3": 2e5}, "spring_law"),
+        ("input_dead_zone", {"u_0": 3.0}, "drive_limit"),
+        ("input_delay", {"T_d": 0.01}, "delay_or_lag"),
+        ("maxwell_branch", {"k_m": 200.0, "tau_m": 0.05}, "viscoelasticity"),
+    ],
+)
+def test_the_family_of_a_missing_effect_comes_first(
+    effect: str, values: Mapping[str, float], family: str
+) -> None:
+    found = proposed(campaign(AXIS, {**AXIS_VALUES, **values}, [effect_named(effect)], (10.0, 20.0)))
+    assert found.taken[0].family == family
+    assert found.taken[0].share > 0.5
+    assert found.is_decisive
+    kept = {e.name for e in found.candidates(AXIS, CATALOGUE)}
+    assert effect in kept
+    assert len(kept) < len(CATALOGUE) / 2
+
+
+def test_friction_is_found_at_its_joint_with_its_size() -> None:
+    rig = RIGS["drive_train"]
+    friction = effect_named("coulomb_friction@motor_bearing")
+    found = proposed(campaign(rig, {**TRAIN, "T_c": 0.02}, [friction], (0.8, 1.5)))
+    assert (found.taken[0].family, found.taken[0].where) == ("dry_friction", "motor_bearing")
+    alone = proposed(campaign(rig, {**TRAIN, "T_c": 0.02}, [friction], (0.8, 1.5)), [effect_named("coulomb_friction")])
+    assert alone.taken[0].values["T_c"] == pytest.approx(0.02, rel=0.1)
+
+
+def test_where_nothing_is_missing_nothing_is_decisive() -> None:
+    found = proposed(campaign(AXIS, AXIS_VALUES, [], (10.0, 20.0)))
+    assert not found.is_decisive
+    assert found.candidates(AXIS, CATALOGUE) == list(CATALOGUE)
+
+
+def test_a_motion_that_no_sensor_shows_gives_no_proposal() -> None:
+    rig = RIGS["drive_train"]
+    own = campaign(rig, TRAIN, [], (0.8,))
+    records = tuple(
+        replace(r, signals={n: v for n, v in r.signals.items() if n != "load_angle"}) for r in own.records
+    )
+    hidden = Campaign(
+        "test", rig, own.constants, own.parameters, records
+    )
+    assert propose(hidden, {**own.constants, **own.given}, candidates_on(rig, CATALOGUE)) is None
