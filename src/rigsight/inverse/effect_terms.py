@@ -19,7 +19,7 @@ from rigsight.effects import Effect, Place, kind_of
 from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
 from rigsight.inverse.equation_fit import EquationFit, generalized
-from rigsight.inverse.joint_force import joint_motion
+from rigsight.inverse.joint_force import JointMotion, joint_motion
 from rigsight.inverse.measured_motion import RecordMotion
 from rigsight.parameters import Parameter
 from rigsight.rigs import evaluated
@@ -51,15 +51,11 @@ class Term:
     one_sided: tuple[bool, ...]  # whether a coefficient cannot be negative
 
 
-def terms_of(
-    effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
-) -> Iterator[Term]:
-    """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term of the equations.
+class EffectTerms:
+    """Effects as terms of the equations along motions.
 
     Parameters
     ----------
-    effect
-        With its place.
     fit
         Equations and motions.
     values
@@ -67,22 +63,35 @@ def terms_of(
     scales
         Size of each base quantity in the records.
     """
-    if effect.place is Place.SENSOR or kind_of(effect.name) == "time_shift":
-        yield from _of_sensor(effect, fit, values, scales)
-    elif effect.place is Place.ACTUATOR:
-        yield from _of_drive(effect, fit, values)
-    elif effect.place in (Place.DYNAMICS, Place.DISTURBANCE) and not effect.reads_inertia:
-        yield from _of_joint(effect, fit, values, scales)
+
+    def __init__(self, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]) -> None:
+        self.fit, self.values, self.scales = fit, values, scales
+        self._moved: dict[str, list[JointMotion]] = {}
+
+    def of(self, effect: Effect) -> Iterator[Term]:
+        """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term."""
+        if effect.place is Place.SENSOR or kind_of(effect.name) == "time_shift":
+            yield from _of_sensor(effect, self.fit, self.values, self.scales)
+        elif effect.place is Place.ACTUATOR:
+            yield from _of_drive(effect, self.fit, self.values)
+        elif effect.place in (Place.DYNAMICS, Place.DISTURBANCE) and not effect.reads_inertia:
+            joint = joint_of(self.fit.rig, effect)
+            if joint.name not in self._moved:
+                self._moved[joint.name] = [joint_motion(m, joint, self.values) for m in self.fit.motions]
+            yield from _of_joint(effect, self.fit, self.values, self.scales, self._moved[joint.name])
 
 
 def _of_joint(
-    effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
+    effect: Effect,
+    fit: EquationFit,
+    values: Mapping[str, float],
+    scales: Mapping[str, float],
+    moved: Sequence[JointMotion],
 ) -> Iterator[Term]:
     joint = joint_of(fit.rig, effect)
     springs = effect.spring is not None or effect.deflection is not None
     if springs and not evaluated(joint.stiffness, {**values, **fit.motions[0].record.constants}) > 0.0:
         return
-    moved = [joint_motion(motion, joint, values) for motion in fit.motions]
     linear = [p for p in effect.parameters if p.fitted and _is_linear(effect, p)]
     units = [characteristic_value(p.dimension, scales) for p in linear]
     if effect.holds_constant_force and linear and all(p.lower >= 0.0 for p in linear):

@@ -106,7 +106,10 @@ class RecordMotion:
         if reads_place == reads_rate or np.any(slopes[own, 2 * n :]):
             return None
         first = 0 if reads_place else n
-        by_reading = np.linalg.pinv(np.moveaxis(slopes[:, first : first + n], 2, 0))[:, :, own].T * change
+        of_sensors = np.moveaxis(slopes[:, first : first + n], 2, 0)
+        if not np.any(np.ptp(of_sensors, axis=0)):
+            of_sensors = of_sensors[:1]
+        by_reading = np.linalg.pinv(of_sensors)[:, :, own].T * change
         z = np.zeros_like(self.z)
         z[first : first + n] = by_reading
         if reads_place:
@@ -128,11 +131,15 @@ class RecordMotion:
         below = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
         return float(_WIDER * 2.0 * (np.searchsorted(below, _OF_MOTION) + 1) / speeds.shape[1])
 
+    @cached_property
+    def _filter(self) -> Floats:
+        return np.asarray(butter(_ORDER, self.band, output="sos"))
+
     def filtered(self, rows: Floats) -> Floats:
         """Return rows (.., n_samples) without what is faster than the motion."""
         if self.band >= _HIGHEST or rows.shape[-1] < 10 * _ORDER:
             return rows
-        return np.asarray(sosfiltfilt(butter(_ORDER, self.band, output="sos"), rows, axis=-1))
+        return np.asarray(sosfiltfilt(self._filter, rows, axis=-1))
 
     def thinned(self, rows: Floats) -> Floats:
         """Return filtered rows at those samples only that are nearly independent."""

@@ -23,7 +23,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import Effect, Family
 from rigsight.errors import SimulationError
 from rigsight.identify import characteristic_scales
-from rigsight.inverse.effect_terms import Term, terms_of
+from rigsight.inverse.effect_terms import EffectTerms, Term
 from rigsight.inverse.equation_fit import (
     EquationFit,
     held_numbers,
@@ -105,7 +105,8 @@ def propose(campaign: Campaign, known: Mapping[str, float], effects: Sequence[Ef
     own = {p.name: values[p.name] for p in (*rig.constants, *rig.parameters)}
     records = [with_all_inputs(rig, record) for record in campaign.records]
     scales = characteristic_scales(rig, records, own)
-    terms = [term for effect in effects for term in terms_of(effect, fit, values, scales)]
+    terms_of = EffectTerms(fit, values, scales)
+    terms = [term for effect in effects for term in terms_of.of(effect)]
     if not terms:
         return None
     return _Selection(fit, values, terms).proposal(rig)
