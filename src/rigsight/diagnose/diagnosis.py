@@ -182,6 +182,7 @@ def _assembled(
             [signal.name for signal in rig.outputs], {name: floor.std for name, floor in noise.items()}
         ),
         rng.spawn(1)[0],
+        found.proposal,
     )
     chosen = judgement.model.effects if is_effect else ()
     likely = _likely(candidates, calibration.least_probability)

@@ -32,6 +32,7 @@ from rigsight.diagnose.verdict.plausibility import doubts, has_size_of_zero, pla
 from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
 from rigsight.effects import Effect
 from rigsight.identify import FitMemory
+from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
 
 
@@ -59,6 +60,8 @@ class Examination:
     # For an unknown cause the joint, drive or sensor whose signals correlate most with the gap; empty where
     # none is known.
     gap_at: str = ""
+    # What the motion says of the missing force; None where the sensors do not show the motion.
+    proposal: Proposal | None = None
 
 
 def examine(
@@ -123,6 +126,7 @@ def examine(
         if judgement.model.effects
         else (),
         checks.of(reidentified).place if judgement.verdict == "unknown" else "",
+        models.alone.proposal,
     )
 
 

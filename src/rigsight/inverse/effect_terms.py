@@ -28,8 +28,10 @@ from rigsight.units import characteristic_value
 
 Floats = NDArray[np.float64]
 
-_GRID = {0: 1, 1: 6, 2: 3}
+_GRID = {0: 1, 1: 6, 2: 4}
 """Points of the grid of each nonlinear parameter, by their number; two points beyond."""
+_WAVES = 24
+"""Points of the grid of a wave number: between two of them a wave loses its phase."""
 _LEAST_SHARE, _MOST_SHARE = 0.02, 3.0
 """Range of the grid in characteristic sizes, within that of a search."""
 _SMALL = 1e-3
@@ -129,7 +131,7 @@ def _grid_of(
         for p in effect.parameters
         if not p.fitted
     }
-    n = _GRID.get(len(inside), 2)
+    n = _GRID.get(len(inside), 2) if effect.wave_number is None else _WAVES
     for values in itertools.product(*(_grid(p, scales, n) for p in inside)):
         yield {**held, **dict(zip((p.name for p in inside), map(float, values), strict=True))}
 
@@ -207,7 +209,7 @@ def _of_reading(
         yield {}, (lambda reading, dt: np.gradient(reading, dt),)
     elif effect.wave_number is not None:
         (wave,) = [p for p in effect.parameters if p.name == effect.wave_number]
-        for number in _grid(wave, scales, 2 * _GRID[1]):
+        for number in _grid(wave, scales, _WAVES):
             yield (
                 {wave.name: float(number)},
                 (

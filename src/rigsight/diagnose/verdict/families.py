@@ -18,11 +18,19 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.effects import Effect, Family
+from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
 
 _LIMITS = (0.025, 0.975)
 _LEAST = 0.01
 """Smallest probability of a family that is listed although no named effect belongs to it."""
+
+_PER_SIMULATION, _PER_MOTION = 2.0, 4.0
+"""Powers of what a family leaves in a simulation and along the motion, see `_main_causes`."""
+_NOTHING_OF_THESE = 4.0
+"""Weight of a cause of no family, where one that explains nothing has the weight 1."""
+_MOST_SHARE = 0.99
+"""Share that counts at most: a law error of some percent is never excluded."""
 
 Key = tuple[Family, str]
 """A family and the place at which it acts."""
@@ -79,6 +87,7 @@ def families_at_places(
     outside: float,
     noise: NDArray[np.float64],
     rng: np.random.Generator,
+    proposal: Proposal | None = None,
 ) -> tuple[FamilyAtPlace, ...]:
     """Return the families of the diagnosed model and of its probable rivals, the largest share first.
 
@@ -93,12 +102,14 @@ def families_at_places(
     candidates
         Every scored model with its probability and its share of the ranking.
     outside
-        Probability of a cause that has none of the forms tried. It belongs to a family as far as this explains the gap: a real
+        Probability of a cause that has none of the forms tried. It belongs to a family by what this explains of the gap: a real
         law is no exact form, and what it leaves does not refute it.
     noise
         Noise floor of each output.
     rng
         Source of the resampling.
+    proposal
+        What the families explain along the measured motion; None where the sensors do not show it.
     """
     usable = [
         own
@@ -115,12 +126,17 @@ def families_at_places(
     keys = [frozenset(_keys(rig, model.effects)) for model in models]
     own_keys = _keys(rig, diagnosed.effects)
     of_sets = {key_set: [i for i, own in enumerate(keys) if own == key_set] for key_set in set(keys)}
+    main = _main_causes([*own_keys, *itertools.chain(*keys)], of_sets, explained, proposal)
     found = []
     for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
         members = [i for i, own in enumerate(keys) if key in own]
         listed = math.fsum(usable[i][1] for i in members)
-        beyond = math.fsum(usable[i][2] * min(1.0, max(0.0, explained[i])) for i in members)
-        probability = min(1.0, listed + outside * min(1.0, beyond))
+        beyond = main[key]
+        if key in own_keys and len(own_keys) > 1:
+            others = of_sets.get(frozenset(own_keys) - {key}, ())
+            beside = max((float(explained[i]) for i in others), default=0.0)
+            beyond = max(beyond, _second_cause(_explained_by(diagnosed, models, explained), beside))
+        probability = min(1.0, listed + outside * beyond)
         if key in own_keys:
             share = _share(key, own_keys, explained, of_sets)
             ends = [_share(key, own_keys, row, of_sets) for row in explained_drawn]
@@ -146,6 +162,45 @@ def shares_of_gap(
     above = 0.0 if is_adequate or not gap > 0.0 else max(error**2 - 1.0, 0.0) / max(gap**2, 1.0)
     remainder = min(above, max(0.0, 1.0 - families))
     return Shares(families, remainder, 1.0 - families - remainder)
+
+
+def _main_causes(
+    keys: Sequence[Key],
+    of_sets: Mapping[frozenset[Key], Sequence[int]],
+    explained: NDArray[np.float64],
+    proposal: Proposal | None,
+) -> dict[Key, float]:
+    """Return how probable each family is as the main cause where no law is exact.
+
+    A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
+    number of independent pieces of evidence that law errors leave in records. Both the simulation and the motion are asked.
+    """
+    along = {} if proposal is None else {(c.family, c.where): c.share for c in proposal.alone}
+    weights = {}
+    for key in dict.fromkeys(keys):
+        simulated = max((float(explained[i]) for i in of_sets.get(frozenset({key}), ())), default=0.0)
+        weights[key] = math.exp(
+            _evidence(simulated, _PER_SIMULATION) + _evidence(along.get(key, 0.0), _PER_MOTION)
+        )
+    whole = math.fsum(weights.values()) + _NOTHING_OF_THESE
+    return {key: weight / whole for key, weight in weights.items()}
+
+
+def _second_cause(together: float, without: float) -> float:
+    """Return how probable a family is as a further cause, from what a model explains with it and without it."""
+    if not without < 1.0:
+        return 0.0
+    weight = math.exp(_evidence((together - without) / (1.0 - without), _PER_SIMULATION))
+    return weight / (weight + _NOTHING_OF_THESE)
+
+
+def _evidence(share: float, per_share: float) -> float:
+    """Return the evidence of a share that is explained [nats]."""
+    return -per_share * math.log1p(-min(max(share, 0.0), _MOST_SHARE))
+
+
+def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: NDArray[np.float64]) -> float:
+    return max((float(explained[i]) for i, own in enumerate(models) if own is model), default=0.0)
 
 
 def _keys(rig: Rig, effects: Sequence[Effect]) -> tuple[Key, ...]:
