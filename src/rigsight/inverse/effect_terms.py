@@ -30,8 +30,8 @@ Floats = NDArray[np.float64]
 
 _GRID = {0: 1, 1: 6, 2: 4}
 """Points of the grid of each nonlinear parameter, by their number; two points beyond."""
-_WAVES = 24
-"""Points of the grid of a wave number: between two of them a wave loses its phase."""
+_WAVES = 40
+"""Points of the grid of a wave number: between two of them a wave loses its phase at the ends of the motion."""
 _LEAST_SHARE, _MOST_SHARE = 0.02, 3.0
 """Range of the grid in characteristic sizes, within that of a search."""
 _SMALL = 1e-3
@@ -131,8 +131,9 @@ def _grid_of(
         for p in effect.parameters
         if not p.fitted
     }
-    n = _GRID.get(len(inside), 2) if effect.wave_number is None else _WAVES
-    for values in itertools.product(*(_grid(p, scales, n) for p in inside)):
+    n = _GRID.get(len(inside), 2)
+    grids = [_waves(p, scales) if p.name == effect.wave_number else _grid(p, scales, n) for p in inside]
+    for values in itertools.product(*grids):
         yield {**held, **dict(zip((p.name for p in inside), map(float, values), strict=True))}
 
 
@@ -140,6 +141,10 @@ def _grid(parameter: Parameter, scales: Mapping[str, float], n: int) -> Floats:
     size = characteristic_value(parameter.dimension, scales)
     low, high = max(parameter.search[0], _LEAST_SHARE), min(parameter.search[1], _MOST_SHARE)
     return size * np.geomspace(low, 0.97 * high, n)
+
+
+def _waves(parameter: Parameter, scales: Mapping[str, float]) -> Floats:
+    return characteristic_value(parameter.dimension, scales) * np.linspace(*parameter.search, _WAVES)
 
 
 _OF_FORCE: Mapping[str, Callable[[Floats, float], Floats]] = {
@@ -209,7 +214,7 @@ def _of_reading(
         yield {}, (lambda reading, dt: np.gradient(reading, dt),)
     elif effect.wave_number is not None:
         (wave,) = [p for p in effect.parameters if p.name == effect.wave_number]
-        for number in _grid(wave, scales, _WAVES):
+        for number in _waves(wave, scales):
             yield (
                 {wave.name: float(number)},
                 (
