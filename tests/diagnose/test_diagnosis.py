@@ -267,7 +267,7 @@ def test_a_given_simulation_that_cannot_follow_a_validation_record_is_told() -> 
 
 def test_json_follows_the_contract(cubic: Diagnosis) -> None:
     content = json.loads(json.dumps(cubic.to_json(), allow_nan=False))
-    assert content["schema_version"] == 1
+    assert content["schema_version"] == 2
     contract = {
         "schema_version", "verdict", "effects", "where", "ambiguous_with", "candidates",
         "gap", "gap_by_record", "gap_by_band", "gap_by_amplitude", "gap_by_state",

@@ -196,7 +196,7 @@ def test_an_element_shows_its_force_over_its_motion(page_of: Callable[[str], str
     ("name", "label"),
     [
         ("effect", "<dt>Probability</dt>"), ("none", "<dt>Probability of no missing effect</dt>"),
-        ("unknown", "<dt>Probability of a cause not tried</dt>"),
+        ("unknown", "<dt>Probability of a cause that is none of the families</dt>"),
     ],
 )  # fmt: skip
 def test_the_probability_is_labelled_by_what_the_verdict_states(

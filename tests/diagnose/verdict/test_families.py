@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rigsight.diagnose.policy import FAMILIES
 from rigsight.diagnose.verdict.families import (
-    _NOTHING_OF_THESE,
-    _PER_SIMULATION,
+    FAMILIES.other_causes,
+    FAMILIES.per_simulation,
     families_at_places,
     shares_of_gap,
 )
@@ -62,9 +63,9 @@ def test_a_law_that_is_no_exact_form_belongs_to_the_family_that_explains_the_gap
         (("coulomb_friction",), left, 0.004, 0.7), (("stribeck_friction",), left, 0.002, 0.3), outside=0.99
     )
     # It leaves 0.16: the evidence of that beside the weight of any other cause.
-    weight = 0.16**-_PER_SIMULATION
+    weight = 0.16**-FAMILIES.per_simulation
     assert found[0].probability == pytest.approx(
-        0.006 + 0.99 * weight / (weight + _NOTHING_OF_THESE), abs=0.01
+        0.006 + 0.99 * weight / (weight + FAMILIES.other_causes), abs=0.01
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from rigsight.diagnose.policy.bootstrap_numbers import BootstrapNumbers
+from rigsight.diagnose.policy.family_numbers import FamilyNumbers
 from rigsight.diagnose.policy.horizon_numbers import HorizonNumbers
 from rigsight.diagnose.policy.map_numbers import MapNumbers
 from rigsight.diagnose.policy.note_numbers import NoteNumbers
@@ -15,14 +16,26 @@ from rigsight.diagnose.policy.search_numbers import SearchNumbers
 from rigsight.diagnose.policy.trust_numbers import TrustNumbers
 from rigsight.diagnose.policy.verdict_numbers import VerdictNumbers
 
-__all__ = ["BOOTSTRAP", "HORIZON", "MAPS", "NOTES", "POLICY", "SEARCH", "TRUST", "VERDICT", "Policy"]
+__all__ = [
+    "BOOTSTRAP",
+    "FAMILIES",
+    "HORIZON",
+    "MAPS",
+    "NOTES",
+    "POLICY",
+    "SEARCH",
+    "TRUST",
+    "VERDICT",
+    "Policy",
+]
 
 
 @dataclass(frozen=True)
 class Policy:
-    """What decides, what is told, how far is searched, how finely the gap is mapped, and how numbers are asked and weighed."""
+    """What decides, how families are weighed, what is told, how far is searched, how finely the gap is mapped, and how numbers are asked and weighed."""
 
     verdict: VerdictNumbers = field(default_factory=VerdictNumbers)
+    families: FamilyNumbers = field(default_factory=FamilyNumbers)
     notes: NoteNumbers = field(default_factory=NoteNumbers)
     horizon: HorizonNumbers = field(default_factory=HorizonNumbers)
     search: SearchNumbers = field(default_factory=SearchNumbers)
@@ -34,3 +47,4 @@ class Policy:
 POLICY = Policy()
 VERDICT, NOTES, SEARCH, MAPS = POLICY.verdict, POLICY.notes, POLICY.search, POLICY.maps
 HORIZON, TRUST, BOOTSTRAP = POLICY.horizon, POLICY.trust, POLICY.bootstrap
+FAMILIES = POLICY.families

@@ -17,20 +17,10 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
+from rigsight.diagnose.policy import FAMILIES
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
-
-_LIMITS = (0.025, 0.975)
-_LEAST = 0.01
-"""Smallest probability of a family that is listed although no named effect belongs to it."""
-
-_PER_SIMULATION, _PER_MOTION = 2.0, 4.0
-"""Powers of what a family leaves in a simulation and along the motion, see `_main_causes`."""
-_NOTHING_OF_THESE = 4.0
-"""Weight of a cause of no family, where one that explains nothing has the weight 1."""
-_MOST_SHARE = 0.99
-"""Share that counts at most: a law error of some percent is never excluded."""
 
 Key = tuple[Family, str]
 """A family and the place at which it acts."""
@@ -140,14 +130,14 @@ def families_at_places(
         if key in own_keys:
             share = _share(key, own_keys, explained, of_sets)
             ends = [_share(key, own_keys, row, of_sets) for row in explained_drawn]
-            low, high = (float(end) for end in np.quantile(ends, _LIMITS))
-        elif probability < _LEAST:
+            low, high = (float(end) for end in np.quantile(ends, FAMILIES.limits))
+        elif probability < FAMILIES.listed:
             continue
         else:
             alone = [i for i in members if len(keys[i]) == 1] or members
             best = max(alone, key=lambda i: explained[i])
             share, low = 0.0, 0.0
-            high = float(np.clip(np.quantile(explained_drawn[:, best], _LIMITS[1]), 0.0, 1.0))
+            high = float(np.clip(np.quantile(explained_drawn[:, best], FAMILIES.limits[1]), 0.0, 1.0))
         forms = _forms(rig, key, [usable[i] for i in members])
         found.append(FamilyAtPlace(*key, probability, share, (low, high), forms))
     return tuple(sorted(found, key=lambda own: (-own.share, -own.probability)))
@@ -180,9 +170,10 @@ def _main_causes(
     for key in dict.fromkeys(keys):
         simulated = max((float(explained[i]) for i in of_sets.get(frozenset({key}), ())), default=0.0)
         weights[key] = math.exp(
-            _evidence(simulated, _PER_SIMULATION) + _evidence(along.get(key, 0.0), _PER_MOTION)
+            _evidence(simulated, FAMILIES.per_simulation)
+            + _evidence(along.get(key, 0.0), FAMILIES.per_motion)
         )
-    whole = math.fsum(weights.values()) + _NOTHING_OF_THESE
+    whole = math.fsum(weights.values()) + FAMILIES.other_causes
     return {key: weight / whole for key, weight in weights.items()}
 
 
@@ -190,13 +181,13 @@ def _second_cause(together: float, without: float) -> float:
     """Return how probable a family is as a further cause, from what a model explains with it and without it."""
     if not without < 1.0:
         return 0.0
-    weight = math.exp(_evidence((together - without) / (1.0 - without), _PER_SIMULATION))
-    return weight / (weight + _NOTHING_OF_THESE)
+    weight = math.exp(_evidence((together - without) / (1.0 - without), FAMILIES.per_simulation))
+    return weight / (weight + FAMILIES.other_causes)
 
 
 def _evidence(share: float, per_share: float) -> float:
     """Return the evidence of a share that is explained [nats]."""
-    return -per_share * math.log1p(-min(max(share, 0.0), _MOST_SHARE))
+    return -per_share * math.log1p(-min(max(share, 0.0), FAMILIES.most_share))
 
 
 def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: NDArray[np.float64]) -> float:

@@ -1,0 +1,46 @@
+"""How much does what a family explains say of it, where no law is exact?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigsight.diagnose.policy.number import number
+
+
+@dataclass(frozen=True)
+class FamilyNumbers:
+    """How much does what a family explains say of it, where no law is exact? Each field carries its reason."""
+
+    per_simulation: float = number(
+        2.0,
+        "assumption",
+        (
+            "Power of the share of the squared gap that a family leaves in a simulation: half the number of independent pieces "
+            "of evidence that law errors leave in records."
+        ),
+    )
+    per_motion: float = number(
+        4.0,
+        "assumption",
+        "The same for the share of the squared force that a family leaves along the measured motion.",
+    )
+    other_causes: float = number(
+        4.0,
+        "assumption",
+        "Weight of a cause of no family of the catalogue, where a family that explains nothing has the weight one.",
+    )
+    most_share: float = number(
+        0.99,
+        "assumption",
+        "Share that counts at most: a law error of some percent is never excluded.",
+    )
+    listed: float = number(
+        0.01,
+        "convention",
+        "Smallest probability of a family that is listed although no named effect belongs to it.",
+    )
+    limits: tuple[float, float] = number(
+        (0.025, 0.975),
+        "convention",
+        "Quantiles of the resamplings that bound a share: 95 % of them lie between.",
+    )
