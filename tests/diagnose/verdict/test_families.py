@@ -7,8 +7,6 @@ import pytest
 
 from rigsight.diagnose.policy import FAMILIES
 from rigsight.diagnose.verdict.families import (
-    FAMILIES.other_causes,
-    FAMILIES.per_simulation,
     families_at_places,
     shares_of_gap,
 )

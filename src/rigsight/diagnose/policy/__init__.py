@@ -32,7 +32,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Policy:
-    """What decides, how families are weighed, what is told, how far is searched, how finely the gap is mapped, and how numbers are asked and weighed."""
+    """What decides, how families weigh, what is reported, how far is searched, how finely the gap is mapped, how numbers are asked."""
 
     verdict: VerdictNumbers = field(default_factory=VerdictNumbers)
     families: FamilyNumbers = field(default_factory=FamilyNumbers)
