@@ -38,7 +38,6 @@ COMMANDS = (
     "campaign.read_campaign",
     "diagnose",
     "identify",
-    "inverse",
     "discover",
     "compare",
     "simulate",

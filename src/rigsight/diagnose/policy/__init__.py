@@ -32,7 +32,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Policy:
-    """What decides, how families weigh, what is reported, how far is searched, how finely the gap is mapped, what is resampled."""
+    """What decides, how families weigh, what is reported, how far is searched and how finely the gap is mapped."""
 
     verdict: VerdictNumbers = field(default_factory=VerdictNumbers)
     families: FamilyNumbers = field(default_factory=FamilyNumbers)
