@@ -20,14 +20,16 @@ class FamilyNumbers:
         ),
     )
     per_motion: float = number(
-        4.0,
-        "assumption",
+        3.5,
+        "measured",
         "The same for the share of the squared force that a family leaves along the measured motion.",
+        set_by="maximum likelihood on 39 known causes in the measured records of thirteen rigs, seed 1: 3.55",
     )
     other_causes: float = number(
-        4.0,
-        "assumption",
+        1.0,
+        "measured",
         "Weight of a cause of no family of the catalogue, where a family that explains nothing has the weight one.",
+        set_by="the same trials: 0.73",
     )
     most_share: float = number(
         0.99,
