@@ -31,6 +31,11 @@ class FamilyNumbers:
         "Weight of a cause of no family of the catalogue, where a family that explains nothing has the weight one.",
         set_by="the same trials: 0.73",
     )
+    least_rank: float = number(
+        0.1,
+        "assumption",
+        "Share of the ranking that a family keeps at least: where no law is exact, held-out errors exclude none.",
+    )
     most_share: float = number(
         0.99,
         "assumption",

@@ -116,7 +116,11 @@ def families_at_places(
     keys = [frozenset(_keys(rig, model.effects)) for model in models]
     own_keys = _keys(rig, diagnosed.effects)
     of_sets = {key_set: [i for i, own in enumerate(keys) if own == key_set] for key_set in set(keys)}
-    main = _main_causes([*own_keys, *itertools.chain(*keys)], of_sets, explained, proposal)
+    of_rank = {
+        key: math.fsum(usable[i][2] for i, own in enumerate(keys) if key in own)
+        for key in {*own_keys, *itertools.chain(*keys)}
+    }
+    main = _main_causes(of_rank, of_sets, explained, proposal)
     found = []
     for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
         members = [i for i, own in enumerate(keys) if key in own]
@@ -155,7 +159,7 @@ def shares_of_gap(
 
 
 def _main_causes(
-    keys: Sequence[Key],
+    of_rank: Mapping[Key, float],
     of_sets: Mapping[frozenset[Key], Sequence[int]],
     explained: NDArray[np.float64],
     proposal: Proposal | None,
@@ -163,13 +167,14 @@ def _main_causes(
     """Return how probable each family is as the main cause where no law is exact.
 
     A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
-    number of independent pieces of evidence that law errors leave in records. Both the simulation and the motion are asked.
+    number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
+    the ranking, which also knows which parameters are plausible.
     """
     along = {} if proposal is None else {(c.family, c.where): c.share for c in proposal.alone}
     weights = {}
-    for key in dict.fromkeys(keys):
+    for key, share in of_rank.items():
         simulated = max((float(explained[i]) for i in of_sets.get(frozenset({key}), ())), default=0.0)
-        weights[key] = math.exp(
+        weights[key] = max(share, FAMILIES.least_rank) * math.exp(
             _evidence(simulated, FAMILIES.per_simulation)
             + _evidence(along.get(key, 0.0), FAMILIES.per_motion)
         )
