@@ -17,7 +17,17 @@ import sympy as sp
 from pydantic import BaseModel, ConfigDict, InstanceOf, PlainValidator, ValidationError, create_model
 from sympy.core.function import Application
 
-from rigsight.effects import Effect, Energy, GainTrend, Place, Signature, Start, State, SumAndDifference
+from rigsight.effects import (
+    Effect,
+    Energy,
+    Family,
+    GainTrend,
+    Place,
+    Signature,
+    Start,
+    State,
+    SumAndDifference,
+)
 from rigsight.effects import symbols as canonical
 from rigsight.errors import nearest, shown
 from rigsight.parameters import Parameter
@@ -42,7 +52,7 @@ _WANTED = {
     **{f"tuple[{part.__name__}, ...]": f"a tuple of {part.__name__} objects {_BEHIND}" for part in _PARTS},
     **{
         kind.__name__: f"one of {', '.join(f'{kind.__name__}.{one.name}' for one in kind)}"
-        for kind in (Energy, GainTrend, Place)
+        for kind in (Energy, Family, GainTrend, Place)
     },
 }
 """Annotation of a field -> what to give."""
