@@ -156,15 +156,21 @@ def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
     )
 
 
-def family_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
-    """Return each family with its probability, its share of the squared gap and its forms; then remainder and noise."""
+def family_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
+    """Return each family with its probability, its shares of the gap and along the motion, and its forms; then the rest."""
     rows = [
-        (sentence_case(family_label(own)), percent(own.probability), share_label(own), forms_label(own))
+        (
+            sentence_case(family_label(own)),
+            percent(own.probability),
+            share_label(own),
+            "" if own.along_motion is None else percent(own.along_motion),
+            forms_label(own),
+        )
         for own in diagnosis.families
     ]
     if rows and diagnosis.shares is not None:
-        rows.append(("Remainder", "", percent(diagnosis.shares.remainder), "explained by none of them"))
-        rows.append(("Noise and disturbance", "", percent(diagnosis.shares.noise), ""))
+        rows.append(("Remainder", "", percent(diagnosis.shares.remainder), "", "explained by none of them"))
+        rows.append(("Noise and disturbance", "", percent(diagnosis.shares.noise), "", ""))
     return rows
 
 

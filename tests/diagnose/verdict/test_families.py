@@ -10,7 +10,8 @@ from rigsight.diagnose.verdict.families import (
     families_at_places,
     shares_of_gap,
 )
-from rigsight.effects import CATALOGUE, Family
+from rigsight.effects import CATALOGUE, Family, effect_named
+from rigsight.inverse import Proposal, ProposedCause
 from rigsight.rigs import AXIS
 
 N = 4000
@@ -86,3 +87,28 @@ def test_two_causes_divide_what_they_explain_together(families) -> None:
     assert [own.share for own in found] == pytest.approx([0.6, 0.4], abs=0.05)
     assert shares.families == pytest.approx(0.99, abs=0.01)
     assert shares.remainder == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_family_that_explains_the_force_along_the_motion_is_more_probable(scored) -> None:
+    models = [
+        (scored((name,), residuals=0.7 * GAP), 0.0, 0.5) for name in ("coulomb_friction", "cubic_stiffness")
+    ]
+    seen = ProposedCause(effect_named("coulomb_friction"), Family.DRY_FRICTION, "dynamics", 0.6, {})
+    proposal = Proposal((seen,), (seen,), frozenset({"coulomb_friction", "cubic_stiffness"}), 0.6)
+    by_family = {
+        own.family: own
+        for own in families_at_places(
+            AXIS,
+            scored((), residuals=GAP),
+            models[0][0],
+            models,
+            1.0,
+            np.ones(1),
+            np.random.default_rng(1),
+            proposal,
+        )
+    }
+    friction, spring = by_family[Family.DRY_FRICTION], by_family[Family.SPRING_LAW]
+    assert friction.probability / spring.probability == pytest.approx(0.4**-FAMILIES.per_motion, rel=1e-6)
+    assert (friction.along_motion, spring.along_motion) == (0.6, None)
+    assert friction.to_json()["along_motion"] == 0.6

@@ -48,6 +48,9 @@ class FamilyAtPlace:
     # the upper one is what it would explain in its place.
     interval: tuple[float, float]
     forms: tuple[Form, ...]  # the most probable first
+    # Of the squared force that the equations leave along the measured motion, by this family alone; None
+    # where the sensors do not show the motion, or the family is no term of the equations.
+    along_motion: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return an entry of ``families`` in ``diagnosis.json``."""
@@ -56,6 +59,7 @@ class FamilyAtPlace:
             "where": self.where,
             "probability": self.probability,
             "share": {"value": self.share, "interval": list(self.interval)},
+            "along_motion": self.along_motion,
             "forms": [{"effects": list(f.effects), "probability": f.probability} for f in self.forms],
         }
 
@@ -120,7 +124,8 @@ def families_at_places(
         key: math.fsum(usable[i][2] for i, own in enumerate(keys) if key in own)
         for key in {*own_keys, *itertools.chain(*keys)}
     }
-    main = _main_causes(of_rank, of_sets, explained, proposal)
+    along = {} if proposal is None else {(c.family, c.where): max(0.0, c.share) for c in proposal.alone}
+    main = _main_causes(of_rank, of_sets, explained, along)
     found = []
     for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
         members = [i for i, own in enumerate(keys) if key in own]
@@ -143,7 +148,7 @@ def families_at_places(
             share, low = 0.0, 0.0
             high = float(np.clip(np.quantile(explained_drawn[:, best], FAMILIES.limits[1]), 0.0, 1.0))
         forms = _forms(rig, key, [usable[i] for i in members])
-        found.append(FamilyAtPlace(*key, probability, share, (low, high), forms))
+        found.append(FamilyAtPlace(*key, probability, share, (low, high), forms, along.get(key)))
     return tuple(sorted(found, key=lambda own: (-own.share, -own.probability)))
 
 
@@ -162,7 +167,7 @@ def _main_causes(
     of_rank: Mapping[Key, float],
     of_sets: Mapping[frozenset[Key], Sequence[int]],
     explained: NDArray[np.float64],
-    proposal: Proposal | None,
+    along: Mapping[Key, float],
 ) -> dict[Key, float]:
     """Return how probable each family is as the main cause where no law is exact.
 
@@ -170,7 +175,6 @@ def _main_causes(
     number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
     the ranking, which also knows which parameters are plausible.
     """
-    along = {} if proposal is None else {(c.family, c.where): c.share for c in proposal.alone}
     weights = {}
     for key, share in of_rank.items():
         simulated = max((float(explained[i]) for i in of_sets.get(frozenset({key}), ())), default=0.0)
