@@ -37,7 +37,7 @@ demo: $(RUNNABLE) $(COMPILER)  ## run the whole chain on the built-in virtual ri
 # Tests start dozens of processes; each would compile a thousand Python files again if Python could not cache them.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-test: $(DEVELOPMENT)  ## run the tests that every change must pass; under six minutes on two processors
+test: $(DEVELOPMENT)  ## run the tests that every change must pass; five to seven minutes on two processors
 	@# Kernels compile in two thirds of the time; test-all takes the options that users have.
 	@RIGSIGHT_CFLAGS=-O1 $(PYTEST) -m "not slow and not release"
 
