@@ -36,7 +36,8 @@ Make = Callable[..., list[str]]
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
     """A folder with the Makefile and what it reads, and a Python that only takes notes."""
-    for name in ("Makefile", "pyproject.toml", "requirements.lock"):
+    (tmp_path / "bench").mkdir()
+    for name in ("Makefile", "pyproject.toml", "bench/pyproject.toml", "requirements.lock"):
         shutil.copy(ROOT / name, tmp_path / name)
     python = tmp_path / "python"
     python.write_text(PYTHON, "utf-8")
