@@ -10,19 +10,22 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache, partial
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.effects import Effect, Place, kind_of
+from rigsight.effects import Effect, Place
+from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
+from rigsight.identify.rig_equations import FUNCTIONS
 from rigsight.inverse.equation_fit import EquationFit, generalized
 from rigsight.inverse.joint_force import JointMotion, joint_motion
 from rigsight.inverse.measured_motion import RecordMotion
 from rigsight.parameters import Parameter
-from rigsight.rigs import evaluated
+from rigsight.rigs import Drive, evaluated
 from rigsight.rigs.rig import joint_of
 from rigsight.units import characteristic_value
 
@@ -36,8 +39,6 @@ _LEAST_SHARE, _MOST_SHARE = 0.02, 3.0
 """Range of the grid in characteristic sizes, within that of a search."""
 _SMALL = 1e-3
 """Change of a reading, in units of its deviation, from which its influence on the equations is taken."""
-_ROUNDED = 0.05
-"""Width of the step of a dead zone, in units of the required force: near zero the noise of the force decides its sign."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,16 @@ class Term:
     # Of each record, filtered and thinned, shape (n_parts, n_equations, n_rows) each.
     columns: tuple[Floats, ...]
     one_sided: tuple[bool, ...]  # whether a coefficient cannot be negative
+
+
+def is_joint_force(effect: Effect) -> bool:
+    """Return True for a force at a joint that follows from the motion of this joint."""
+    return effect.place is Place.DYNAMICS and not effect.reads_inertia
+
+
+def _is_resonance(effect: Effect) -> bool:
+    """Return True for an effect with an oscillation of its own, which is narrower than any grid."""
+    return sum(state.limit is None for state in effect.states) > 1
 
 
 class EffectTerms:
@@ -72,11 +83,11 @@ class EffectTerms:
 
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term."""
-        if effect.place is Place.SENSOR or kind_of(effect.name) == "time_shift":
+        if effect.place is Place.SENSOR:
             yield from _of_sensor(effect, self.fit, self.values, self.scales)
         elif effect.place is Place.ACTUATOR:
-            yield from _of_drive(effect, self.fit, self.values)
-        elif effect.place in (Place.DYNAMICS, Place.DISTURBANCE) and not effect.reads_inertia:
+            yield from _of_drive(effect, self.fit, self.values, self.scales)
+        elif is_joint_force(effect) and not _is_resonance(effect):
             joint = joint_of(self.fit.rig, effect)
             if joint.name not in self._moved:
                 self._moved[joint.name] = [joint_motion(m, joint, self.values) for m in self.fit.motions]
@@ -147,81 +158,118 @@ def _waves(parameter: Parameter, scales: Mapping[str, float]) -> Floats:
     return characteristic_value(parameter.dimension, scales) * np.linspace(*parameter.search, _WAVES)
 
 
-_OF_FORCE: Mapping[str, Callable[[Floats, float], Floats]] = {
-    "input_dead_zone": lambda force, _: np.tanh(force / (_ROUNDED * _rms(force))),
-    "input_saturation": lambda force, _: force**3 / _rms(force) ** 2,
-    "input_delay": lambda force, dt: np.gradient(force, dt),
-    "actuator_lag": lambda force, dt: np.gradient(force, dt),
-}
-"""What an effect of a drive adds to the force that the input must give, as a function of the force that the motion requires."""
-
-
-def _of_drive(effect: Effect, fit: EquationFit, values: Mapping[str, float]) -> Iterator[Term]:
-    shape = _OF_FORCE.get(kind_of(effect.name))
-    if shape is None:
-        return
+def _of_drive(
+    effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
+) -> Iterator[Term]:
+    """Yield what the input must give beyond what reaches the motion, as a function of what the motion requires."""
     drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
-    columns = []
-    for motion in fit.motions:
-        equations = motion.equations
-        if not equations.n_coordinates:
-            return
-        p = equations.parameters(values, motion.record)
-        along = equations.slopes_along(motion.z, motion.u, p)[drive.name]
-        missing = np.sum(along * fit.residual(motion, values), axis=0) / np.maximum(
-            np.sum(along**2, axis=0), 1e-300
+    per_input = [_force_per_input(drive, {**values, **motion.record.constants}) for motion in fit.motions]
+    if effect.states or not fit.motions[0].equations.n_coordinates or not all(per_input):
+        return
+    required = [_required(drive, fit, motion, values) for motion in fit.motions]
+    for inner, lost in _lost_in_drive(effect, scales):
+        columns = tuple(
+            motion.thinned(along * gain * lost(force / gain, motion.record.dt))[None]
+            for motion, (along, force), gain in zip(fit.motions, required, per_input, strict=True)
         )
-        required = motion.filtered(
-            missing + equations.at_places(motion.z, motion.u, p)[f"force@{drive.name}"]
-        )
-        if not np.any(required):
-            return
-        columns.append(motion.thinned(along * shape(required, motion.record.dt))[None])
-    if all(np.all(np.isfinite(column)) for column in columns):
-        yield Term(effect, {}, (), (), tuple(columns), (True,))
+        if all(np.all(np.isfinite(column)) for column in columns):
+            yield Term(effect, inner, (), (), columns, (True,))
+
+
+Shape = Callable[[Floats, float], Floats]
+"""A signal, shape (n_samples,), and its sample time -> another signal."""
+
+
+def _lost_in_drive(effect: Effect, scales: Mapping[str, float]) -> Iterator[tuple[dict[str, float], Shape]]:
+    if effect.delay is not None:
+        yield {}, np.gradient
+        return
+    own = [sp.Symbol(p.name, real=True) for p in effect.parameters]
+    if effect.drive is None or not effect.drive.free_symbols <= {canonical.u, *own}:
+        return
+    drive = _compiled(effect.drive, (canonical.u, *own))
+    for inner in _grid_of(effect, (), scales):
+        yield inner, partial(_lost, drive, [inner[symbol.name] for symbol in own])
+
+
+def _lost(drive: Callable[..., Floats], numbers: Sequence[float], u: Floats, _dt: float) -> Floats:
+    return np.asarray(u - drive(u, *numbers))
+
+
+def _force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
+    gain = derivative(drive.force, sp.Symbol(drive.name, real=True))
+    known = {symbol.name for symbol in gain.free_symbols} <= numbers.keys()
+    return float(evaluated(gain, numbers)) if known else 0.0
+
+
+def _required(
+    drive: Drive, fit: EquationFit, motion: RecordMotion, values: Mapping[str, float]
+) -> tuple[Floats, Floats]:
+    """Return how a drive enters the equations, shape (n_equations, n_samples), and the force that the motion requires of it."""
+    equations = motion.equations
+    p = equations.parameters(values, motion.record)
+    along = equations.slopes_along(motion.z, motion.u, p)[drive.name]
+    size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
+    missing = np.sum(along * fit.residual(motion, values), axis=0) / size
+    given = equations.at_places(motion.z, motion.u, p)[f"force@{drive.name}"]
+    return along, motion.filtered(missing + given)
 
 
 def _of_sensor(
     effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
 ) -> Iterator[Term]:
+    """Yield what a small change of the reading, which undoes the effect, changes in the equations."""
     name = fit.rig.acts_at(effect)
-    for inner, shapes in _of_reading(effect, scales):
+    for inner, undone in _undone_in_reading(effect, scales):
         columns = []
         for motion in fit.motions:
             if name not in motion.record:
-                nothing = np.zeros((len(shapes), *fit.residual(motion, values).shape))
-                columns.append(motion.thinned(nothing))
-                continue
-            reading = motion.record[name]
-            parts = [
-                _influence(fit, motion, values, name, shape(reading, motion.record.dt)) for shape in shapes
-            ]
+                return
+            changes = [undo(motion.record[name], motion.record.dt) for undo in undone.values()]
+            parts = [_influence(fit, motion, values, name, change) for change in changes]
             if any(part is None for part in parts):
                 return
             columns.append(motion.thinned(np.array(parts)))
-        sided = effect.wave_number is None and kind_of(effect.name) != "time_shift"
-        yield Term(effect, inner, (), (), tuple(columns), (sided,) * len(shapes))
+        declared = {p.name: p for p in effect.parameters}
+        sided = tuple(declared[p].lower >= 0.0 for p in undone)
+        yield Term(effect, inner, tuple(undone), (1.0,) * len(undone), tuple(columns), sided)
 
 
-Shape = Callable[[Floats, float], Floats]
-
-
-def _of_reading(
+def _undone_in_reading(
     effect: Effect, scales: Mapping[str, float]
-) -> Iterator[tuple[dict[str, float], tuple[Shape, ...]]]:
-    """Yield what must be added to a reading to undo an effect of the sensor, by nonlinear parameter."""
-    if kind_of(effect.name) in ("sensor_delay", "sensor_lag", "time_shift"):
-        yield {}, (lambda reading, dt: np.gradient(reading, dt),)
-    elif effect.wave_number is not None:
-        (wave,) = [p for p in effect.parameters if p.name == effect.wave_number]
-        for number in _waves(wave, scales):
-            yield (
-                {wave.name: float(number)},
-                (
-                    lambda reading, _, k=number: _rms(reading) * np.sin(k * reading),  # type: ignore[misc]
-                    lambda reading, _, k=number: _rms(reading) * np.cos(k * reading),  # type: ignore[misc]
-                ),
-            )
+) -> Iterator[tuple[dict[str, float], dict[str, Shape]]]:
+    """Yield nonlinear parameters, and what undoes a unit of each linear one in a reading."""
+    if effect.reading_delay is not None:
+        yield {}, {effect.parameters[0].name: np.gradient}
+        return
+    if effect.measured is None or effect.states:
+        return
+    fitted = [p for p in effect.parameters if p.fitted]
+    slopes = {p: derivative(effect.measured, sp.Symbol(p.name, real=True)) for p in fitted}
+    linear = [p for p in fitted if not slopes[p].has(sp.Symbol(p.name, real=True))]
+    if any(slopes[p].has(sp.Symbol(other.name, real=True)) for p in linear for other in linear):
+        return
+    for inner in _grid_of(effect, linear, scales):
+        names = [sp.Symbol(name, real=True) for name in inner]
+        yield (
+            inner,
+            {
+                p.name: partial(_undone, _compiled(slopes[p], (canonical.reading, *names)), [*inner.values()])
+                for p in linear
+            },
+        )
+
+
+def _undone(slope: Callable[..., Floats], numbers: Sequence[float], reading: Floats, _dt: float) -> Floats:
+    return np.asarray(-slope(reading, *numbers))
+
+
+@lru_cache(maxsize=256)
+def _compiled(expression: sp.Expr, arguments: tuple[sp.Symbol, ...]) -> Callable[..., Floats]:
+    function = sp.lambdify(arguments, expression, [FUNCTIONS, "numpy"])
+    return lambda signal, *numbers: np.broadcast_to(function(signal, *numbers), signal.shape).astype(
+        np.float64
+    )
 
 
 def _influence(

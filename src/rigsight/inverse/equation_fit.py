@@ -23,6 +23,8 @@ _ROUNDS = 12
 _SETTLED = 1e-6
 _RANK = 1e-9
 _DEPENDENT = 1e-6
+_APART = 1e-12
+"""Least distance of two bounds, relative to them, that the solver accepts."""
 
 
 def held_numbers(rig: Rig) -> set[str]:
@@ -86,12 +88,12 @@ class EquationFit:
 
     def residual(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
         """Return the residual of each equation along one motion in its whole band, shape (n_equations, n_samples)."""
-        own = motion.left(values)
+        own = motion.residual(values)
         for effect in self.modelled:
             own = own + self._along(motion, effect, self._own(effect, values), values)
         return own
 
-    def left(self, values: Mapping[str, float]) -> Floats:
+    def rms(self, values: Mapping[str, float]) -> Floats:
         """Return the RMS of each equation."""
         return _rms(self.rows(values))
 
@@ -103,59 +105,54 @@ class EquationFit:
         SimulationError
             If the equations cannot be evaluated along the motions, or leave nothing at all.
         """
-        values, left = dict(start), self.left(start)
+        values, remainder = dict(start), self.rms(start)
         for _ in range(_ROUNDS):
-            moved, _ = self.step(values, left)
-            now = self.left(moved)
-            better = size_in(now, left)
+            moved = self.step(values, remainder)
+            now = self.rms(moved)
+            better = size_in(now, remainder)
             if not better < 1.0:
                 break
-            values, left = moved, now
+            values, remainder = moved, now
             if better > 1.0 - _SETTLED:
                 break
-        if not np.all(np.isfinite(left)) or np.any(left <= 0.0):
+        if not np.all(np.isfinite(remainder)) or np.any(remainder <= 0.0):
             raise SimulationError(f"The equations of {self.rig.name} have no residual along these records.")
-        return values, left
+        return values, remainder
 
-    def step(self, values: Mapping[str, float], unit: Floats) -> tuple[dict[str, float], Floats]:
-        """Return numbers that are better where the equations are linear in them, and what these would leave there."""
-        rows = self.rows(values)
-        by = [motion.filtered(self.slopes(motion, values)) for motion in self.motions]
+    def step(self, values: Mapping[str, float], unit: Floats) -> dict[str, float]:
+        """Return numbers that are better where the equations are linear in them; residuals count in the given units."""
+        if not self.free:
+            return dict(values)
         weight = np.where(unit > 0.0, unit, 1.0)[:, None]
-        target = np.concatenate([(own / weight).ravel() for own in rows])
-        matrix = np.concatenate([(own / weight).reshape(len(self.free), -1) for own in by], axis=1).T
-        size = np.sqrt(np.mean(matrix**2, axis=0))
-        size[size == 0.0] = 1.0
+        target = _joined([row / weight for row in self.rows(values)])
+        matrix, size = self._influences(values, weight)
         now = np.array([values[name] for name in self.free])
-        ends = np.array(self.bounds).reshape(-1, 2)
-        q, r = np.linalg.qr(matrix / size)
+        ends = np.array(self.bounds)
+        q, r = np.linalg.qr(matrix)
         # Directions that nothing determines stay where they are.
         held = _RANK * float(np.max(np.abs(r), initial=0.0)) * np.eye(r.shape[1])
         low, high = (ends[:, 0] - now) * size, (ends[:, 1] - now) * size
         narrow = high <= low
-        high = np.where(narrow, low + 1e-12 * np.maximum(1.0, np.abs(low)), high)
-        if self.free:
-            change = lsq_linear(
-                np.concatenate([r, held]), -np.r_[q.T @ target, np.zeros(len(held))], (low, high)
-            ).x
-        else:
-            change = np.zeros(0)
-        moved = dict(zip(self.free, map(float, now + change / size), strict=True))
-        after = target + (matrix / size) @ change
-        parts, first = [], 0
-        for own in rows:
-            parts.append(after[first : first + own.size].reshape(own.shape) * weight)
-            first += own.size
-        return {**values, **moved}, _rms(parts)
+        high = np.where(narrow, low + _APART * np.maximum(1.0, np.abs(low)), high)
+        change = lsq_linear(
+            np.concatenate([r, held]), -np.r_[q.T @ target, np.zeros(len(held))], (low, high)
+        ).x
+        return {**values, **dict(zip(self.free, map(float, now + change / size), strict=True))}
 
     def independent(self, values: Mapping[str, float]) -> tuple[str, ...]:
         """Return the free numbers whose influence is not a sum of the influences of those before them."""
-        slopes = [motion.filtered(self.slopes(motion, values)) for motion in self.motions]
-        matrix = np.concatenate([own.reshape(len(self.free), -1) for own in slopes], axis=1).T
-        size = np.sqrt(np.mean(matrix**2, axis=0))
-        own = np.abs(np.diag(np.linalg.qr(matrix / np.where(size > 0.0, size, 1.0), mode="r")))
+        matrix, _ = self._influences(values, np.ones((1, 1)))
+        own = np.abs(np.diag(np.linalg.qr(matrix, mode="r")))
         enough = _DEPENDENT * float(np.max(own, initial=0.0))
         return tuple(name for name, part in zip(self.free, own, strict=True) if part > enough)
+
+    def _influences(self, values: Mapping[str, float], weight: Floats) -> tuple[Floats, Floats]:
+        """Return the derivatives of all residuals by the free numbers as columns of RMS one, and the RMS that they had."""
+        slopes = [motion.filtered(self.slopes(motion, values)) / weight for motion in self.motions]
+        matrix = np.concatenate([own.reshape(len(self.free), -1) for own in slopes], axis=1).T
+        size = np.sqrt(np.mean(matrix**2, axis=0))
+        size[size == 0.0] = 1.0
+        return matrix / size, size
 
     def unexplained(self, changed: EquationFit, values: Mapping[str, float], unit: Floats) -> Floats:
         """Return the RMS of the change of each equation that no numbers of these equations explain.
@@ -170,19 +167,17 @@ class EquationFit:
             Of each equation.
         """
         pairs = zip(self.rows(values), changed.rows(values), strict=True)
-        changes = [after - before for before, after in pairs]
         weight = unit[:, None]
-        target = np.concatenate([(own / weight).ravel() for own in changes])
+        changes = [(after - before) / weight for before, after in pairs]
+        target = _joined(changes)
         if self.free:
-            by = [motion.filtered(self.slopes(motion, values)) / weight for motion in self.motions]
-            matrix = np.concatenate([own.reshape(len(self.free), -1) for own in by], axis=1).T
-            size = np.sqrt(np.mean(matrix**2, axis=0))
-            matrix = matrix / np.where(size > 0.0, size, 1.0)
+            matrix, _ = self._influences(values, weight)
             target = target - matrix @ np.linalg.lstsq(matrix, target, rcond=_RANK)[0]
-        parts, first = [], 0
-        for own in changes:
-            parts.append(target[first : first + own.size].reshape(own.shape) * weight)
-            first += own.size
+        ends = np.cumsum([own.size for own in changes])[:-1]
+        parts = [
+            part.reshape(own.shape) * weight
+            for part, own in zip(np.split(target, ends), changes, strict=True)
+        ]
         return _rms(parts)
 
     def slopes(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
@@ -214,7 +209,7 @@ def generalized(
     values: Mapping[str, float],
     moved: JointMotion,
 ) -> Floats:
-    """Return what an effect adds to `RecordMotion.left`.
+    """Return what an effect adds to `RecordMotion.residual`.
 
     Parameters
     ----------
@@ -240,9 +235,13 @@ def generalized(
     return np.array([force if name in reading else np.zeros_like(force) for name in names])
 
 
-def size_in(left: Floats, unit: Floats) -> float:
+def _joined(rows: Sequence[Floats]) -> Floats:
+    return np.concatenate([own.ravel() for own in rows])
+
+
+def size_in(remainder: Floats, unit: Floats) -> float:
     """Return residuals of equations in units of other ones, as one number."""
-    return float(np.sqrt(np.mean((left / unit) ** 2)))
+    return float(np.sqrt(np.mean((remainder / unit) ** 2)))
 
 
 def _rms(rows: Sequence[Floats]) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any
@@ -12,8 +12,10 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.effects import Effect, Place, effect_named, kind_of
+from rigsight.effects import Effect, Place, kind_of
 from rigsight.effects import symbols as canonical
+from rigsight.effects.placed import ByIdentity
+from rigsight.identify.rig_equations import FUNCTIONS
 from rigsight.inverse.measured_motion import RecordMotion
 from rigsight.records import Record
 from rigsight.rigs import Joint, Rig, evaluated, rig_of_tables
@@ -145,20 +147,19 @@ def effect_force(effect: Effect, values: Mapping[str, float], motion: JointMotio
     motion
         Of the joint.
     """
-    plain = effect_named(kind_of(effect.name))
-    if plain.place is Place.DISTURBANCE:
-        return _periodic(plain, values, motion)
-    if plain.states:
-        return _simulated(plain, values, motion)
-    if plain.deflection is not None:
-        return motion.stiffness * (_along(plain.deflection, values, motion, motion.load) - motion.x)
-    assert plain.torque is not None
-    if not plain.reads(canonical.load):
-        return _along(plain.torque, values, motion, motion.load)
+    if effect.place is Place.DISTURBANCE:
+        return _periodic(effect, values, motion)
+    if effect.states or (effect.deflection is None and effect.torque is None):
+        return _simulated(effect, values, motion)
+    if effect.deflection is not None:
+        return motion.stiffness * (_along(effect.deflection, values, motion, motion.load) - motion.x)
+    assert effect.torque is not None
+    if not effect.reads(canonical.load):
+        return _along(effect.torque, values, motion, motion.load)
     # A drive that overcomes friction loads the joint with it.
     force = np.zeros_like(motion.load)
     for _ in range(_ROUNDS):
-        force = _along(plain.torque, values, motion, motion.load + force)
+        force = _along(effect.torque, values, motion, motion.load + force)
     return force
 
 
@@ -170,10 +171,9 @@ def _along(expression: sp.Expr, values: Mapping[str, float], motion: JointMotion
 
 @cache
 def _compiled(expression: sp.Expr, names: tuple[str, ...]) -> Any:
-    plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2)
     signals = (canonical.x, canonical.v, canonical.position, canonical.acceleration, canonical.load)
     own = [sp.Symbol(name, real=True) for name in names]
-    return sp.lambdify((*signals, *own), plain, "numpy", cse=True)
+    return sp.lambdify((*signals, *own), expression, [FUNCTIONS, "numpy"], cse=True)
 
 
 def _periodic(effect: Effect, values: Mapping[str, float], motion: JointMotion) -> Floats:
@@ -190,6 +190,12 @@ def _element() -> Rig:
     return rig_of_tables(_ELEMENT, "Measured joint")
 
 
+@cache
+def _unplaced(key: ByIdentity[Effect]) -> Effect:
+    """Return an effect for the only joint of the element; equal arguments give the same object, compiled once."""
+    return replace(key.value, name=kind_of(key.value.name), at=None)
+
+
 def _simulated(effect: Effect, values: Mapping[str, float], motion: JointMotion) -> Floats:
     """Return the force of an effect with a history, from equilibrium at the first sample on."""
     record = Record(
@@ -199,8 +205,9 @@ def _simulated(effect: Effect, values: Mapping[str, float], motion: JointMotion)
         units={},
         hold="foh",
     )
-    structure, base = compose(_element(), [effect]), compose(_element())
+    alone = _unplaced(ByIdentity(effect))
+    structure, base = compose(_element(), [alone]), compose(_element())
     own = {"k": motion.stiffness, "x_off": motion.rest, "m_j": 0.0}
-    named = {structure.parameter_name(effect, name): value for name, value in values.items()}
+    named = {structure.parameter_name(alone, name): value for name, value in values.items()}
     with_it = simulate(structure, {**own, **named}, record, accuracy=_ACCURACY)["force"]
     return np.asarray(with_it - simulate(base, own, record, accuracy=_ACCURACY)["force"])

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 _OF_MOTION = 0.99
 """Share of the power of all velocities below the end of the band of a motion."""
-_WIDER = 3.0
+WIDER = 3.0
 """End of the band in which forces are compared, in units of that of the motion: forces hold overtones of it."""
 _HIGHEST = 0.8
 """Share of the Nyquist frequency above which nothing is filtered."""
@@ -56,7 +56,7 @@ class RecordMotion:
         names = self.equations.sensor_names
         return [number for number, name in enumerate(names) if name in self.record]
 
-    def left(self, values: Mapping[str, float]) -> Floats:
+    def residual(self, values: Mapping[str, float]) -> Floats:
         """Return what the equations of motion need beside their forces, shape (n_equations, n_samples).
 
         Where every motion is prescribed: the model of each force less its reading.
@@ -74,7 +74,7 @@ class RecordMotion:
         return np.array([shown[i] - self.record[self.equations.sensor_names[i]] for i in self.sensors])
 
     def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> Floats:
-        """Return the derivatives of `left` by parameters, shape (n_names, n_equations, n_samples).
+        """Return the derivatives of `residual` by parameters, shape (n_names, n_equations, n_samples).
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class RecordMotion:
         speeds = self.z[n : 2 * n] if n else self.u[1::3]
         power = np.sum(np.abs(np.fft.rfft(speeds * np.hanning(speeds.shape[1]))) ** 2, axis=0)
         below = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
-        return float(_WIDER * 2.0 * (np.searchsorted(below, _OF_MOTION) + 1) / speeds.shape[1])
+        return float(WIDER * 2.0 * (np.searchsorted(below, _OF_MOTION) + 1) / speeds.shape[1])
 
     @cached_property
     def _filter(self) -> Floats:

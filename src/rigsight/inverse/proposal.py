@@ -12,6 +12,7 @@ S. A. Billings, *Nonlinear System Identification* (Wiley 2013), for greedy forwa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -23,7 +24,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import Effect, Family
 from rigsight.errors import SimulationError
 from rigsight.identify import characteristic_scales
-from rigsight.inverse.effect_terms import EffectTerms, Term
+from rigsight.inverse.effect_terms import EffectTerms, Term, is_joint_force
 from rigsight.inverse.equation_fit import (
     EquationFit,
     held_numbers,
@@ -32,6 +33,7 @@ from rigsight.inverse.equation_fit import (
     record_motions,
     with_all_inputs,
 )
+from rigsight.inverse.measured_motion import WIDER
 from rigsight.rigs import Rig
 
 Floats = NDArray[np.float64]
@@ -39,13 +41,13 @@ Key = tuple[Family, str]
 """A family and the place at which it acts."""
 
 _STRETCHES = 10
+"""Number of parts of the records of which each is left out once."""
 _MOST_CAUSES = 5
+"""Families that are taken at most; a robot has three to five causes at once."""
 _WORTH = 0.03
 """Least share of the residual that a further family must remove from stretches that it was not fitted to."""
+_SIGNIFICANCE = 0.01
 _SMOOTH = 1e-9
-_DECISIVE = 0.25
-_NEAR = 0.5
-"""Share of what the best family explains from which on another one may be the cause."""
 
 
 @dataclass(frozen=True)
@@ -70,23 +72,16 @@ class Proposal:
     judged: frozenset[str]  # names of the effects that are terms of this regression
     # Share of the squared residual that those taken remove together.
     explained: float
-
-    @property
-    def is_decisive(self) -> bool:
-        """Whether one family alone explains a good part of what the equations leave."""
-        return bool(self.alone) and self.alone[0].share >= _DECISIVE
-
-    def candidates(self, rig: Rig, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the effects worth fitting: of families that were taken or explain nearly as much, and those not judged."""
-        if not self.is_decisive:
-            return list(effects)
-        near = {(c.family, c.where) for c in self.alone if c.share >= _NEAR * self.alone[0].share}
-        near |= {(cause.family, cause.where) for cause in self.taken}
-        return [e for e in effects if e.name not in self.judged or (e.family, rig.where(e)) in near]
+    # Share that the best of so many terms exceeds in one of a hundred cases if none has to do with the
+    # residual.
+    by_chance: float
 
 
 def propose(campaign: Campaign, known: Mapping[str, float], effects: Sequence[Effect]) -> Proposal | None:
-    """Return the families that explain what the equations of a campaign leave; None where the sensors do not show the motion.
+    """Return the families that explain what the equations of a campaign leave of its estimation records.
+
+    None where the sensors do not show the motion, another program simulates the bodies, or the given simulation has an effect
+    that is no force at a joint.
 
     Parameters
     ----------
@@ -97,13 +92,15 @@ def propose(campaign: Campaign, known: Mapping[str, float], effects: Sequence[Ef
     effects
         Candidates at their places.
     """
+    rig = campaign.rig
+    if rig.mechanism.bodies is not None or not all(map(is_joint_force, campaign.modelled)):
+        return None
     try:
         fit, values = _fitted(campaign, known)
     except SimulationError:
         return None
-    rig = campaign.rig
     own = {p.name: values[p.name] for p in (*rig.constants, *rig.parameters)}
-    records = [with_all_inputs(rig, record) for record in campaign.records]
+    records = [with_all_inputs(rig, record) for record in campaign.estimation]
     scales = characteristic_scales(rig, records, own)
     terms_of = EffectTerms(fit, values, scales)
     terms = [term for effect in effects for term in terms_of.of(effect)]
@@ -117,7 +114,7 @@ def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit
     held = held_numbers(rig) | ({campaign.absent_spring} if campaign.absent_spring else set())
     start = {p.name: p.default if p.default is not None else 1.0 for p in rig.parameters}
     start |= {**campaign.constants, **known}
-    motions = record_motions(rig, campaign.records, start)
+    motions = record_motions(rig, campaign.estimation, start)
     held |= of_undriven(motions, start)
     free = tuple(p.name for p in rig.parameters if p.name not in held and matters(motions, start, p.name))
     # A constant force and the rest of a spring do the same: the rest stays where it is known.
@@ -134,7 +131,7 @@ class _Selection:
     def __init__(self, fit: EquationFit, values: Mapping[str, float], terms: Sequence[Term]) -> None:
         self.fit, self.terms = fit, terms
         rows, slopes, columns, stretch = [], [], [], []
-        unit = fit.left(values)[:, None]
+        unit = fit.rms(values)[:, None]
         per_record = max(1, round(2 * _STRETCHES / len(fit.motions)))
         for i, motion in enumerate(fit.motions):
             own = motion.thinned(fit.residual(motion, values))
@@ -159,6 +156,10 @@ class _Selection:
         groups = np.concatenate(stretch) % _STRETCHES
         self.products = np.array([matrix[groups == g].T @ matrix[groups == g] for g in range(_STRETCHES)])
         self.whole = np.sum(self.products, axis=0)
+        # Limit of the largest of so many squared normal deviates (Bonferroni), as a share of the squares of all rows. What laws
+        # leave moves with the motion: in its band lie fewer rows than in that of the forces.
+        independent = target.size / WIDER
+        self.by_chance = min(1.0, 2.0 * math.log(len(terms) / _SIGNIFICANCE) / independent)
 
     def _solved(self, products: Floats, columns: Sequence[int]) -> Floats:
         normal = products[np.ix_(columns, columns)]
@@ -189,14 +190,14 @@ class _Selection:
             own = self._solved(self.whole, [*self.own, *columns])[-len(self.places[i]) :]
             if any(sided and number < 0.0 for sided, number in zip(term.one_sided, own, strict=True)):
                 continue
-            left = self._remainder(columns)
-            if key not in best or left < best[key][0]:
-                best[key] = (left, i)
+            remainder = self._remainder(columns)
+            if key not in best or remainder < best[key][0]:
+                best[key] = (remainder, i)
         return best
 
     def proposal(self, rig: Rig) -> Proposal:
         """Take families until none removes enough."""
-        begun = left = self._remainder([])
+        begun = remainder = self._remainder([])
         chosen: list[int] = []
         taken: list[ProposedCause] = []
         alone: tuple[ProposedCause, ...] = ()
@@ -205,13 +206,14 @@ class _Selection:
             ordered = sorted(best.items(), key=lambda found: found[1][0])
             if not alone:
                 alone = tuple(self._cause(key, i, 1.0 - own / begun, []) for key, (own, i) in ordered)
-            if not ordered or not ordered[0][1][0] < (1.0 - _WORTH) * left:
+            if not ordered or not ordered[0][1][0] < (1.0 - max(_WORTH, self.by_chance)) * remainder:
                 break
             key, (own, i) = ordered[0]
-            taken.append(self._cause(key, i, 1.0 - own / left, chosen))
-            chosen, left = [*chosen, *self.places[i]], own
+            taken.append(self._cause(key, i, 1.0 - own / remainder, chosen))
+            chosen, remainder = [*chosen, *self.places[i]], own
         judged = frozenset(term.effect.name for term in self.terms)
-        return Proposal(tuple(taken), alone, judged, 1.0 - left / begun if begun > 0.0 else 0.0)
+        explained = 1.0 - remainder / begun if begun > 0.0 else 0.0
+        return Proposal(tuple(taken), alone, judged, explained, self.by_chance)
 
     def _cause(self, key: Key, i: int, share: float, chosen: Sequence[int]) -> ProposedCause:
         term, columns = self.terms[i], [*self.own, *chosen, *self.places[i]]

@@ -94,7 +94,7 @@ def test_a_family_that_explains_the_force_along_the_motion_is_more_probable(scor
         (scored((name,), residuals=0.7 * GAP), 0.0, 0.5) for name in ("coulomb_friction", "cubic_stiffness")
     ]
     seen = ProposedCause(effect_named("coulomb_friction"), Family.DRY_FRICTION, "dynamics", 0.6, {})
-    proposal = Proposal((seen,), (seen,), frozenset({"coulomb_friction", "cubic_stiffness"}), 0.6)
+    proposal = Proposal((seen,), (seen,), frozenset({"coulomb_friction", "cubic_stiffness"}), 0.6, 0.0)
     by_family = {
         own.family: own
         for own in families_at_places(

@@ -338,3 +338,17 @@ class SearchNumbers:
         "budget",
         "Evaluations of the fit in a lower minimum.",
     )
+    decisive_force: float = number(
+        0.25,
+        "assumption",
+        (
+            "Share of the squared missing force along the measured motion that a family must explain alone for others to be left "
+            "out of the fits."
+        ),
+        set_by="thirteen measured rigs: with 0.5 two rigs with friction (0.26, 0.37) were searched for all families",
+    )
+    near_force: float = number(
+        0.5,
+        "assumption",
+        "Share of that from which on another family may be the cause: grids and first-order terms understate some.",
+    )

@@ -21,6 +21,7 @@ from rigsight.diagnose.search.several.pairs import refit_singles
 from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
 from rigsight.diagnose.search.several.several_effects import several_effects
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.diagnose.search.worth_fitting import worth_fitting
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
@@ -76,9 +77,8 @@ def single_models(
         )
     say("re-identified")
     proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects)
-    if proposal is not None:
-        effects = proposal.candidates(campaign.rig, effects)
-        say("missing force")
+    say("missing force")
+    effects = worth_fitting(campaign.rig, proposal, effects)
     while True:
         context = _with_known_motion(campaign, context, reidentified)
         search, singles = _singles(context, reidentified, effects, say, prepare)
@@ -91,7 +91,7 @@ def single_models(
     before = _before(campaign, context, reidentified)
     if campaign.given:
         say("given simulation")
-    return SingleModels(windowing, context, before, reidentified, singles, search, proposal, tuple(effects))
+    return SingleModels(windowing, context, before, reidentified, singles, search, proposal, effects)
 
 
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:

@@ -160,9 +160,9 @@ def test_a_changed_record_is_one_of_the_rig_with_the_effect(
     without = simulate(compose(AXIS, exact.modelled), TRUTH, changed, accuracy=1e-7)
     # What the beginning of a record does not tell (the input before it) is forgotten after some periods.
     late = slice(1000, None)
-    left, gap = (float(np.std((changed["x"] - shown["x"])[late])) for shown in (with_it, without))
-    assert left < 0.02 * float(np.std(record["x"]))
-    assert left < 0.1 * gap, f"{left:.3g} m of {gap:.3g} m remain"
+    remainder, gap = (float(np.std((changed["x"] - shown["x"])[late])) for shown in (with_it, without))
+    assert remainder < 0.02 * float(np.std(record["x"]))
+    assert remainder < 0.1 * gap, f"{remainder:.3g} m of {gap:.3g} m remain"
 
 
 def test_every_family_of_an_axis_is_offered(base: Base) -> None:

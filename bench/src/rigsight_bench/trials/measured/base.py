@@ -50,7 +50,7 @@ class Base:
         Constants, parameters and numbers of these effects by name.
     free
         Names of the numbers that the regression moves.
-    left
+    remainder
         RMS of what they leave of each equation, in the band of the motion.
     without
         The same equations without the friction that was chosen, if one was.
@@ -61,7 +61,7 @@ class Base:
     is_chosen: bool
     values: Mapping[str, float]
     free: tuple[str, ...]
-    left: Floats
+    remainder: Floats
     without: Base | None = None
 
     @property
@@ -93,7 +93,7 @@ class Base:
             EquationFit(self.rig, record_motions(self.rig, records, self.values), self.modelled, self.free)
             for records in (reference, changed)
         )
-        return float(np.max(before.unexplained(after, self.values, self.left) / self.left))
+        return float(np.max(before.unexplained(after, self.values, self.remainder) / self.remainder))
 
     def size(self, name: str) -> float:
         """Return the RMS of an input or a reading in the records.
@@ -143,10 +143,10 @@ def base_of(campaign: Campaign) -> Base:
         if not rig.offers(placed(effect_named(FRICTION), joint.name)):
             continue
         found = _fitted(campaign, motions, start, free, (effect,), is_chosen=True)
-        if size_in(found.left, plain.left) < min(_HELPS, size_in(best.left, plain.left)):
+        if size_in(found.remainder, plain.remainder) < min(_HELPS, size_in(best.remainder, plain.remainder)):
             best = found
     # Strengths are in units of what the better equations leave.
-    return replace(best, without=replace(plain, left=best.left)) if best.is_chosen else best
+    return replace(best, without=replace(plain, remainder=best.remainder)) if best.is_chosen else best
 
 
 def _fitted(
@@ -164,5 +164,5 @@ def _fitted(
         (effect,) = modelled
         name = structure.parameter_name(effect, "T_c")
         values[name], free = 0.0, (*free, name)
-    values, left = EquationFit(rig, motions, modelled, free).settled(values)
-    return Base(campaign, modelled, is_chosen, values, free, left)
+    values, remainder = EquationFit(rig, motions, modelled, free).settled(values)
+    return Base(campaign, modelled, is_chosen, values, free, remainder)

@@ -197,7 +197,7 @@ def _trial(
             "chosen_by_fit": base.is_chosen,
             "own_of_same_family": is_own,
             "values": {name: base.values[name] for name in of_base},
-            "force_residual": base.left.tolist(),
+            "force_residual": base.remainder.tolist(),
         },
         "rig": rig.name,
         "declaration": dict(rig.declaration),

@@ -1,0 +1,43 @@
+"""Which effects are fitted after what the motion says of the missing force?"""
+
+from __future__ import annotations
+
+from rigsight.diagnose.search.worth_fitting import worth_fitting
+from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.inverse import Proposal, ProposedCause
+from rigsight.rigs import AXIS
+
+
+def cause(name: str, share: float) -> ProposedCause:
+    effect = effect_named(name)
+    return ProposedCause(effect, effect.family, AXIS.where(effect), share, {})
+
+
+def fitted(*alone: ProposedCause, taken: tuple[ProposedCause, ...] = (), by_chance: float = 0.1) -> set[str]:
+    effects: list[Effect] = [*CATALOGUE]
+    judged = frozenset(e.name for e in effects if not e.states)
+    proposal = Proposal(taken or alone[:1], alone, judged, alone[0].share, by_chance)
+    return {effect.name for effect in worth_fitting(AXIS, proposal, effects)}
+
+
+def test_families_that_explain_little_beside_the_best_are_not_fitted() -> None:
+    kept = fitted(
+        cause("coulomb_friction", 0.8), cause("cubic_stiffness", 0.5), cause("quadratic_damping", 0.2)
+    )
+    assert {"coulomb_friction", "stribeck_friction", "cubic_stiffness"} <= kept
+    assert "quadratic_damping" not in kept
+
+
+def test_what_the_motion_does_not_judge_is_fitted() -> None:
+    assert {"sensor_lag", "flexible_mode"} <= fitted(cause("coulomb_friction", 0.8))
+
+
+def test_a_further_family_that_was_taken_is_fitted() -> None:
+    best, second = cause("coulomb_friction", 0.8), cause("quadratic_damping", 0.2)
+    assert "quadratic_damping" in fitted(best, second, taken=(best, second))
+
+
+def test_where_no_family_explains_enough_all_are_fitted() -> None:
+    assert len(fitted(cause("coulomb_friction", 0.2))) == len(CATALOGUE)
+    assert len(fitted(cause("coulomb_friction", 0.8), by_chance=0.9)) == len(CATALOGUE)
+    assert worth_fitting(AXIS, None, CATALOGUE) == CATALOGUE
