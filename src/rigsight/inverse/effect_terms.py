@@ -37,6 +37,8 @@ _WAVES = 40
 """Points of the grid of a wave number: between two of them a wave loses its phase at the ends of the motion."""
 _LEAST_SHARE, _MOST_SHARE = 0.02, 3.0
 """Range of the grid in characteristic sizes, within that of a search."""
+_SMALL_PART = 0.05
+"""Parameters of a drive effect in characteristic sizes: small, and above the noise of the force."""
 _SMALL = 1e-3
 """Change of a reading, in units of its deviation, from which its influence on the equations is taken."""
 
@@ -161,7 +163,7 @@ def _waves(parameter: Parameter, scales: Mapping[str, float]) -> Floats:
 def _of_drive(
     effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
 ) -> Iterator[Term]:
-    """Yield what the input must give beyond what reaches the motion, as a function of what the motion requires."""
+    """Yield what the input must give beyond what reaches the motion, a function of what the motion requires."""
     drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
     per_input = [_force_per_input(drive, {**values, **motion.record.constants}) for motion in fit.motions]
     if effect.states or not fit.motions[0].equations.n_coordinates or not all(per_input):
@@ -185,11 +187,13 @@ def _lost_in_drive(effect: Effect, scales: Mapping[str, float]) -> Iterator[tupl
         yield {}, np.gradient
         return
     own = [sp.Symbol(p.name, real=True) for p in effect.parameters]
-    if effect.drive is None or not effect.drive.free_symbols <= {canonical.u, *own}:
+    vanishes = all(p.null == 0.0 for p in effect.parameters)
+    if effect.drive is None or not vanishes or not effect.drive.free_symbols <= {canonical.u, *own}:
         return
-    drive = _compiled(effect.drive, (canonical.u, *own))
-    for inner in _grid_of(effect, (), scales):
-        yield inner, partial(_lost, drive, [inner[symbol.name] for symbol in own])
+    # To first order in small parameters. With large ones nearly all of the required force is lost, and this force holds the
+    # residual that it would explain.
+    inner = {p.name: _SMALL_PART * characteristic_value(p.dimension, scales) for p in effect.parameters}
+    yield inner, partial(_lost, _compiled(effect.drive, (canonical.u, *own)), list(inner.values()))
 
 
 def _lost(drive: Callable[..., Floats], numbers: Sequence[float], u: Floats, _dt: float) -> Floats:
