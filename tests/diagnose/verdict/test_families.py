@@ -89,26 +89,20 @@ def test_two_causes_divide_what_they_explain_together(families) -> None:
     assert shares.remainder == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_family_that_explains_the_force_along_the_motion_is_more_probable(scored) -> None:
+@pytest.mark.parametrize("by_chance", [0.0, 0.75])
+def test_a_family_that_explains_the_force_along_the_motion_is_more_probable(scored, by_chance: float) -> None:
     models = [
         (scored((name,), residuals=0.7 * GAP), 0.0, 0.5) for name in ("coulomb_friction", "cubic_stiffness")
     ]
     seen = ProposedCause(effect_named("coulomb_friction"), Family.DRY_FRICTION, "dynamics", 0.6, {})
-    proposal = Proposal((seen,), (seen,), frozenset({"coulomb_friction", "cubic_stiffness"}), 0.6, 0.0)
-    by_family = {
-        own.family: own
-        for own in families_at_places(
-            AXIS,
-            scored((), residuals=GAP),
-            models[0][0],
-            models,
-            1.0,
-            np.ones(1),
-            np.random.default_rng(1),
-            proposal,
-        )
-    }
+    proposal = Proposal((seen,), (seen,), frozenset({"coulomb_friction", "cubic_stiffness"}), 0.6, by_chance)
+    rng = np.random.default_rng(1)
+    found = families_at_places(
+        AXIS, scored((), residuals=GAP), models[0][0], models, 1.0, np.ones(1), rng, proposal
+    )
+    by_family = {own.family: own for own in found}
     friction, spring = by_family[Family.DRY_FRICTION], by_family[Family.SPRING_LAW]
-    assert friction.probability / spring.probability == pytest.approx(0.4**-FAMILIES.per_motion, rel=1e-6)
+    expected = 0.4 ** (-FAMILIES.per_motion * (1.0 - by_chance))
+    assert friction.probability / spring.probability == pytest.approx(expected, rel=1e-6)
     assert (friction.along_motion, spring.along_motion) == (0.6, None)
     assert friction.to_json()["along_motion"] == 0.6

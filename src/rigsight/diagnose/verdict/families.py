@@ -125,7 +125,9 @@ def families_at_places(
         for key in {*own_keys, *itertools.chain(*keys)}
     }
     along = {} if proposal is None else {(c.family, c.where): max(0.0, c.share) for c in proposal.alone}
-    main = _main_causes(of_rank, of_sets, explained, along)
+    certainty = 0.0 if proposal is None else 1.0 - proposal.by_chance
+    of_motion = {key: _evidence(share, FAMILIES.per_motion * certainty) for key, share in along.items()}
+    main = _main_causes(of_rank, of_sets, explained, of_motion)
     found = []
     for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
         members = [i for i, own in enumerate(keys) if key in own]
@@ -167,7 +169,7 @@ def _main_causes(
     of_rank: Mapping[Key, float],
     of_sets: Mapping[frozenset[Key], Sequence[int]],
     explained: NDArray[np.float64],
-    along: Mapping[Key, float],
+    of_motion: Mapping[Key, float],
 ) -> dict[Key, float]:
     """Return how probable each family is as the main cause where no law is exact.
 
@@ -179,8 +181,7 @@ def _main_causes(
     for key, share in of_rank.items():
         simulated = max((float(explained[i]) for i in of_sets.get(frozenset({key}), ())), default=0.0)
         weights[key] = max(share, FAMILIES.least_rank) * math.exp(
-            _evidence(simulated, FAMILIES.per_simulation)
-            + _evidence(along.get(key, 0.0), FAMILIES.per_motion)
+            _evidence(simulated, FAMILIES.per_simulation) + of_motion.get(key, 0.0)
         )
     whole = math.fsum(weights.values()) + FAMILIES.other_causes
     return {key: weight / whole for key, weight in weights.items()}
