@@ -54,7 +54,6 @@ def proposed(own: Campaign, effects: Sequence[Effect] = CATALOGUE) -> Proposal:
         ("coulomb_friction", {"T_c": 3.0}, "dry_friction"),
         ("cubic_stiffness", {"k_3": 2e5}, "spring_law"),
         ("input_dead_zone", {"u_0": 3.0}, "drive_limit"),
-        ("input_delay", {"T_d": 0.01}, "delay_or_lag"),
         ("maxwell_branch", {"k_m": 200.0, "tau_m": 0.05}, "viscoelasticity"),
     ],
 )
@@ -73,6 +72,15 @@ def test_friction_is_found_at_its_joint() -> None:
     friction = effect_named("coulomb_friction@motor_bearing")
     found = proposed(campaign(rig, {**TRAIN, "T_c": 0.02}, [friction], (0.8, 1.5)))
     assert (found.taken[0].family, found.taken[0].where) == ("dry_friction", "motor_bearing")
+
+
+def test_a_delay_is_left_to_the_fits() -> None:
+    found = proposed(
+        campaign(AXIS, {**AXIS_VALUES, "T_d": 0.01}, [effect_named("input_delay")], (10.0, 20.0))
+    )
+    assert found.judged.isdisjoint(
+        {"input_delay", "sensor_delay", "time_shift", "actuator_lag", "sensor_lag"}
+    )
 
 
 def test_a_cause_comes_with_its_numbers() -> None:

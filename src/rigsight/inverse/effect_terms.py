@@ -3,6 +3,9 @@
 Parameters in which an effect is linear become coefficients; the others, such as a clearance or the length of a presliding spring,
 are tried on a grid. Effects of a drive are functions of the force that the motion requires, not of the logged input: a clip of
 the logged input would explain that input. Effects of a sensor are what a small change of its reading changes in the equations.
+
+A delay or a lag is no term: it changes what every number of the equations means, and what it moves holds the residual that it
+would explain.
 """
 
 from __future__ import annotations
@@ -10,7 +13,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
@@ -163,41 +166,27 @@ def _waves(parameter: Parameter, scales: Mapping[str, float]) -> Floats:
 def _of_drive(
     effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
 ) -> Iterator[Term]:
-    """Yield what the input must give beyond what reaches the motion, a function of what the motion requires."""
+    """Yield what the input must give beyond what reaches the motion, a function of what the motion requires.
+
+    To first order in small parameters. With large ones nearly all of the required force is lost, and this force holds the residual
+    that it would explain.
+    """
     drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
     per_input = [_force_per_input(drive, {**values, **motion.record.constants}) for motion in fit.motions]
-    if effect.states or not fit.motions[0].equations.n_coordinates or not all(per_input):
-        return
-    required = [_required(drive, fit, motion, values) for motion in fit.motions]
-    for inner, lost in _lost_in_drive(effect, scales):
-        columns = tuple(
-            motion.thinned(along * gain * lost(force / gain, motion.record.dt))[None]
-            for motion, (along, force), gain in zip(fit.motions, required, per_input, strict=True)
-        )
-        if all(np.all(np.isfinite(column)) for column in columns):
-            yield Term(effect, inner, (), (), columns, (True,))
-
-
-Shape = Callable[[Floats, float], Floats]
-"""A signal, shape (n_samples,), and its sample time -> another signal."""
-
-
-def _lost_in_drive(effect: Effect, scales: Mapping[str, float]) -> Iterator[tuple[dict[str, float], Shape]]:
-    if effect.delay is not None:
-        yield {}, np.gradient
-        return
     own = [sp.Symbol(p.name, real=True) for p in effect.parameters]
+    is_function = effect.drive is not None and effect.drive.free_symbols <= {canonical.u, *own}
     vanishes = all(p.null == 0.0 for p in effect.parameters)
-    if effect.drive is None or not vanishes or not effect.drive.free_symbols <= {canonical.u, *own}:
+    if not (is_function and vanishes and fit.motions[0].equations.n_coordinates and all(per_input)):
         return
-    # To first order in small parameters. With large ones nearly all of the required force is lost, and this force holds the
-    # residual that it would explain.
     inner = {p.name: _SMALL_PART * characteristic_value(p.dimension, scales) for p in effect.parameters}
-    yield inner, partial(_lost, _compiled(effect.drive, (canonical.u, *own)), list(inner.values()))
-
-
-def _lost(drive: Callable[..., Floats], numbers: Sequence[float], u: Floats, _dt: float) -> Floats:
-    return np.asarray(u - drive(u, *numbers))
+    reaching = _compiled(effect.drive, (canonical.u, *own))
+    columns = []
+    for motion, gain in zip(fit.motions, per_input, strict=True):
+        along, force = _required(drive, fit, motion, values)
+        lost = force - gain * reaching(force / gain, *inner.values())
+        columns.append(motion.thinned(along * lost)[None])
+    if all(np.all(np.isfinite(column)) for column in columns):
+        yield Term(effect, inner, (), (), tuple(columns), (True,))
 
 
 def _force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
@@ -222,50 +211,24 @@ def _required(
 def _of_sensor(
     effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
 ) -> Iterator[Term]:
-    """Yield what a small change of the reading, which undoes the effect, changes in the equations."""
+    """Yield what small changes of the reading, which undo a unit of each linear parameter, change in the equations."""
     name = fit.rig.acts_at(effect)
-    for inner, undone in _undone_in_reading(effect, scales):
-        columns = []
-        for motion in fit.motions:
-            if name not in motion.record:
-                return
-            changes = [undo(motion.record[name], motion.record.dt) for undo in undone.values()]
-            parts = [_influence(fit, motion, values, name, change) for change in changes]
-            if any(part is None for part in parts):
-                return
-            columns.append(motion.thinned(np.array(parts)))
-        declared = {p.name: p for p in effect.parameters}
-        sided = tuple(declared[p].lower >= 0.0 for p in undone)
-        yield Term(effect, inner, tuple(undone), (1.0,) * len(undone), tuple(columns), sided)
-
-
-def _undone_in_reading(
-    effect: Effect, scales: Mapping[str, float]
-) -> Iterator[tuple[dict[str, float], dict[str, Shape]]]:
-    """Yield nonlinear parameters, and what undoes a unit of each linear one in a reading."""
-    if effect.reading_delay is not None:
-        yield {}, {effect.parameters[0].name: np.gradient}
-        return
-    if effect.measured is None or effect.states:
+    if effect.measured is None or effect.states or any(name not in motion.record for motion in fit.motions):
         return
     fitted = [p for p in effect.parameters if p.fitted]
     slopes = {p: derivative(effect.measured, sp.Symbol(p.name, real=True)) for p in fitted}
     linear = [p for p in fitted if not slopes[p].has(sp.Symbol(p.name, real=True))]
-    if any(slopes[p].has(sp.Symbol(other.name, real=True)) for p in linear for other in linear):
-        return
     for inner in _grid_of(effect, linear, scales):
-        names = [sp.Symbol(name, real=True) for name in inner]
-        yield (
-            inner,
-            {
-                p.name: partial(_undone, _compiled(slopes[p], (canonical.reading, *names)), [*inner.values()])
-                for p in linear
-            },
-        )
-
-
-def _undone(slope: Callable[..., Floats], numbers: Sequence[float], reading: Floats, _dt: float) -> Floats:
-    return np.asarray(-slope(reading, *numbers))
+        arguments = (canonical.reading, *(sp.Symbol(own, real=True) for own in inner))
+        columns = []
+        for motion in fit.motions:
+            changes = [-_compiled(slopes[p], arguments)(motion.record[name], *inner.values()) for p in linear]
+            parts = [_influence(fit, motion, values, name, change) for change in changes]
+            if any(part is None for part in parts):
+                return
+            columns.append(motion.thinned(np.array(parts)))
+        names, sided = tuple(p.name for p in linear), tuple(p.lower >= 0.0 for p in linear)
+        yield Term(effect, inner, names, (1.0,) * len(linear), tuple(columns), sided)
 
 
 @lru_cache(maxsize=256)

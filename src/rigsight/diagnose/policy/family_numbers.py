@@ -20,7 +20,7 @@ class FamilyNumbers:
         ),
     )
     per_motion: float = number(
-        3.6,
+        3.5,
         "measured",
         "The same for the share of the squared force that a family leaves along the measured motion; less where few independent "
         "rows leave much to chance.",
@@ -28,7 +28,7 @@ class FamilyNumbers:
         "made these trials",
     )
     other_causes: float = number(
-        2.3,
+        2.0,
         "measured",
         "Weight of a cause of no family of the catalogue, where a family that explains nothing has the weight one.",
         set_by="the same trials",
