@@ -168,8 +168,8 @@ def _of_drive(
 ) -> Iterator[Term]:
     """Yield what the input must give beyond what reaches the motion, a function of what the motion requires.
 
-    To first order in small parameters. With large ones nearly all of the required force is lost, and this force holds the residual
-    that it would explain.
+    To first order in small parameters. With large ones nearly all of the required force is lost, and this force holds the
+    residual that it would explain.
     """
     drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
     per_input = [_force_per_input(drive, {**values, **motion.record.constants}) for motion in fit.motions]
@@ -218,6 +218,8 @@ def _of_sensor(
     fitted = [p for p in effect.parameters if p.fitted]
     slopes = {p: derivative(effect.measured, sp.Symbol(p.name, real=True)) for p in fitted}
     linear = [p for p in fitted if not slopes[p].has(sp.Symbol(p.name, real=True))]
+    if any(slopes[p].has(sp.Symbol(other.name, real=True)) for p in linear for other in linear):
+        return
     for inner in _grid_of(effect, linear, scales):
         arguments = (canonical.reading, *(sp.Symbol(own, real=True) for own in inner))
         columns = []
