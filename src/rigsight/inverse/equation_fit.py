@@ -141,6 +141,8 @@ class EquationFit:
 
     def independent(self, values: Mapping[str, float]) -> tuple[str, ...]:
         """Return the free numbers whose influence is not a sum of the influences of those before them."""
+        if not self.free:
+            return ()
         matrix, _ = self._influences(values, np.ones((1, 1)))
         own = np.abs(np.diag(np.linalg.qr(matrix, mode="r")))
         enough = _DEPENDENT * float(np.max(own, initial=0.0))
@@ -189,7 +191,7 @@ class EquationFit:
                 if self.structure.parameter_name(effect, p.name) in self.free:
                     # Dry friction, which is linear in its number.
                     found.append(self._along(motion, effect, {p.name: 1.0}, values))
-        return np.array(found) if found else np.zeros((0, 1, motion.record.n_samples))
+        return np.array(found) if found else np.zeros((0, *motion.residual(values).shape))
 
     def _own(self, effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
         return {p.name: values[self.structure.parameter_name(effect, p.name)] for p in effect.parameters}

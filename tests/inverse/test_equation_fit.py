@@ -1,0 +1,73 @@
+"""Are the numbers of the equations found along the measured motion, whatever is free?"""
+
+from __future__ import annotations
+
+import pytest
+
+from rigsight.diagnose.fitting.placed_effects import candidates_on
+from rigsight.effects import CATALOGUE, effect_named
+from rigsight.inverse import EquationFit, propose, record_motions
+from rigsight.rigs import RIGS, Rig
+from rigsight.rigs.reading.rig_file import rig_of_text
+
+from .test_proposal import AXIS_VALUES, TRAIN, campaign
+
+CART = """
+name = "cart"
+summary = "A cart whose numbers are all known."
+[inputs.f]
+unit = "N"
+[constants.m]
+unit = "kg"
+[coordinates.x]
+unit = "m"
+[energy]
+kinetic = "m*d(x)^2/2"
+[joints.rail]
+motion = "x"
+[drives.motor]
+signal = "f"
+force = "motor"
+along = "x"
+[sensors.x]
+reads = "x"
+unit = "m"
+"""
+
+
+@pytest.fixture(scope="module")
+def train() -> Rig:
+    return RIGS["drive_train"]
+
+
+def test_numbers_are_found_from_others(train: Rig) -> None:
+    own = campaign(train, TRAIN, [], (0.8, 1.5))
+    fit = EquationFit(train, record_motions(train, own.records, TRAIN), (), ("J_m", "J_l", "k_s"))
+    found, _ = fit.settled({**TRAIN, "J_m": 2e-4, "J_l": 4e-4, "k_s": 1.0})
+    assert found["J_l"] == pytest.approx(TRAIN["J_l"], rel=0.02)
+    assert found["k_s"] == pytest.approx(TRAIN["k_s"], rel=0.02)
+
+
+def test_where_nothing_is_free_the_numbers_stay(train: Rig) -> None:
+    own = campaign(train, TRAIN, [], (0.8,))
+    motions = record_motions(train, own.records, TRAIN)
+    fit = EquationFit(train, motions, (), ())
+    assert fit.independent(TRAIN) == ()
+    assert fit.settled(TRAIN)[0] == TRAIN
+    assert fit.slopes(motions[0], TRAIN).shape == (0, 2, own.records[0].n_samples)
+
+
+def test_of_two_numbers_that_do_the_same_the_first_is_free() -> None:
+    rig = RIGS["axis"]
+    own = campaign(rig, AXIS_VALUES, [], (10.0,))
+    fit = EquationFit(rig, record_motions(rig, own.records, AXIS_VALUES), (), ("force_off", "k", "x_off"))
+    assert fit.independent(AXIS_VALUES) == ("force_off", "k")
+
+
+def test_a_rig_without_a_free_number_is_asked_too() -> None:
+    rig = rig_of_text(CART, "cart.toml")
+    friction = effect_named("coulomb_friction")
+    own = campaign(rig, {"m": 2.0, "T_c": 0.5}, [friction], (3.0,))
+    found = propose(own, {"m": 2.0}, candidates_on(rig, CATALOGUE))
+    assert found is not None
+    assert found.alone[0].family == friction.family
