@@ -149,7 +149,7 @@ class _Selection:
         self.size = np.sqrt(np.mean(matrix**2, axis=0))
         self.size[self.size == 0.0] = 1.0
         self.size[-1] = 1.0
-        matrix = matrix / self.size
+        matrix, self.n_rows = matrix / self.size, target.size
         self.own = list(range(regressors[0].shape[1]))
         ends = np.cumsum([part.shape[1] for part in regressors])
         self.places = [list(range(a, b)) for a, b in pairwise(ends)]
@@ -163,7 +163,7 @@ class _Selection:
 
     def _solved(self, products: Floats, columns: Sequence[int]) -> Floats:
         normal = products[np.ix_(columns, columns)]
-        ridge = _SMOOTH * np.trace(normal) / max(len(columns), 1) * np.eye(len(columns))
+        ridge = _SMOOTH * self.n_rows * np.eye(len(columns))
         return np.asarray(np.linalg.solve(normal + ridge, products[columns, -1]))
 
     def _remainder(self, chosen: Sequence[int]) -> float:
