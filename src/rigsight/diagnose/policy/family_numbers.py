@@ -30,8 +30,8 @@ class FamilyNumbers:
     other_causes: float = number(
         7.5,
         "measured",
-        "Weight of a cause of no family of the catalogue, or of one that the motion does not judge; a family that explains nothing "
-        "has the weight one.",
+        "Weight of a cause of no family of the catalogue, or of one that the motion does not judge; a family that explains "
+        "nothing has the weight one.",
         set_by="the same trials",
     )
     least_rank: float = number(
