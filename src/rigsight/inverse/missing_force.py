@@ -137,7 +137,12 @@ def missing_forces(
                     for m, own in zip(fit.motions, rows, strict=True)
                     for _ in range(own.shape[1])
                 ),
-                np.concatenate([_inner(m, m.record.dt * np.arange(m.record.n_samples)) for m in fit.motions]),
+                np.concatenate(
+                    [
+                        _inner(m, np.arange(m.record.n_samples, dtype=np.float64) * m.record.dt)
+                        for m in fit.motions
+                    ]
+                ),
                 np.concatenate([_inner(m, own.x) for m, own in zip(fit.motions, moved, strict=True)]),
                 np.concatenate([_inner(m, own.v) for m, own in zip(fit.motions, moved, strict=True)]),
                 force,
