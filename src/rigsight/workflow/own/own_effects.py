@@ -14,10 +14,11 @@ from pathlib import Path
 
 from rigsight.discover.terms.monomials import known_terms
 from rigsight.effects import AT, CATALOGUE, Effect, placed
+from rigsight.effects.effect import PARTS
 from rigsight.errors import InputError, check_option
 from rigsight.simulate.printing.text import text
 from rigsight.workflow.own.effect_checks import failed_checks
-from rigsight.workflow.own.effect_declaration import declaration_faults, equations
+from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.python_file import run_python_file
 from rigsight.workflow.run.progress import Listener, Stage, silent
 
@@ -100,17 +101,7 @@ def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
 
 def equation_text(effect: Effect) -> str:
     """Return the equation of an effect in one line of plain text, shortened if it is long."""
-    reported = {
-        "torque": "resisting torque = {}",
-        "spring": "spring torque = {}",
-        "deflection": "deflection of the spring = {}",
-        "drive": "drive = {}",
-        "delay": "drive = u(t - {})",
-        "lateral": "lateral rate = {}",
-        "measured": "measured = {}",
-        "reading_delay": "measured = reading(t - {})",
-    }
-    lines = [reported[field].format(text(expression, {})) for field, expression in equations(effect).items()]
+    lines = [PARTS[part].text.format(text(expression, {})) for part, expression in effect.equations.items()]
     for state in effect.states:
         limit = "" if state.limit is None else f" within +-{text(state.limit, {})}"
         lines.append(f"{state.symbol}' = {text(state.rate, {})}{limit}")
