@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigsight.discover.terms.monomials import known_terms
-from rigsight.effects import AT, CATALOGUE, Effect, placed
+from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.effect import PARTS
-from rigsight.errors import InputError, check_option
+from rigsight.errors import InputError
 from rigsight.simulate.printing.text import text
 from rigsight.workflow.own.effect_checks import failed_checks
 from rigsight.workflow.own.effect_declaration import declaration_faults
@@ -90,13 +90,8 @@ def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
 
     A name may say where the effect acts, ``coulomb_friction@shaft``; whether the rig has this place is checked later.
     """
-    known = {effect.name: effect for effect in (*CATALOGUE, *own)}
-    found = []
-    for name in dict.fromkeys(names):
-        kind, at, place = name.partition(AT)
-        effect = known[check_option("Effect", kind, known)]
-        found.append(placed(effect, place) if at else effect)
-    return tuple(found) or tuple(known.values())
+    known = (*CATALOGUE, *own)
+    return tuple(effect_named(name, known) for name in dict.fromkeys(names)) or known
 
 
 def equation_text(effect: Effect) -> str:
