@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from rigsight.api.choice import named
 from rigsight.api.estimator import campaign_of
-from rigsight.api.tables import data_frame
+from rigsight.api.results import data_frame, named
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor
 from rigsight.report.drawing.comparison_figures import overall_figure, record_figures

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, get_args
 
-from rigsight.api.choice import check_unused, named
 from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.tables import data_frame
+from rigsight.api.results import check_unused, data_frame, named
 from rigsight.campaign import Campaign
 from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.location.trace import STAGES

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.tables import data_frame
+from rigsight.api.results import data_frame
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery
 from rigsight.errors import check_option

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
-from rigsight.api.choice import check_unused, named
 from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.tables import data_frame
+from rigsight.api.results import check_unused, data_frame, named
 from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, check_option

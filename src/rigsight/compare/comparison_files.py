@@ -7,8 +7,9 @@ import io
 from collections.abc import Mapping
 from typing import Any
 
-from rigsight.compare import QUANTITIES, Column, Comparison, Score
+from rigsight.compare import QUANTITIES, Column, Comparison
 from rigsight.compare.comparison import best
+from rigsight.json_data import json_data
 
 SCHEMA_VERSION = 1
 _HEAD = (
@@ -20,14 +21,14 @@ _HEAD = (
 def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[str, Any]:
     """Return the content of ``comparison.json``."""
     overall = comparison.overall()
-    return {
+    content = {
         "schema_version": SCHEMA_VERSION,
         "title": comparison.title,
         "rig": comparison.rig,
         "method": comparison.method,
         "step_seconds": comparison.step_seconds,
         "window_length": comparison.window_length,
-        "quantities": dict(QUANTITIES),
+        "quantities": QUANTITIES,
         "models": [
             {"name": c.name, "source": c.source, "model": c.model.to_json()} for c in comparison.competitors
         ],
@@ -37,7 +38,7 @@ def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[
                 "role": r.record.role,
                 "kind": r.record.kind,
                 "amplitude": r.record.amplitude,
-                "notes": list(r.notes),
+                "notes": r.notes,
             }
             for r in comparison.records
         ],
@@ -51,7 +52,17 @@ def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[
             }
             for f in comparison.floors
         ],
-        "scores": [_score(s) for s in comparison.scores],
+        "scores": [
+            {
+                "model": s.model,
+                "record": s.record,
+                **_column(s.column),
+                "value": s.value,
+                "noise_floor": s.noise_floor,
+                "n_values": s.n_values,
+            }
+            for s in comparison.scores
+        ],
         "overall": [
             {
                 "model": model,
@@ -67,14 +78,15 @@ def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[
             {
                 "model": f.model,
                 "record": f.record,
-                **(_column(f.column) if f.column else {}),
+                **_column(f.column),
                 "reason": f.reason,
             }
             for f in comparison.failures
         ],
-        "notes": list(comparison.notes),
-        "figures": dict(figures),
+        "notes": comparison.notes,
+        "figures": figures,
     }
+    return json_data(content)
 
 
 def comparison_csv(comparison: Comparison) -> str:
@@ -100,16 +112,7 @@ def comparison_csv(comparison: Comparison) -> str:
     return file.getvalue()
 
 
-def _column(column: Column) -> dict[str, str]:
+def _column(column: Column | None) -> dict[str, str]:
+    if column is None:
+        return {}
     return {"signal": column.signal, "quantity": column.quantity, "unit": column.unit}
-
-
-def _score(score: Score) -> dict[str, Any]:
-    return {
-        "model": score.model,
-        "record": score.record,
-        **_column(score.column),
-        "value": score.value,
-        "noise_floor": score.noise_floor,
-        "n_values": score.n_values,
-    }

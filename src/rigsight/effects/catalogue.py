@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rigsight.effects.actuator_lag import ACTUATOR_LAG
 from rigsight.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS
 from rigsight.effects.backlash import BACKLASH
@@ -78,15 +80,15 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 
 
-def effect_named(name: str) -> Effect:
-    """Return the effect of the catalogue with this name, at its place where it names one: ``"coulomb_friction@shaft"``.
+def effect_named(name: str, known: Iterable[Effect] = CATALOGUE) -> Effect:
+    """Return the known effect with this name, at its place where it names one: ``"coulomb_friction@shaft"``.
 
     Raises
     ------
     InputError
         Naming the nearest and all known effects.
     """
-    effects = {effect.name: effect for effect in CATALOGUE}
+    effects = {effect.name: effect for effect in known}
     kind, at, place = name.partition(AT)
     effect = effects[check_option("Effect", kind, effects)]
     return placed(effect, place) if at else effect
