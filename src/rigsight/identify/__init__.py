@@ -1,5 +1,6 @@
 """Physical parameters from records: transfer functions, linear start values, grey-box fits, their uncertainty."""
 
+from rigsight.identify.absent_spring import weighed_spring as weighed_spring
 from rigsight.identify.fit.coordinates import Coordinates as Coordinates
 from rigsight.identify.fit.covariance import SMOOTHED as SMOOTHED
 from rigsight.identify.fit.covariance import sandwich_covariance as sandwich_covariance

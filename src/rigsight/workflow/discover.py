@@ -11,13 +11,13 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
 from rigsight.discover.regression import has_stiffness
 from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.identify.fit.windows import cut, window_length
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record

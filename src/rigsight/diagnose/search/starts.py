@@ -8,12 +8,12 @@ from collections.abc import Iterator, Mapping
 import sympy as sp
 
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.fitting.windows import leading_output
 from rigsight.diagnose.search.persistent_line import persistent_line
 from rigsight.diagnose.search.waves import wave_starts
 from rigsight.effects import Effect, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
+from rigsight.identify.fit.windows import leading_output
 from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value

@@ -10,8 +10,6 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.absent_spring import with_weighed_spring
-from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.identify import (
     FitResult,
@@ -23,6 +21,7 @@ from rigsight.identify import (
     swallowed_by_offsets,
 )
 from rigsight.identify.amplitude_dependence import amplitude_dependence, measured_amplitude
+from rigsight.identify.fit.windows import cut, window_length
 from rigsight.identify.identifiability import helpful_sensors, identifiability, relative_errors
 from rigsight.identify.identification import (
     Identification,
@@ -99,7 +98,7 @@ def identify_any_rig(
     campaign: Campaign, options: EstimationOptions, n_jobs: int, listener: Listener
 ) -> Identification:
     """Identify a rig of any shape."""
-    campaign = with_weighed_spring(campaign)
+    campaign = campaign.with_weighed_spring()
     rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
     check_option(
         f"The method for the rig '{rig.name}' with these records (h1 and thesis are for built-in rigs of one motion that returns "

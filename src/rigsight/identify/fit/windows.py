@@ -1,4 +1,14 @@
-"""Cutting records into windows with their own initial states, for rigs that drift or move too sensitively."""
+"""Over which stretches of its records is a model fitted: whole, windows with their own initial states, or followed?
+
+A rig without a spring integrates every force error twice, so that a free run soon shows only the drift. Windows keep it small;
+an observer is pulled towards the measured motion. A missing effect still shows within about the reciprocal of the observer's
+bandwidth, while slower drift is removed. Internal states of effects are not corrected.
+
+References
+----------
+D. G. Luenberger, IEEE Trans. Automatic Control 16 (1971) 596, for observers. L. Ljung, *System Identification* (Prentice Hall
+1999), sections 4.3 and 7.4, for predictors of disturbed systems and for fits of them.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +19,63 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.observer import Observer, sensors_of_motion
-from rigsight.diagnose.policy import HORIZON, VERDICT
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
+from rigsight.simulate import compose
 from rigsight.simulate.prescribed_motion import smooth_motion
+
+_PERIODS = 10.0
+"""Length of a window in typical periods of the velocity, if a rig drifts and no sensor measures its motion; an assumption."""
+_SAMPLES = 100
+"""Fewest samples of such a window."""
+_MOST_WINDOWS = 40
+"""Largest number of such windows per record, because each has its own initial state."""
+_FEWEST_IN_CYCLES = 60
+"""Fewest samples of a window counted in cycles."""
+_ABOVE_NOISE = 3.0
+"""Distance from the mean, in units of the noise, that a signal must reach for a zero crossing to count as motion."""
+_DIED_AWAY = 0.99
+"""Share of the sum of squared sample-to-sample changes of an output after which a free motion has decayed below a tenth."""
+_FEWEST_IN_MOTION = 100
+"""Fewest samples of a free motion that are kept."""
+
+
+@dataclass(frozen=True)
+class Observer:
+    """Sensors that a model tracks while it is compared with records, and the bandwidth."""
+
+    sensors: tuple[str, ...]  # names of sensors that read only the motion
+    bandwidth: float  # angular frequency up to which the motion is tracked [rad/s]
+
+    def following(self, records: Sequence[Record]) -> tuple[Record, ...]:
+        """Return records that models follow while they are fitted to them."""
+        return tuple(
+            replace(record, observed={name: self.bandwidth for name in self.sensors if name in record})
+            for record in records
+        )
+
+
+def observed_sensors(records: Sequence[Record]) -> frozenset[str]:
+    """Return the sensors that models follow while they are fitted to records."""
+    return frozenset(sensor for record in records for sensor in record.observed)
+
+
+def followed_sensors(rig: Rig, records: Sequence[Record]) -> tuple[str, ...]:
+    """Return the sensors that models can track in records: those that read only the motion."""
+    return tuple(name for name in sensors_of_motion(rig) if any(name in record for record in records))
+
+
+def sensors_of_motion(rig: Rig) -> tuple[str, ...]:
+    """Return the sensors of a rig that read only its motion: coordinates and their rates."""
+    structure = compose(rig)
+    motion = structure.tree.motion
+    moving = {*motion.coordinates, *motion.velocities}
+    return tuple(
+        sensor.name
+        for sensor, reading in zip(rig.mechanism.sensors, structure.outputs, strict=True)
+        if reading.free_symbols & moving and reading.free_symbols <= {*moving, *structure.parameter_symbols}
+    )
 
 
 @dataclass(frozen=True)
@@ -26,11 +88,6 @@ class Windowing:
     # Noise floor of each output whose cycles count, the first that a record holds.
     noise: Mapping[str, float] = field(default_factory=dict)
     observer: Observer | None = None  # what models follow along whole records; None for a free run
-
-    @classmethod
-    def by_cycles(cls, noise: Mapping[str, float]) -> Windowing:
-        """Return windows of a few cycles of the first of these outputs that a record holds, with their noise floors."""
-        return cls(cycles=VERDICT.window_cycles, noise=noise)
 
     @property
     def whole(self) -> bool:
@@ -56,13 +113,13 @@ class Windowing:
     def _edges(self, record: Record, cycles: int) -> list[int]:
         output = next(name for name in self.noise if name in record)
         deviation = record[output] - np.median(record[output])
-        size = HORIZON.crossing_above_noise * self.noise[output]
+        size = _ABOVE_NOISE * self.noise[output]
         sides = np.flatnonzero(np.abs(deviation) > size)
         above = deviation[sides] > 0.0
         crossings = sides[1:][above[1:] & ~above[:-1]]
         edges = [0]
         for crossing in map(int, crossings[cycles - 1 :: cycles]):
-            if min(crossing - edges[-1], record.n_samples - crossing) >= HORIZON.fewest_window_samples:
+            if min(crossing - edges[-1], record.n_samples - crossing) >= _FEWEST_IN_CYCLES:
                 edges.append(crossing)
         return [*edges, record.n_samples]
 
@@ -84,8 +141,9 @@ def readings(records: Sequence[Record], sensor: str) -> dict[str, NDArray[np.flo
 def leading_output(rig: Rig, records: Sequence[Record]) -> str:
     """Return the output that defines cycles and excited stretches: the first that most records contain, preferably of motion."""
     outputs = [signal.name for signal in rig.outputs]
-    of_motion = [name for name in sensors_of_motion(rig) if any(name in record for record in records)]
-    return max(of_motion or outputs, key=lambda name: sum(name in record for record in records))
+    return max(
+        followed_sensors(rig, records) or outputs, key=lambda name: sum(name in record for record in records)
+    )
 
 
 def shown_by(rig: Rig, records: Sequence[Record]) -> list[str]:
@@ -102,9 +160,9 @@ def window_length(rig: Rig, records: Sequence[Record]) -> float:
     dt = max(record.dt for record in records)
     longest = max(record.n_samples * record.dt for record in records)
     wished = max(
-        HORIZON.window_periods * typical_period(rig, records),
-        HORIZON.window_samples * dt,
-        longest / HORIZON.most_windows,
+        _PERIODS * typical_period(rig, records),
+        _SAMPLES * dt,
+        longest / _MOST_WINDOWS,
     )
     return min(wished, longest)
 
@@ -142,3 +200,43 @@ def _at(record: Record, edges: Sequence[int]) -> list[Record]:
         replace(record.slice(start, stop), name=f"{record.name} window {i}", window_of=record.origin)
         for i, (start, stop) in enumerate(itertools.pairwise(edges), start=1)
     ]
+
+
+def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
+    """Return the records, those of a free motion only until it has decayed.
+
+    The position at which friction stops a mass changes in jumps with the parameters: a fit that includes the following rest,
+    which may be long, would not leave its start.
+    """
+    cut_off = []
+    for record, output in zip(records, shown_by(rig, records), strict=True):
+        stop = record.n_samples
+        if all(is_constant(record[signal.name]) for signal in rig.inputs):
+            energy = np.cumsum(np.diff(record[output]) ** 2)
+            stop = max(_FEWEST_IN_MOTION, int(np.searchsorted(energy, _DIED_AWAY * energy[-1])) + 1)
+        cut_off.append(record.slice(0, min(stop, record.n_samples)))
+    return tuple(cut_off)
+
+
+def liveliest(records: Sequence[Record], rig: Rig, n_samples: int) -> tuple[Record, ...]:
+    """Return the most excited stretch of each record, together about `n_samples` long."""
+    shown = zip(records, shown_by(rig, records), strict=True)
+    return strongest(
+        records, [(record[output] - np.mean(record[output])) ** 2 for record, output in shown], n_samples
+    )
+
+
+def strongest(
+    records: Sequence[Record], powers: Sequence[NDArray[np.float64]], n_samples: int
+) -> tuple[Record, ...]:
+    """Return the stretch of each record with the largest sum of a power, shape (n_samples,), together about `n_samples` long."""
+    share = max(500, n_samples // max(1, len(records)))
+    stretches = []
+    for record, power in zip(records, powers, strict=True):
+        if record.n_samples <= share:
+            stretches.append(record)
+            continue
+        energy = np.cumsum(power)
+        start = int(np.argmax(energy[share:] - energy[:-share]))
+        stretches.append(record.slice(start, start + share))
+    return tuple(stretches)
