@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.regression import Projected
 from rigsight.discover.support_starts import SupportStarts
 from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over, compose, unique_names
 
@@ -42,7 +41,7 @@ class Trial:
     error_over_noise: float  # RMS of the first output's held-out free-run error in units of the noise floor
     # Held-out errors of the first output in units of the noise floor, all records one after the other; empty
     # if a rough score was sufficient.
-    residuals: NDArray[np.float64]
+    residuals: Floats
 
     @property
     def n_free(self) -> int:
@@ -112,7 +111,7 @@ class Bench:
     candidates: Mapping[str, Candidate]  # the library, by name
     projected: Projected  # the regression
     # Columns of the rig's own terms that compete (full form), by parameter.
-    own_terms: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    own_terms: Mapping[str, Floats] = field(default_factory=dict)
     # Threads that fit supports, and the records of a fit, in parallel.
     threads: IdleThreads = field(default_factory=IdleThreads)
     # The supports polished so far.
@@ -137,7 +136,7 @@ class Bench:
         ]
         return replace(self.projected, base=self.projected.base[:, kept])
 
-    def column(self, name: str) -> NDArray[np.float64]:
+    def column(self, name: str) -> Floats:
         """Return the column of a term, one of the library or of the rig's own."""
         return self.own_terms[name] if name in self.own_terms else self.candidates[name].column
 

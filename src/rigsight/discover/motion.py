@@ -16,10 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate.prescribed_motion import smooth_motion
 
@@ -47,11 +46,11 @@ class Motion:
     """
 
     record: Record
-    x: NDArray[np.float64]
-    v: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    u: NDArray[np.float64]
-    measured: NDArray[np.float64]
+    x: Floats
+    v: Floats
+    acceleration: Floats
+    u: Floats
+    measured: Floats
 
     @property
     def dt(self) -> float:
@@ -122,7 +121,7 @@ class _Smoother:
         # Units in which every state changes by about one within a sample time: in SI the Riccati equation is badly scaled.
         self._units = np.array([1.0, 1.0 / dt, m / dt**2, m / dt**3])
 
-    def likeliest(self, x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
+    def likeliest(self, x: Floats, u: Floats) -> float:
         """Return the intensity of the missing force's second derivative that makes the displacement most likely."""
         carrier = self._carrier
         size = float(np.std(x)) or 1.0
@@ -138,9 +137,7 @@ class _Smoother:
         coarse = min(_DECADES, key=cost)
         return float(unit * 10.0 ** min((coarse, *(coarse + step for step in _BETWEEN)), key=cost))
 
-    def smoothed(
-        self, x: NDArray[np.float64], u: NDArray[np.float64], intensity: float
-    ) -> NDArray[np.float64]:
+    def smoothed(self, x: Floats, u: Floats, intensity: float) -> Floats:
         """Return the four states, shape (n_samples, 4)."""
         gain, _, back = self._gains(intensity)
         predicted, filtered, _ = self._filtered(x, u, gain)
@@ -149,7 +146,7 @@ class _Smoother:
             states[i] += back @ (states[i + 1] - predicted[i + 1])
         return states
 
-    def _gains(self, intensity: float) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+    def _gains(self, intensity: float) -> tuple[Floats, float, Floats]:
         units = self._units
         seen = np.array([[1.0, 0.0, 0.0, 0.0]])
         transition = self._transition * (units[None, :] / units[:, None])
@@ -160,9 +157,7 @@ class _Smoother:
         back = np.linalg.solve(spread, transition @ after).T
         return gain * units, float((spread[0, 0] + 1.0) * self._variance), back * np.outer(units, 1.0 / units)
 
-    def _filtered(
-        self, x: NDArray[np.float64], u: NDArray[np.float64], gain: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _filtered(self, x: Floats, u: Floats, gain: Floats) -> tuple[Floats, Floats, Floats]:
         n = x.size
         driven = np.outer(u[:-1], self._level) + np.outer(np.diff(u) / self._dt, self._slope)
         predicted, filtered, errors = np.zeros((n, 4)), np.zeros((n, 4)), np.zeros(n)

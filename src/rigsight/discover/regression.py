@@ -17,14 +17,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
 from rigsight.discover.motion import Motion
 from rigsight.discover.weak_form import Rows
 from rigsight.errors import InputError
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 
 _WINDOW = 0.75
@@ -47,25 +46,25 @@ _RIDGE = 1e-12
 class Projected:
     """A regression with some columns projected out of the target and of all other columns."""
 
-    base: NDArray[np.float64]  # columns that are always included, shape (n_rows, n_base)
-    target: NDArray[np.float64]  # shape (n_rows,)
+    base: Floats  # columns that are always included, shape (n_rows, n_base)
+    target: Floats  # shape (n_rows,)
     independent: float  # number of independent rows; less than n_rows, because windows overlap
 
     @cached_property
-    def _directions(self) -> NDArray[np.float64]:
+    def _directions(self) -> Floats:
         size = np.linalg.norm(self.base, axis=0)
         return np.linalg.qr(self.base[:, size > 0.0] / size[size > 0.0])[0]
 
     @cached_property
-    def rest(self) -> NDArray[np.float64]:
+    def rest(self) -> Floats:
         """The target without the part that the base columns explain."""
         return self.rest_of(self.target)
 
-    def rest_of(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rest_of(self, columns: Floats) -> Floats:
         """Return columns without the part that the base columns explain."""
         return np.asarray(columns - self._directions @ (self._directions.T @ columns))
 
-    def explained(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    def explained(self, columns: Floats) -> tuple[Floats, float]:
         """Return coefficients of further columns and the share that they explain of the residual of the base."""
         remainder, added = self.rest, self.rest_of(columns)
         size = np.linalg.norm(added, axis=0)
@@ -75,7 +74,7 @@ class Projected:
         rest = remainder - (added / size) @ solution
         return solution / size, float(1.0 - (rest @ rest) / (remainder @ remainder))
 
-    def solved(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    def solved(self, columns: Floats) -> tuple[Floats, float]:
         """Return coefficients of base and further columns, shape (n_base + n_columns,), and the RMS of the residual."""
         matrix = np.column_stack([self.base, columns])
         size = np.linalg.norm(matrix, axis=0) + 1e-300
@@ -84,7 +83,7 @@ class Projected:
         return solution / size, float(np.sqrt(np.mean(rest**2)))
 
 
-def sparse_path(projected: Projected, columns: NDArray[np.float64]) -> list[tuple[int, ...]]:
+def sparse_path(projected: Projected, columns: Floats) -> list[tuple[int, ...]]:
     """Return supports of every size, smallest first: those that remain when pysindy's SSR drops term after term.
 
     The supports of FROLS, which adds terms instead, are included; the two differ if columns are similar.
@@ -95,9 +94,7 @@ def sparse_path(projected: Projected, columns: NDArray[np.float64]) -> list[tupl
     return sorted(supports, key=lambda s: (len(s), s))
 
 
-def inclusion_probabilities(
-    projected: Projected, columns: NDArray[np.float64], rng: np.random.Generator
-) -> NDArray[np.float64]:
+def inclusion_probabilities(projected: Projected, columns: Floats, rng: np.random.Generator) -> Floats:
     """Return the share of draws of random stretches of the rows in which each term is selected, shape (n_terms,).
 
     The support of a draw is the smallest whose residual hardly exceeds that of the support with the lowest Bayesian information
@@ -125,9 +122,7 @@ def information_criterion(mean_square: float, n_terms: int, independent: float) 
     return float(independent * np.log(mean_square + 1e-300) + n_terms * np.log(independent))
 
 
-def alike(
-    projected: Projected, columns: NDArray[np.float64], threshold: float
-) -> list[tuple[int, int, float]]:
+def alike(projected: Projected, columns: Floats, threshold: float) -> list[tuple[int, int, float]]:
     """Return pairs of terms whose columns are similar after the rig's own terms are projected out, with their correlation."""
     rest = projected.rest_of(columns)
     size = np.linalg.norm(rest, axis=0)
@@ -141,9 +136,7 @@ def alike(
     ]
 
 
-def _compressed(
-    matrix: NDArray[np.float64], target: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _compressed(matrix: Floats, target: Floats) -> tuple[Floats, Floats]:
     """Return a few rows with the same normal equations and the same sum of squares, with columns of unit length."""
     size = np.linalg.norm(matrix, axis=0)
     size[size == 0.0] = 1.0
@@ -151,7 +144,7 @@ def _compressed(
     return factor[:, :-1], factor[:, -1]
 
 
-def _shrinking(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list[tuple[int, ...]]:
+def _shrinking(matrix: Floats, target: Floats) -> list[tuple[int, ...]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from pysindy import SSR
@@ -166,7 +159,7 @@ def _shrinking(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list
     return _supports(optimizer.history_)
 
 
-def _growing(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list[tuple[int, ...]]:
+def _growing(matrix: Floats, target: Floats) -> list[tuple[int, ...]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from pysindy import FROLS
@@ -179,12 +172,12 @@ def _growing(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list[t
     return _supports(optimizer.history_)
 
 
-def _supports(history: Sequence[NDArray[np.float64]]) -> list[tuple[int, ...]]:
+def _supports(history: Sequence[Floats]) -> list[tuple[int, ...]]:
     supports = (tuple(int(i) for i in np.flatnonzero(np.ravel(coefficients))) for coefficients in history)
     return sorted({support for support in supports if support}, key=lambda s: (len(s), s))
 
 
-def _remainder(matrix: NDArray[np.float64], target: NDArray[np.float64], support: tuple[int, ...]) -> float:
+def _remainder(matrix: Floats, target: Floats, support: tuple[int, ...]) -> float:
     if not support:
         return float(target @ target)
     chosen = matrix[:, list(support)]
@@ -275,7 +268,7 @@ def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], row
     return Projected(base, np.concatenate(targets), max(independent, 10.0))
 
 
-def own_terms(rig: Rig, has_stiffness: bool, projected: Projected) -> dict[str, NDArray[np.float64]]:
+def own_terms(rig: Rig, has_stiffness: bool, projected: Projected) -> dict[str, Floats]:
     """Return the columns of the rig's damper and spring, which compete in the full form."""
     motion = rig.motion
     first = 1 if rig.is_driven else 0

@@ -7,12 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rigsight.discover.joints.joint_force import JointForce
 from rigsight.json_data import json_data
 from rigsight.records import Record
+from rigsight.records.record import Floats
 
 SCHEMA_VERSION = 1
 
@@ -75,9 +73,9 @@ class Run:
 
     record: str
     role: str
-    t: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    simulated: NDArray[np.float64]
+    t: Floats
+    measured: Floats
+    simulated: Floats
     output: str
     unit: str
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.regression import Projected
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over
 
@@ -94,9 +94,7 @@ def _within_bounds(structure: Structure, values: Mapping[str, float]) -> dict[st
     }
 
 
-def _rig_values(
-    rig: Rig, known: Mapping[str, float], base: NDArray[np.float64]
-) -> tuple[dict[str, float], float]:
+def _rig_values(rig: Rig, known: Mapping[str, float], base: Floats) -> tuple[dict[str, float], float]:
     """Return the rig's parameters from the coefficients of its own terms, and the force per unit of the other coefficients."""
     values = dict(known)
     motion = rig.motion

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.motion import Motion
+from rigsight.records.record import Floats
 
 _POWER = 5
 """Of the test function (1 - s^2)^p; its first four derivatives vanish at the ends of the window."""
@@ -30,10 +30,10 @@ class Windows:
 
     # Test function and its first two derivatives with respect to time, integration weights included, shape
     # (3, width).
-    weights: NDArray[np.float64]
+    weights: Floats
     step: int  # samples from row to row
 
-    def against(self, signal: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+    def against(self, signal: Floats, order: int) -> Floats:
         """Return the integrals of a signal with the test function or one of its derivatives, shape (n_rows,).
 
         There are none if the signal is shorter than a window.
@@ -61,23 +61,23 @@ class Rows:
         """Make a row of every `step`-th sample."""
         return cls(None, step)
 
-    def of(self, signal: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
+    def of(self, signal: Floats, dt: float) -> Floats:
         """Return the rows of a signal of shape (n_samples,)."""
         return signal[:: self.step] if self.width is None else windows(self.width, dt).against(signal, 0)
 
-    def rate_of(self, signal: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
+    def rate_of(self, signal: Floats, dt: float) -> Floats:
         """Return the rows of the derivative of a signal."""
         if self.width is None:
             return np.asarray(np.gradient(signal, dt)[:: self.step])
         return -windows(self.width, dt).against(signal, 1)
 
-    def velocity(self, motion: Motion) -> NDArray[np.float64]:
+    def velocity(self, motion: Motion) -> Floats:
         """Return the rows of the velocity."""
         if self.width is None:
             return motion.v[:: self.step]
         return -windows(self.width, motion.dt).against(motion.x, 1)
 
-    def acceleration(self, motion: Motion) -> NDArray[np.float64]:
+    def acceleration(self, motion: Motion) -> Floats:
         """Return the rows of the acceleration."""
         if self.width is None:
             return motion.acceleration[:: self.step]

@@ -126,9 +126,7 @@ def _why_not(records: Sequence[RecordIdentification]) -> str:
     return f"{reason}, so they cannot show whether the parameters change with it. {remedy}"
 
 
-def _comparable(
-    records: Sequence[RecordIdentification],
-) -> list[tuple[float, list[RecordIdentification]]]:
+def _comparable(records: Sequence[RecordIdentification]) -> list[tuple[float, list[RecordIdentification]]]:
     """Return the amplitudes in increasing order with their records, for the kind of records with the most amplitudes."""
     grouped = [_by_amplitude([r for r in alike if _has_numbers(r)]) for alike in _alike(records)]
     return max(grouped, key=len, default=[])
@@ -142,9 +140,7 @@ def _alike(records: Sequence[RecordIdentification]) -> list[list[RecordIdentific
     ]
 
 
-def _by_amplitude(
-    records: Sequence[RecordIdentification],
-) -> list[tuple[float, list[RecordIdentification]]]:
+def _by_amplitude(records: Sequence[RecordIdentification]) -> list[tuple[float, list[RecordIdentification]]]:
     """Return the amplitudes in increasing order with their records."""
     groups: list[tuple[float, list[RecordIdentification]]] = []
     for found in sorted(records, key=lambda r: r.amplitude):

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import orth
 
 from rigsight.identify.fit.coordinates import Coordinates
@@ -14,10 +13,9 @@ from rigsight.identify.fit.fit_problem import Problem
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.undetermined import POORLY_KNOWN, conditional_errors
+from rigsight.records.record import Floats
 from rigsight.simulate import carries_tangents
 from rigsight.units import characteristic_value
-
-Floats = NDArray[np.float64]
 
 _OWN_SIZE = 0.5
 """Value over its characteristic size from which a parameter of either sign is its own reference, as a stiffness that gives the

@@ -15,12 +15,10 @@ from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.transfer.record_response import Method
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure
 from rigsight.simulate.linearization import Linearization, linearize
-
-Floats = NDArray[np.float64]
 
 _STEP = 1e-4
 """Relative change of a parameter for a difference: rounding and curvature both contribute an error of 1e-8."""

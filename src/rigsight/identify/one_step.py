@@ -12,15 +12,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.covariance import propagated_covariance, sandwich_covariance
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.information import central_sensitivities, place_of_fit
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _FOLLOWED = 1e-9
 """Share of the strongest direction below which a combination of initial states has no influence."""

@@ -6,16 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from rigsight.identify.fit.covariance import SMOOTHED
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure
-
-Floats = NDArray[np.float64]
 
 _CHANCE = 1e-3
 """Probability by chance below which means count as different; with ten outputs this is wrong in one campaign in a hundred."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.policy import HORIZON
 from rigsight.effects import Effect, Place, placed
@@ -15,7 +14,7 @@ from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
 from rigsight.identify.fit.windows import cut, strongest
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig, joint_of
 from rigsight.simulate import Structure, compose, special_values
 
@@ -35,12 +34,12 @@ class FittedModel:
     error_over_noise: float  # RMS of the residuals in units of the noise floor
 
     @property
-    def residuals(self) -> tuple[NDArray[np.float64], ...]:
+    def residuals(self) -> tuple[Floats, ...]:
         """Per scoring record, shape (n_samples, n_outputs), NaN where an output was not measured."""
         return self.held_out.residuals
 
     @property
-    def initial_states(self) -> tuple[NDArray[np.float64], ...]:
+    def initial_states(self) -> tuple[Floats, ...]:
         """Of the equations, per scoring record."""
         return self.held_out.rig_states
 

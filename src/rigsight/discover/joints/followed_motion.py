@@ -17,11 +17,9 @@ from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionE
 from rigsight.discover.joints.unknown_force import UNKNOWN_FORCE, force_states
 from rigsight.effects import placed
 from rigsight.parameters import Parameter
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
-
-Floats = NDArray[np.float64]
 
 DECADES = (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0)
 """Intensities of an unknown force that are tried, in decades of its size and the motion's angular frequency."""

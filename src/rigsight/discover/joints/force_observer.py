@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.discover.joints.linearized_motion import LinearizedMotion
+from rigsight.records.record import Floats
 
-Floats = NDArray[np.float64]
 Rows = Callable[[int, int, Floats], None]
 """Called with sample, sensor and whitened rows, shape (n_cases, n_intensities, n_columns)."""
 AtSample = Callable[[int], Floats]

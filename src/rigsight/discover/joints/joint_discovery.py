@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.doubts import still_missing
 from rigsight.discover.held_out import split
@@ -33,12 +32,10 @@ from rigsight.identify import (
     swallowed_by_offsets,
     without_offsets,
 )
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-
-Floats = NDArray[np.float64]
 
 _EVALUATIONS = 100
 _NO_WORSE = 1.05

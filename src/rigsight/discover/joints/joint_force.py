@@ -12,17 +12,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.joints.followed_motion import FollowedMotion, within_reach
 from rigsight.discover.joints.joint_law import LawTerm, RegressedLaw, force_along, inclusion, regressed_laws
 from rigsight.discover.joints.joint_motion import JointMotion, followed_again, joint_motions, noise_of
 from rigsight.errors import InputError, SimulationError
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
-
-Floats = NDArray[np.float64]
 
 _ROUNDS = 7
 """Alternating estimates of law and motion: parameters that were identified without the force are far off at first."""

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.joints.joint_motion import JointMotion
 from rigsight.discover.joints.sensor_regression import SensorRegression, sensor_regressions
@@ -29,9 +28,8 @@ from rigsight.discover.terms.library import (
 from rigsight.discover.terms.monomials import LINEAR
 from rigsight.effects import Effect, Place, placed
 from rigsight.effects.placed import kind_of
+from rigsight.records.record import Floats
 from rigsight.rigs import Joint, Rig, evaluated
-
-Floats = NDArray[np.float64]
 
 _MOST_TERMS = 4
 _SAME_COLUMN = 1.0 - 1e-7

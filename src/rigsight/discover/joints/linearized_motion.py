@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, parameter_vector, record_input
 from rigsight.simulate.equations.derivatives import slopes_of
 from rigsight.simulate.equations.elimination import Elimination
@@ -24,8 +24,6 @@ from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.simulation import record_values
-
-Floats = NDArray[np.float64]
 
 _LONGEST_STEP = 0.5
 """Integration step times the fastest rate of the linearized equations; this is well within the stability limit of the method."""

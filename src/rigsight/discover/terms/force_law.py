@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected, inclusion_probabilities
@@ -24,6 +23,7 @@ from rigsight.discover.weak_form import Rows
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
+from rigsight.records.record import Floats
 from rigsight.simulate.printing.text import TermPrinter
 
 _FORCE = sp.Symbol("F", real=True)
@@ -79,7 +79,7 @@ def force_equation(
     law: ForceLaw,
     motions: Sequence[Motion],
     rows: Rows,
-    forces: Sequence[NDArray[np.float64]],
+    forces: Sequence[Floats],
     values: Mapping[str, float],
     rng: np.random.Generator,
 ) -> ForceEquation:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.discover.motion import Motion
@@ -23,6 +22,7 @@ from rigsight.effects import Effect, SumAndDifference
 from rigsight.effects import symbols as canonical
 from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
+from rigsight.records.record import Floats
 from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose, simulate_sets
 from rigsight.simulate.input_hold import hold_motion
@@ -95,7 +95,7 @@ class LoopShape:
         )
 
     @property
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest value of each refined coordinate."""
         sizes = [r for pair in self.pairs for r in (pair.sum_range, pair.difference_range)]
         ranges = [_logarithms(r) for r in sizes]
@@ -142,7 +142,7 @@ class Loop:
     """The shape of a loop and its column."""
 
     values: Mapping[str, float]  # nonlinear parameters of the effect
-    column: NDArray[np.float64]  # rows of the loop's own deflection in all records, shape (n_rows,)
+    column: Floats  # rows of the loop's own deflection in all records, shape (n_rows,)
     share: float  # share of the residual of the rig's own terms that the loop explains
 
 
@@ -166,7 +166,7 @@ def best_loop(
     grid, bounds = shape.grid, shape.bounds
     n_refined = bounds[0].size
 
-    def columns_at(points: Sequence[Point]) -> NDArray[np.float64]:
+    def columns_at(points: Sequence[Point]) -> Floats:
         shapes = [shape.values(point, scales) for point in points]
         return _columns(structure, effect, motions, rows, shapes, scales["x"], threads)
 
@@ -179,7 +179,7 @@ def best_loop(
 
     rest = projected.rest
 
-    def remainder(column: NDArray[np.float64]) -> NDArray[np.float64]:
+    def remainder(column: Floats) -> Floats:
         if not np.all(np.isfinite(column)):
             return rest
         column = projected.rest_of(column)
@@ -187,9 +187,9 @@ def best_loop(
 
     def refined(start: Point) -> Loop:
         kept = start[n_refined:]
-        seen: dict[bytes, NDArray[np.float64]] = {}
+        seen: dict[bytes, Floats] = {}
 
-        def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        def around(theta: Floats) -> Floats:
             """Return the residual at a point and one step along each axis; a few loops at once cost as much as one."""
             key = theta.tobytes()
             if key not in seen:
@@ -200,10 +200,10 @@ def best_loop(
                 seen[key] = np.column_stack([remainder(near[:, i]) for i in range(len(points))])
             return seen[key]
 
-        def here(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        def here(theta: Floats) -> Floats:
             return np.asarray(around(theta)[:, 0])
 
-        def slopes(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        def slopes(theta: Floats) -> Floats:
             near = around(theta)
             return np.asarray((near[:, 1:] - near[:, :1]) / _STEP)
 
@@ -226,7 +226,7 @@ def _apart(grid: Sequence[Point], shares: Sequence[float]) -> list[Point]:
     return found[:_STARTS]
 
 
-def _share(projected: Projected, column: NDArray[np.float64]) -> float:
+def _share(projected: Projected, column: Floats) -> float:
     """Return the share that a loop explains; 0 for a loop that would have to drive the motion instead of resisting it."""
     if not np.all(np.isfinite(column)):
         return 0.0
@@ -242,7 +242,7 @@ def _columns(
     shapes: Sequence[Mapping[str, float]],
     x_size: float,
     threads: IdleThreads,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return the rows of several loops' deflections, shape (n_rows, n_loops)."""
     motion_of_element = structure.rig.motion
     fixed = {p.name: 0.0 for p in structure.rig.parameters} | {motion_of_element.stiffness.name: 1.0}
@@ -251,7 +251,7 @@ def _columns(
     values = [{**fixed, effect.post_yield_stiffness_ratio: 0.0, **inner} for inner in shapes]
     p = np.array([[v[name] for v in values] for name in structure.names])
 
-    def block(index: int) -> NDArray[np.float64]:
+    def block(index: int) -> Floats:
         motion = motions[index]
         held = hold_motion(motion.x, motion.v, motion.dt)
         start = np.zeros((len(structure.states), len(shapes)))

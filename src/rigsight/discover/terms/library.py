@@ -16,7 +16,6 @@ from typing import Any, Literal
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from rigsight.discover.motion import Motion
@@ -30,6 +29,7 @@ from rigsight.effects.effect import Place
 from rigsight.effects.symbols import derivative
 from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 from rigsight.units import characteristic_value
 
@@ -63,7 +63,7 @@ class Candidate:
     effect: Effect
     inner: Mapping[str, float]
     linear: Mapping[str, float]
-    column: NDArray[np.float64]
+    column: Floats
 
     @property
     def name(self) -> str:
@@ -173,7 +173,7 @@ def _best_inner(
     return best
 
 
-def mixed(signals: TermSignals, parts: NDArray[np.float64], projected: Projected) -> tuple[Candidate, float]:
+def mixed(signals: TermSignals, parts: Floats, projected: Projected) -> tuple[Candidate, float]:
     """Return the parts of a term as one column, mixed as in the regression, and the share that it explains."""
     weights, share = projected.explained(parts)
     if not np.any(weights):
@@ -189,9 +189,7 @@ def _is_plain(effect: Effect) -> bool:
     return effect.torque is not None and not effect.states and len(effect.parameters) == 1
 
 
-def _library_columns(
-    effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows
-) -> list[NDArray[np.float64]]:
+def _library_columns(effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows) -> list[Floats]:
     """Return the columns of the terms without nonlinear parameters, computed by a pysindy library from [x, x']."""
     if not effects:
         return []
@@ -203,7 +201,7 @@ def _library_columns(
         library_functions=[_term(effect) for effect in effects],
         function_names=[_constant_name(effect.name) for effect in effects],
     )
-    columns: list[list[NDArray[np.float64]]] = [[] for _ in effects]
+    columns: list[list[Floats]] = [[] for _ in effects]
     for motion in motions:
         # In SI, because a sine requires the angle in radians; every regression scales its columns itself.
         values = np.asarray(library.fit_transform(np.column_stack([motion.x, motion.v])))
@@ -215,7 +213,7 @@ def _library_columns(
 def _term(effect: Effect) -> Any:
     compiled = sp.lambdify((canonical.x, canonical.v), _slope(effect, effect.parameters[0]), "numpy")
 
-    def term(x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    def term(x: Floats, v: Floats) -> Floats:
         return np.asarray(compiled(x, v))
 
     return term
@@ -240,7 +238,7 @@ class TermSignals:
     # own.
     names: tuple[str, ...]
     # For each record, the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
-    parts: tuple[tuple[NDArray[np.float64], ...], ...]
+    parts: tuple[tuple[Floats, ...], ...]
 
 
 def term_signals(
@@ -274,7 +272,7 @@ def _grid(parameter: Parameter, scales: Mapping[str, float]) -> list[float]:
 
 def _signals(
     effect: Effect, linear: Sequence[Parameter], inner: Mapping[str, float], motion: Motion
-) -> list[NDArray[np.float64]]:
+) -> list[Floats]:
     """Return the parts of an effect as resisting forces per unit of their coefficient."""
     if effect.delay is not None:
         time = motion.dt * np.arange(motion.u.size)
@@ -289,21 +287,19 @@ def _signals(
     return [motion.u - _evaluated(effect.drive, {**inner, **states}, motion)]
 
 
-def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
+def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> Floats:
     """Return the torque of a static effect along a measured motion, shape (n_samples,)."""
     assert effect.torque is not None
     return _evaluated(effect.torque, values, motion)
 
 
-def deflection_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
+def deflection_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> Floats:
     """Return the deflection of the spring along a measured motion with a static effect (such as play), shape (n_samples,)."""
     assert effect.deflection is not None
     return _evaluated(effect.deflection, values, motion)
 
 
-def _evaluated(
-    expression: sp.Expr, inner: Mapping[str, float | NDArray[np.float64]], motion: Motion
-) -> NDArray[np.float64]:
+def _evaluated(expression: sp.Expr, inner: Mapping[str, float | Floats], motion: Motion) -> Floats:
     function = _compiled(expression, tuple(inner))
     return np.broadcast_to(function(motion.x, motion.v, motion.u, *inner.values()), motion.x.shape).astype(
         np.float64
@@ -341,9 +337,7 @@ def is_filter(effect: Effect) -> bool:
     return linear_filter(_rates(effect)) is not None
 
 
-def states_along(
-    effect: Effect, values: Mapping[str, float], motion: Motion
-) -> dict[str, NDArray[np.float64]]:
+def states_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> dict[str, Floats]:
     """Return the states of a filter along a motion by name, shape (n_samples,) each.
 
     They start in equilibrium with the first sample of each signal.

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import norm, t
 
+from rigsight.records.record import Floats
+
 _ROUNDED_EIGENVALUE = 1e-14
 """Share of the largest eigenvalue below which the effect of a direction of the coordinates is rounding error."""
 _MARGIN = 3.0
@@ -29,12 +31,12 @@ duration of the record and not on the sample rate, and the resonance excited by 
 
 
 def colored_covariance(
-    sensitivities: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    sensitivities: Sequence[tuple[Floats, Floats]],
     n_common: int,
     n_outputs: Sequence[int] | None = None,
     derivative_error: float = 0.0,
     for_intervals: bool = False,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return the covariance of the common coordinates, allowing for colored residuals.
 
     ``(J^T J)^-1 (sum_f J(f)^* S(f) J(f)^T) (J^T J)^-1`` with the smoothed residual spectrum S of each record, a matrix over its
@@ -74,9 +76,7 @@ def colored_covariance(
     return np.asarray(covariance)
 
 
-def _interval_factors(
-    reads: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], int]],
-) -> NDArray[np.float64]:
+def _interval_factors(reads: Sequence[tuple[Floats, Floats, int]]) -> Floats:
     """Return the factors on variances for the few degrees of freedom of the noise, shape (n,).
 
     Each of the records has its residuals, the weights with which the estimates read them, and the number of its outputs.
@@ -102,9 +102,7 @@ def _interval_factors(
     return np.asarray((remainder + 1.0) / remainder * (t.ppf(quantile, remainder) / norm.ppf(quantile)) ** 2)
 
 
-def sandwich_covariance(
-    bread: NDArray[np.float64], filling: NDArray[np.float64], derivative_error: float = 0.0
-) -> NDArray[np.float64]:
+def sandwich_covariance(bread: Floats, filling: Floats, derivative_error: float = 0.0) -> Floats:
     """Return ``bread^-1 filling bread^-1``, with infinite variances for coordinates that the bread does not determine.
 
     Parameters
@@ -139,7 +137,7 @@ def sandwich_covariance(
     return np.asarray(covariance)
 
 
-def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.float64]) -> NDArray[np.float64]:
+def propagated_covariance(covariance: Floats, chain: Floats) -> Floats:
     """Return ``chain covariance chain^T``, for variances that may be infinite."""
     infinite = np.isinf(np.diag(covariance))
     finite = np.where(infinite[:, None] | infinite[None, :], 0.0, covariance)
@@ -151,9 +149,7 @@ def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.flo
     return np.asarray(result)
 
 
-def spectral_product(
-    residual: NDArray[np.float64], derivative: NDArray[np.float64], count: int
-) -> NDArray[np.float64]:
+def spectral_product(residual: Floats, derivative: Floats, count: int) -> Floats:
     """Return the covariance of J^T r of one record from the smoothed spectrum of its residual.
 
     Parameters
@@ -193,7 +189,7 @@ def smoothed_spectrum(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128
     return np.asarray(np.convolve(around, np.full(2 * half + 1, 1.0 / (2 * half + 1)), "valid"))
 
 
-def symmetric_eigen(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
     """Return eigenvalues in ascending order, shape (n,), and eigenvectors as columns, shape (n, n).
 
     Divide and conquer is faster but has failed on a well-conditioned matrix of 90 rows; relatively robust representations are

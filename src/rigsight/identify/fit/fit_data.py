@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.fit.idle_threads import IdleThreads
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, record_input, record_values, state_limits
 from rigsight.simulate.input_hold import HeldInput
 
@@ -27,8 +27,8 @@ class RecordData:
     # The record, and its input between samples.
     record: Record
     held: HeldInput
-    measured: NDArray[np.float64]  # shape (n_samples, n_outputs), NaN for an output that was not measured
-    weights: NDArray[np.float64]  # reciprocal noise of each output, 0 if it was not measured
+    measured: Floats  # shape (n_samples, n_outputs), NaN for an output that was not measured
+    weights: Floats  # reciprocal noise of each output, 0 if it was not measured
     # Indices in the parameter vector of the record's own constants, and their values.
     own: tuple[tuple[int, float], ...] = ()
 
@@ -36,7 +36,7 @@ class RecordData:
         """Return the data with only the first samples of measurement and input."""
         return replace(self, held=self.held.first(n_samples), measured=self.measured[:n_samples])
 
-    def parameters(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def parameters(self, p: Floats) -> Floats:
         """Return parameters, shape (n_parameters,) or (n_parameters, n_sets), with the record's own constants."""
         if not self.own:
             return p
@@ -53,7 +53,7 @@ class FitData:
     structure: Structure  # rig and effects; the free offsets of sensors come after all other states
     records: tuple[RecordData, ...]
     limited: NDArray[np.bool_]  # true for states that cannot leave a range, shape (n_states,)
-    unlimited_sizes: NDArray[np.float64]  # characteristic size of each state, shape (n_states, 1)
+    unlimited_sizes: Floats  # characteristic size of each state, shape (n_states, 1)
     accuracy: float  # relative accuracy of the simulations
     # Threads among which the records are distributed.
     threads: IdleThreads = field(default_factory=IdleThreads)
@@ -62,7 +62,7 @@ class FitData:
         """Return the results of a function for the index of each record, in their order."""
         return self.threads.results(one, [record.record.n_samples for record in self.records])
 
-    def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def state_sizes(self, p: Floats) -> Floats:
         """Return the unit of each initial state in the fit, shape (n_states, n_sets).
 
         A state with a limited range is fitted in units of that range, which may depend on the parameters: beyond its ends the
@@ -87,7 +87,7 @@ def record_data(
     return RecordData(record, record_input(structure, record), measured, weights, places)
 
 
-def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def weighted(record: RecordData, out: Floats) -> tuple[Floats, Floats]:
     """Return weighted residuals (n,) of the first set and its outputs minus those of each other one (n, n_sets - 1)."""
     used = np.flatnonzero(record.weights > 0.0)
     n_samples, _, n_sets = out.shape

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, Substeps
 
 
@@ -52,19 +51,19 @@ class FitResult:
     message: str
     values: dict[str, float]
     standard_errors: dict[str, float]
-    initial_states: tuple[NDArray[np.float64], ...]
+    initial_states: tuple[Floats, ...]
     cost: float
     n_samples: int
     n_evaluations: int
     free: tuple[str, ...]
-    covariance: NDArray[np.float64]
-    residuals: tuple[NDArray[np.float64], ...]
+    covariance: Floats
+    residuals: tuple[Floats, ...]
     """Measured minus simulated per record, shape (n_samples, n_outputs), NaN for an output that was not measured."""
     substeps: tuple[Substeps, ...] = ()
     offset_names: tuple[str, ...] = ()
 
     @property
-    def rig_states(self) -> tuple[NDArray[np.float64], ...]:
+    def rig_states(self) -> tuple[Floats, ...]:
         """Initial states of the structure per record, shape (n_states,), without offsets of sensors."""
         count = len(self.offset_names)
         return tuple(state[: state.size - count] for state in self.initial_states)
@@ -111,7 +110,7 @@ def record_digest(record: Record) -> str:
     return digest.hexdigest()
 
 
-def fit_key(problem: Sequence[Any], theta: NDArray[np.float64], settings: Sequence[Any]) -> str:
+def fit_key(problem: Sequence[Any], theta: Floats, settings: Sequence[Any]) -> str:
     """Return a hash of a fit: of its problem (plain data), its start and its settings.
 
     Start values are hashed bit by bit: a fit from a slightly different value is a different fit.

@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
@@ -27,13 +26,8 @@ from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.fit.search import FINE_TOLERANCE, off_kinks, searched
 from rigsight.identify.fit.settled_states import SearchStart
 from rigsight.identify.fit.variable_projection import VariableProjection
-from rigsight.records.record import Record
-from rigsight.simulate import (
-    Structure,
-    Substeps,
-    simulate_outputs,
-    structure_of_fit,
-)
+from rigsight.records.record import Floats, Record
+from rigsight.simulate import Structure, Substeps, simulate_outputs, structure_of_fit
 from rigsight.units import characteristic_value
 
 DEFAULT_ACCURACY = 1e-4
@@ -42,7 +36,7 @@ _MOST_ROUNDS = 4
 """Largest number of successive searches with finer steps."""
 _WORTH_A_ROUND = 1e-3
 """Share of the cost by which a round must have lowered it for another round."""
-_Outcome = tuple[NDArray[np.float64], bool, str]
+_Outcome = tuple[Floats, bool, str]
 """Coordinates and initial states at the end of a search, whether it converged, and the optimizer's message."""
 
 
@@ -114,7 +108,7 @@ class GreyBoxFit:
         self,
         start: Mapping[str, float],
         free: Sequence[str],
-        initial_states: Sequence[NDArray[np.float64]] | None = None,
+        initial_states: Sequence[Floats] | None = None,
         max_evaluations: int = 60,
         tolerance: float = 1e-7,
         finish: bool = True,
@@ -158,7 +152,7 @@ class GreyBoxFit:
         if theta.size == 0:
             return self._result(problem, theta, True, "Nothing to fit.", finish)
 
-        def search(theta: NDArray[np.float64] = theta) -> _Outcome:
+        def search(theta: Floats = theta) -> _Outcome:
             for _ in range(_MOST_ROUNDS if finish and substeps is None else 1):
                 solution = searched(problem, theta, (lower, upper), tolerance, max_evaluations)
                 theta = solution.x
@@ -226,7 +220,7 @@ class GreyBoxFit:
         together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
         return self._result(together, *outcome, finish=True)
 
-    def information(self, start: Mapping[str, float], free: Sequence[str]) -> NDArray[np.float64]:
+    def information(self, start: Mapping[str, float], free: Sequence[str]) -> Floats:
         """Return the information of the records on parameters at their start, with unknown initial states.
 
         This is the Fisher information of relative changes (of changes in units of the size, if a value is zero); NaN if the start
@@ -272,18 +266,14 @@ class GreyBoxFit:
         return theta, success, message
 
     def _key(
-        self,
-        coordinates: Coordinates,
-        start: Mapping[str, float],
-        theta: NDArray[np.float64],
-        settings: Sequence[float],
+        self, coordinates: Coordinates, start: Mapping[str, float], theta: Floats, settings: Sequence[float]
     ) -> str:
         if self.memory is None:
             return ""
         values = [float(start[name]) for name in self.structure.names]
         return fit_key([*self._problem, values, list(coordinates.free)], theta, settings)
 
-    def _failed(self, problem: Problem, theta: NDArray[np.float64], message: str) -> FitResult:
+    def _failed(self, problem: Problem, theta: Floats, message: str) -> FitResult:
         coordinates = problem.coordinates
         p = coordinates.to_parameters(theta[: len(coordinates.free)])
         n = len(coordinates.free)
@@ -305,14 +295,14 @@ class GreyBoxFit:
         )
 
     def _result(
-        self, problem: Problem, theta: NDArray[np.float64], success: bool, message: str, finish: bool
+        self, problem: Problem, theta: Floats, success: bool, message: str, finish: bool
     ) -> FitResult:
         coordinates, n_evaluations = problem.coordinates, problem.n_evaluations
         n_free = len(coordinates.free)
         p = coordinates.to_parameters(theta[:n_free])
         states = problem.states(theta)
         cost = problem.at(theta).cost
-        residuals: tuple[NDArray[np.float64], ...] = ()
+        residuals: tuple[Floats, ...] = ()
         covariance = np.full((n_free, n_free), np.nan)
         if finish:
             try:
@@ -348,13 +338,11 @@ class GreyBoxFit:
             offset_names=self.data.structure.offsets,
         )
 
-    def _values(self, p: NDArray[np.float64]) -> dict[str, float]:
+    def _values(self, p: Floats) -> dict[str, float]:
         # The bandwidths of an observer come after all other parameters.
         return dict(zip(self.structure.names, map(float, p), strict=False))
 
-    def _remainder(
-        self, index: int, p: NDArray[np.float64], state: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _remainder(self, index: int, p: Floats, state: Floats) -> Floats:
         """Return measured minus accurately simulated outputs of a record."""
         d = self.data.records[index]
         return d.measured - simulate_outputs(

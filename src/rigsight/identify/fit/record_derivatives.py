@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.fit_problem import Problem
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _LEAST_SLOPE = 1e-6
 """Share of the largest influence below which a direction has none, however exact its derivatives are."""

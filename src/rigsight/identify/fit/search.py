@@ -9,13 +9,13 @@ motion cannot do this.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.coordinates import STEP
 from rigsight.identify.fit.fit_data import weighted
 from rigsight.identify.fit.fit_problem import Evaluation, Problem
+from rigsight.records.record import Floats
 from rigsight.simulate import simulate_outputs
 
 FINE_TOLERANCE = 1e-6
@@ -41,11 +41,7 @@ which cannot resolve less."""
 
 
 def searched(
-    problem: Problem,
-    theta: NDArray[np.float64],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    tolerance: float,
-    max_evaluations: int,
+    problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], tolerance: float, max_evaluations: int
 ) -> OptimizeResult:
     """Return the result of the optimizer."""
     return least_squares(
@@ -63,11 +59,8 @@ def searched(
 
 
 def off_kinks(
-    problem: Problem,
-    theta: NDArray[np.float64],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    n_samples: int,
-) -> NDArray[np.float64] | None:
+    problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], n_samples: int
+) -> Floats | None:
     """Return the point near the end of a search where Gauss-Newton steps from long differences vanish."""
     before = problem.at(theta)
     variance = before.cost / max(n_samples, 1)
@@ -83,11 +76,8 @@ def off_kinks(
 
 
 def _settled(
-    problem: Problem,
-    theta: NDArray[np.float64],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    variance: float,
-) -> NDArray[np.float64] | None:
+    problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], variance: float
+) -> Floats | None:
     """Return the point where the steps vanish; None if they do not, or only at a higher cost."""
     place, share, last, first = theta, 1.0, np.zeros(theta.size), float("inf")
     for _ in range(_MOST_STEPS):
@@ -106,9 +96,7 @@ def _settled(
     return None
 
 
-def _differences(
-    evaluation: Evaluation, bounds: tuple[NDArray[np.float64], NDArray[np.float64]], variance: float
-) -> NDArray[np.float64]:
+def _differences(evaluation: Evaluation, bounds: tuple[Floats, Floats], variance: float) -> Floats:
     """Return the standard error of each coordinate with all others held; a coordinate without influence keeps the small step."""
     curvature = np.diag(evaluation.normal)
     error = np.sqrt(variance / np.maximum(curvature, 1e-300))
@@ -116,14 +104,14 @@ def _differences(
     return np.where(curvature > 0.0, np.clip(error, STEP, widest), STEP)
 
 
-def _evaluated(problem: Problem, place: NDArray[np.float64]) -> Evaluation:
+def _evaluated(problem: Problem, place: Floats) -> Evaluation:
     """Return the equations of a step: accurate residuals, and derivatives by long differences."""
     data, n = problem.data, place.size
     p = problem.coordinates.to_parameters(place[: problem.n_free])
     states = problem.states(place)
     normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
 
-    def accurate(index: int) -> NDArray[np.float64]:
+    def accurate(index: int) -> Floats:
         record = data.records[index]
         n_samples = record.record.n_samples
         own = record.parameters(p)
@@ -139,9 +127,7 @@ def _evaluated(problem: Problem, place: NDArray[np.float64]) -> Evaluation:
     return Evaluation(place, cost, normal, gradient)
 
 
-def _step(
-    evaluation: Evaluation, bounds: tuple[NDArray[np.float64], NDArray[np.float64]]
-) -> tuple[NDArray[np.float64], float]:
+def _step(evaluation: Evaluation, bounds: tuple[Floats, Floats]) -> tuple[Floats, float]:
     """Return a Gauss-Newton step within the bounds, and the change of the residuals, which bounds its size in standard errors.
 
     Coordinates that the step would move beyond a bound are held.

@@ -13,12 +13,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.identify.fit.coordinates import STEP, Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.fit_data import FitData, weighted
 from rigsight.identify.fit.fit_problem import Evaluation, Problem
+from rigsight.records.record import Floats
 from rigsight.simulate import simulate_sets
 
 _DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)
@@ -54,9 +54,9 @@ class VariableProjection(Problem):
         self,
         data: FitData,
         coordinates: Coordinates,
-        places: Sequence[NDArray[np.float64]],
-        lower: Sequence[NDArray[np.float64]],
-        upper: Sequence[NDArray[np.float64]],
+        places: Sequence[Floats],
+        lower: Sequence[Floats],
+        upper: Sequence[Floats],
     ) -> None:
         n_states = len(data.structure.states)
         super().__init__(data, coordinates, n_states, np.concatenate([coordinates.upper, *upper]))
@@ -64,14 +64,14 @@ class VariableProjection(Problem):
         self._lower, self._upper = lower, upper
         self._settled_at = self.places
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def jacobian(self, theta: Floats) -> Floats:
         """Return the derivatives of `residual`; the search continues from the point where they are requested."""
         evaluation = self.at(theta)
         self.places = self._settled_at
         root, _ = evaluation.compressed
         return np.vstack([root, np.zeros(theta.size)])
 
-    def at(self, theta: NDArray[np.float64]) -> Evaluation:
+    def at(self, theta: Floats) -> Evaluation:
         """Refit the initial states, then evaluate with their directions projected out of the derivatives."""
         if self._last is not None and np.array_equal(self._last.theta, theta):
             return self._last
@@ -92,12 +92,12 @@ class VariableProjection(Problem):
         self.n_evaluations += 1
         return self._last
 
-    def settle_anew(self, theta: NDArray[np.float64]) -> float:
+    def settle_anew(self, theta: Floats) -> float:
         """Refit the initial states from several values of limited states, and return the cost."""
         self._last = None
         p = self.coordinates.to_parameters(theta)
 
-        def best(index: int) -> tuple[NDArray[np.float64], float]:
+        def best(index: int) -> tuple[Floats, float]:
             place = self.places[index]
             starts = [place]
             if np.any(self.data.limited):
@@ -110,9 +110,7 @@ class VariableProjection(Problem):
             self.places[index] = place
         return sum((cost for _, cost in found), start=0.0)
 
-    def _settled(
-        self, index: int, p: NDArray[np.float64], place: NDArray[np.float64], most: int
-    ) -> tuple[NDArray[np.float64], float]:
+    def _settled(self, index: int, p: Floats, place: Floats, most: int) -> tuple[Floats, float]:
         """Return the best initial state near a given one, and its cost."""
         n, cost = self.n_states, float("inf")
         low, high = self._lower[index][:, None], self._upper[index][:, None]
@@ -138,9 +136,7 @@ class VariableProjection(Problem):
                 break
         return place, cost
 
-    def _candidates(
-        self, place: NDArray[np.float64], derivative: NDArray[np.float64], residual: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _candidates(self, place: Floats, derivative: Floats, residual: Floats) -> Floats:
         """Return initial states to try, shape (n_states, n_lanes)."""
         size = np.linalg.norm(derivative, axis=0)
         size[size == 0.0] = 1.0
@@ -155,9 +151,7 @@ class VariableProjection(Problem):
             lanes += [np.where(self.data.limited, place + aside, place) for aside in _ASIDE]
         return np.column_stack(lanes)
 
-    def _residuals(
-        self, index: int, p: NDArray[np.float64], places: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _residuals(self, index: int, p: Floats, places: Floats) -> Floats:
         record = self.data.records[index]
         sets = np.repeat(record.parameters(p)[:, None], places.shape[1], axis=1)
         with np.errstate(all="ignore"):
@@ -173,9 +167,7 @@ class VariableProjection(Problem):
             return np.column_stack([first, first[:, None] + against_first])
 
 
-def _projected(
-    own: NDArray[np.float64], states: NDArray[np.float64], residual: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _projected(own: Floats, states: Floats, residual: Floats) -> tuple[Floats, Floats]:
     """Return derivatives and residual with the directions of the initial states projected out."""
     size = np.linalg.norm(states, axis=0)
     size[size == 0.0] = 1.0

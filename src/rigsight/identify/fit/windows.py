@@ -17,10 +17,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -124,12 +123,12 @@ class Windowing:
         return [*edges, record.n_samples]
 
 
-def readings(records: Sequence[Record], sensor: str) -> dict[str, NDArray[np.float64]]:
+def readings(records: Sequence[Record], sensor: str) -> dict[str, Floats]:
     """Return what a sensor shows in each record that holds it, windows joined, by the name of the record.
 
     If the sensor has its own offset in each record, its mean is removed.
     """
-    parts: dict[str, list[NDArray[np.float64]]] = {}
+    parts: dict[str, list[Floats]] = {}
     for record in records:
         if sensor in record:
             parts.setdefault(record.origin, []).append(record[sensor])
@@ -159,11 +158,7 @@ def window_length(rig: Rig, records: Sequence[Record]) -> float:
     """
     dt = max(record.dt for record in records)
     longest = max(record.n_samples * record.dt for record in records)
-    wished = max(
-        _PERIODS * typical_period(rig, records),
-        _SAMPLES * dt,
-        longest / _MOST_WINDOWS,
-    )
+    wished = max(_PERIODS * typical_period(rig, records), _SAMPLES * dt, longest / _MOST_WINDOWS)
     return min(wished, longest)
 
 
@@ -226,9 +221,7 @@ def liveliest(records: Sequence[Record], rig: Rig, n_samples: int) -> tuple[Reco
     )
 
 
-def strongest(
-    records: Sequence[Record], powers: Sequence[NDArray[np.float64]], n_samples: int
-) -> tuple[Record, ...]:
+def strongest(records: Sequence[Record], powers: Sequence[Floats], n_samples: int) -> tuple[Record, ...]:
     """Return the stretch of each record with the largest sum of a power, shape (n_samples,), together about `n_samples` long."""
     share = max(500, n_samples // max(1, len(records)))
     stretches = []

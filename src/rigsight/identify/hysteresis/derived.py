@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Effect, SumAndDifference
@@ -18,7 +17,7 @@ from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.fit_result import FitResult
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import ELEMENT
 from rigsight.simulate import Structure, compose, simulate_sets
 from rigsight.simulate.input_hold import hold_motion
@@ -110,7 +109,7 @@ def derived_quantities(
     determined = _determined(fit)
     known = dict(structure.fixed)
 
-    def of(name: str) -> NDArray[np.float64]:
+    def of(name: str) -> Floats:
         if name in structure.names:
             return np.asarray(draws[structure.names.index(name)])
         return np.full(draws.shape[1], known[name])
@@ -149,7 +148,7 @@ def derived_quantities(
 
 def parameter_draws(
     fit: FitResult, scales: Mapping[str, float], rng: np.random.Generator, n_draws: int
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return the fitted parameters and draws of their covariance, shape (n_parameters, 1 + n_draws).
 
     The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear. Draws outside the
@@ -177,12 +176,7 @@ def parameter_draws(
     return draws
 
 
-def _moved_inside(
-    drawn: NDArray[np.float64],
-    covariance: NDArray[np.float64],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _moved_inside(drawn: Floats, covariance: Floats, lower: Floats, upper: Floats) -> Floats:
     """Move draws of shape (n_draws, n_free) to the bounds that they exceed; other coordinates follow by their correlation."""
     moved = drawn.copy()
     for i in range(lower.size):
@@ -192,12 +186,12 @@ def _moved_inside(
     return np.clip(moved, lower, upper)
 
 
-def _sizes(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sizes(covariance: Floats) -> Floats:
     size = np.sqrt(np.diag(covariance))
     return np.asarray(np.where(size == 0.0, 1.0, size))
 
 
-def loop_area(structure: Structure, p: NDArray[np.float64], amplitude: float) -> NDArray[np.float64]:
+def loop_area(structure: Structure, p: Floats, amplitude: float) -> Floats:
     """Return the energy per cycle of the spring for parameter sets of shape (n_parameters, n_sets), shape (n_sets,).
 
     The effects that change the spring (its deflection or its torque) are simulated on a bench that moves them slowly and
@@ -280,7 +274,7 @@ def saturation_level(effect: Effect) -> sp.Expr | None:
     return levels[0].xreplace({there: here for here, there in own.items()}) if len(levels) == 1 else None
 
 
-def _saturation(level: sp.Expr, own: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+def _saturation(level: sp.Expr, own: Mapping[str, Floats]) -> Floats:
     """Return the limit for values of the parameters, infinite if there is none."""
     reached = sp.lambdify([sp.Symbol(name, real=True) for name in own], level, "numpy")
     with np.errstate(all="ignore"):
@@ -302,7 +296,7 @@ def _in_words(saturation: Derived, total: str) -> str:
     )
 
 
-def _derived(name: str, unit: str, samples: NDArray[np.float64], determined: bool) -> Derived:
+def _derived(name: str, unit: str, samples: Floats, determined: bool) -> Derived:
     """Take the value from the first sample and the interval from the others."""
     if not determined:
         return Derived(name, unit, float(samples[0]), -np.inf, np.inf)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, hold_response
 from rigsight.frequency.signal_pair import pair_unit
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 
 _NEAREST = 0.75
 """Smallest width of the averaging, in distances between spectral lines."""
@@ -36,7 +36,7 @@ class SpectralRatio:
 
     source: str
     response: str
-    omega: NDArray[np.float64]
+    omega: Floats
     width: float = 0.035
 
     def __call__(self, record: Record) -> FrequencyResponse:
@@ -61,7 +61,7 @@ class SpectralRatio:
             method=f"spectral ratio averaged over {self.width:g} of the frequency",
         )
 
-    def rows(self, record: Record) -> NDArray[np.float64]:
+    def rows(self, record: Record) -> Floats:
         """Return the matrix from response samples to real parts, then imaginary parts, shape (2 n_frequencies, n_samples)."""
         n = record.n_samples
         weighted = np.zeros((self.omega.size, n), dtype=np.complex128)

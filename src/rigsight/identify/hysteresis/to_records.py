@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
@@ -26,7 +25,7 @@ from rigsight.identify.hysteresis.parameters import (
 from rigsight.identify.hysteresis.search import SearchBox, search
 from rigsight.identify.start.linear_start import linear_start
 from rigsight.identify.start.scales import characteristic_scales
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, simulate_sets
 
 _SUBSTEPS = 2
@@ -124,11 +123,7 @@ def calibrate_to_records(
 
     def refined(values: Mapping[str, float]) -> FitResult:
         return look.fit(
-            values,
-            simple_free,
-            max_evaluations=_ROUGH_EVALUATIONS,
-            tolerance=_ROUGH_TOLERANCE,
-            finish=False,
+            values, simple_free, max_evaluations=_ROUGH_EVALUATIONS, tolerance=_ROUGH_TOLERANCE, finish=False
         )
 
     rough = []
@@ -182,11 +177,11 @@ def _refined(
     return best
 
 
-def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: Floats) -> Floats:
     """Return the mean squared weighted residual of every set, shape (n_sets,)."""
     p = np.array([coordinates.to_parameters(theta) for theta in thetas]).T
 
-    def of_record(number: int) -> NDArray[np.float64]:
+    def of_record(number: int) -> Floats:
         data = look.data.records[number]
         first = first_state(look.structure, data.record, {})
         states = np.repeat(first[:, None], thetas.shape[0], axis=1)

@@ -12,7 +12,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from rigsight.errors import InputError
@@ -27,12 +26,10 @@ from rigsight.identify.start.spread_search import AGREEING, PERSISTENT, balanced
 from rigsight.identify.start.weak_equations import WeakEquations
 from rigsight.identify.typical_size import size_of_signal
 from rigsight.parameters import Parameter
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, parameter_vector
 from rigsight.simulate.prescribed_motion import smooth_motion
-
-Floats = NDArray[np.float64]
 
 _SEED = 0
 """Fixed, so that the same records give the same start."""

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.identify.start.equation_error import Spectra, Term, solve_in_frequency, spectra_of
 from rigsight.parameters import Parameter
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.units import characteristic_value
@@ -36,11 +35,11 @@ class _Motion:
     """Measured signals of a record about the rest position."""
 
     spectra: Spectra
-    x: NDArray[np.float64]
-    v: NDArray[np.float64]
-    u: NDArray[np.float64]
-    position: NDArray[np.float64]
-    load: NDArray[np.float64]
+    x: Floats
+    v: Floats
+    u: Floats
+    position: Floats
+    load: Floats
 
 
 class EffectRegression:
@@ -59,11 +58,7 @@ class EffectRegression:
     """
 
     def __init__(
-        self,
-        rig: Rig,
-        records: Sequence[Record],
-        values: Mapping[str, float],
-        scales: Mapping[str, float],
+        self, rig: Rig, records: Sequence[Record], values: Mapping[str, float], scales: Mapping[str, float]
     ) -> None:
         self._rig = rig
         self._values = dict(values)
@@ -173,7 +168,7 @@ def _function(expression: sp.Expr, inner: Mapping[str, float]):  # type: ignore[
     plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2).subs(numbers)
     compiled = sp.lambdify(_SIGNALS, plain, "numpy", cse=True)
 
-    def evaluate(motion: _Motion) -> NDArray[np.float64]:
+    def evaluate(motion: _Motion) -> Floats:
         signals = (motion.x, motion.v, motion.u, motion.position, motion.load)
         return np.broadcast_to(compiled(*signals), motion.x.shape).astype(np.float64)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rigsight.identify.start.linearized_responses import USABLE_BAND
 from rigsight.identify.start.projection import SIGNIFICANT_POWER
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 
 _ITERATIONS = 20
 _TRANSIENT_ORDER = 2
@@ -34,13 +34,13 @@ Term = tuple[int, NDArray[np.complex128]]
 class Spectra:
     """Spectra of one record on its informative lines, shape (n_lines,) each."""
 
-    omega: NDArray[np.float64]  # angular frequencies [rad/s]
+    omega: Floats  # angular frequencies [rad/s]
     lines: NDArray[np.intp]  # indices of the lines in the full spectrum
     hold: NDArray[np.complex128]  # frequency response of the hold
     drive: NDArray[np.complex128]  # input, multiplied by the response of the hold
     response: NDArray[np.complex128]  # output
 
-    def of(self, signal: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def of(self, signal: Floats) -> NDArray[np.complex128]:
         """Return the spectrum of another signal of the record, shape (n_samples,), on the same lines."""
         centered = signal - np.mean(signal)
         return np.asarray(np.fft.rfft(centered)[self.lines] / signal.size)
@@ -50,7 +50,7 @@ class Spectra:
 class Solution:
     """Coefficients of the terms, and the remaining weighted error."""
 
-    coefficients: NDArray[np.float64]
+    coefficients: Floats
     error: float
 
 
@@ -109,7 +109,7 @@ def _weighted_solution(
     targets: Sequence[NDArray[np.complex128]],
     weights: Sequence[NDArray[np.complex128]],
     top: float,
-) -> tuple[NDArray[np.float64], float]:
+) -> tuple[Floats, float]:
     n_terms, n_transient = len(terms[0]), _TRANSIENT_ORDER + 1
     n_columns = n_terms + n_transient * len(blocks)
     normal, right, energy = np.zeros((n_columns, n_columns)), np.zeros(n_columns), 0.0
@@ -133,7 +133,7 @@ def _weighted_solution(
 
 
 def _own_denominator(
-    block: Spectra, terms: Sequence[Term], solution: NDArray[np.float64], top: float
+    block: Spectra, terms: Sequence[Term], solution: Floats, top: float
 ) -> NDArray[np.complex128]:
     s = 1j * block.omega / top
     value = np.zeros_like(block.response)

@@ -21,10 +21,9 @@ from numpy.typing import NDArray
 
 from rigsight.identify.rig_equations import RigEquations
 from rigsight.identify.start.projection import SIGNIFICANT_POWER
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate.equations.structure import input_symbols
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 USABLE_BAND = 0.8

@@ -11,16 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import null_space
 
 from rigsight.effects.symbols import derivative
 from rigsight.identify.rig_equations import RigEquations
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate.prescribed_motion import smooth_motion
-
-Floats = NDArray[np.float64]
 
 _RANK = 1e-9
 """Share of the largest singular value below which a combination of states is not shown."""
@@ -64,10 +61,7 @@ def sensor_factors(equations: RigEquations, free: frozenset[str]) -> dict[str, t
 
 
 def measured_states(
-    equations: RigEquations,
-    record: Record,
-    p: Floats,
-    factors: Mapping[str, Sequence[sp.Expr]],
+    equations: RigEquations, record: Record, p: Floats, factors: Mapping[str, Sequence[sp.Expr]]
 ) -> MeasuredStates | None:
     """Return the states of a record, or None if its sensors do not show them all."""
     n, n_states = equations.n_coordinates, equations.n_states

@@ -8,16 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.start.rig_motion import simulated_motion
 from rigsight.identify.typical_size import size_about_zero, size_of_signal
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.units import size_of
 
-Floats = NDArray[np.float64]
 _Signals = Mapping[str, list[Floats]]
 
 _LEAST_SHARE = 1e-3

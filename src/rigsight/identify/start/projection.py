@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from rigsight.identify.rig_equations import RigEquations
 from rigsight.identify.start.measured_states import MeasuredStates
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _STRETCHES = 4

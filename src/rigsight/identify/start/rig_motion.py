@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.first_states import rig_state
 from rigsight.identify.rig_equations import RigEquations
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import simulate_outputs
-
-Floats = NDArray[np.float64]
 
 _ACCURACY = 1e-4
 """Relative accuracy of the simulation, more than sufficient for sizes."""

@@ -31,14 +31,13 @@ from rigsight.identify.start.measured_states import (
     supposed_states,
 )
 from rigsight.identify.start.projection import Projection, projected
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate.equations.structure import input_symbols
 
 _MOST_FACTORS = 6
 """Largest power that is expanded; energies contain squares, and potentials somewhat higher powers."""
 
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _MOST_POINTS = 400
