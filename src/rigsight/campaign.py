@@ -106,18 +106,19 @@ class Campaign:
             return self.given_without_spring is not None
         return can_drift(self.rig, {**self.constants, **self.given})
 
-    def with_weighed_spring(self) -> Campaign:
-        """Return a campaign whose fits estimate an absent spring if its records show one, with a note on what was found.
 
-        The given simulation keeps a stiffness of zero.
-        """
-        name, factor = self.absent_spring, self.open_factor
-        if name is None:
-            return self
-        held = {} if factor is None else {factor.held: factor.value}
-        weighed = weighed_spring(
-            self.rig, self.estimation, self.constants, self.given, self.modelled, name, held
-        )
-        if weighed is None:
-            return self
-        return replace(self, spring_released=weighed.found, notes=(*self.notes, weighed.note))
+def with_weighed_spring(campaign: Campaign) -> Campaign:
+    """Return a campaign whose fits estimate an absent spring if its records show one, with a note on what was found.
+
+    The given simulation keeps a stiffness of zero.
+    """
+    name, factor = campaign.absent_spring, campaign.open_factor
+    if name is None:
+        return campaign
+    held = {} if factor is None else {factor.held: factor.value}
+    weighed = weighed_spring(
+        campaign.rig, campaign.estimation, campaign.constants, campaign.given, campaign.modelled, name, held
+    )
+    if weighed is None:
+        return campaign
+    return replace(campaign, spring_released=weighed.found, notes=(*campaign.notes, weighed.note))

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.campaign import Campaign
+from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.diagnose.advise import advise
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, candidates_on
@@ -85,7 +85,7 @@ def diagnose(
     say = progress or (lambda _: None)
     if not campaign.estimation:
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
-    campaign = campaign.with_weighed_spring()
+    campaign = with_weighed_spring(campaign)
     effects = candidates_on(campaign.rig, effects, campaign.modelled)
     scored_on = "validation" if campaign.validation else "estimation"
     rng = np.random.default_rng(seed)

@@ -63,28 +63,10 @@ def discover(
 ) -> Discovery:
     """Discover the governing equations of a rig from records.
 
-    Parameters
-    ----------
-    data
-        Records and rig.
-    method
-        ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term. ``"discrepancy"``: the
-        rig's own terms are kept and their residual is regressed; the only form for a rig of several joints.
-    pointwise
-        Regress sample by sample instead of in the weak form; not for a rig of several joints.
-    seed
-        Seed of the ensembles.
-    progress
-        Called with a short text when a stage or support is done.
-    n_jobs
-        Supports that are fitted at the same time; the result is the same with any number.
-
-    Raises
-    ------
-    InputError
-        If there is no estimation record, one is too short, none moves the rig, or the form is not available for this rig.
-    SimulationError
-        If the rig's own equations cannot be simulated near the records.
+    The method ``"full"`` regresses the whole acceleration, where the rig's damper competes with every other term;
+    ``"discrepancy"`` keeps the rig's own terms and regresses their residual, the only form for a rig of several joints.
+    Point-wise rows, instead of the weak form, are not for such a rig either. The seed is that of the ensembles; the result is
+    the same with any number of jobs.
     """
     if not data.rig.mechanism.joints:
         raise InputError(

@@ -31,26 +31,14 @@ _SETTLING = 20
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Smoothed motion of one record about its rest position.
+    """Smoothed motion of one record about its rest position, shape (n_samples,) each."""
 
-    Attributes
-    ----------
-    record
-        The measured record.
-    x, v, acceleration
-        Displacement, velocity and acceleration, shape (n_samples,) each.
-    u
-        Input, shape (n_samples,); the displacement if the motion is prescribed.
-    measured
-        The measured quantity that is regressed, shape (n_samples,): displacement, or force if the motion is prescribed.
-    """
-
-    record: Record
-    x: Floats
-    v: Floats
+    record: Record  # the measured record
+    x: Floats  # displacement
+    v: Floats  # velocity
     acceleration: Floats
-    u: Floats
-    measured: Floats
+    u: Floats  # input; the displacement if the motion is prescribed
+    measured: Floats  # what is regressed: displacement, or force if the motion is prescribed
 
     @property
     def dt(self) -> float:

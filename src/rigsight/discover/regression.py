@@ -187,21 +187,11 @@ def _remainder(matrix: Floats, target: Floats, support: tuple[int, ...]) -> floa
 
 @dataclass(frozen=True)
 class RegressionData:
-    """A campaign, the noise floors of its sensors, and the records that are regressed.
-
-    Attributes
-    ----------
-    campaign
-        The campaign.
-    noise
-        Noise floor of each output.
-    windows
-        Sections of its records to be used, for a rig that drifts; None for the whole records.
-    """
+    """A campaign, the noise floors of its sensors, and the records that are regressed."""
 
     campaign: Campaign
-    noise: Mapping[str, float]
-    windows: tuple[Record, ...] | None = None
+    noise: Mapping[str, float]  # floor of each output
+    windows: tuple[Record, ...] | None = None  # sections of the records to be used, for a rig that drifts
 
     @property
     def rig(self) -> Rig:

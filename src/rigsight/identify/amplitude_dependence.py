@@ -30,13 +30,6 @@ def amplitude_dependence(
 
     Only records of one kind with different amplitudes are compared, because a step and a sweep also differ in frequency content.
     Offsets are not compared; they may differ from record to record without any nonlinearity.
-
-    Parameters
-    ----------
-    records
-        Results of each record.
-    units
-        Unit by parameter and signal.
     """
     compared = _comparable(records)
     if len(compared) < 2:

@@ -28,27 +28,13 @@ _MASS = "[mass]"
 
 @dataclass(frozen=True)
 class OpenFactor:
-    """Parameters that records determine only up to a common factor, and the one that is held.
+    """Parameters that records determine only up to a common factor, and the one that is held."""
 
-    Attributes
-    ----------
-    names
-        All of them, including the one that is held.
-    held
-        Name of the one that is held.
-    value
-        Its value [SI].
-    unit
-        Its unit.
-    is_given
-        Whether the value was given; otherwise it is the default of the rig, or one.
-    """
-
-    names: tuple[str, ...]
-    held: str
-    value: float
+    names: tuple[str, ...]  # all of them, including the one that is held
+    held: str  # name of the one that is held
+    value: float  # its value [SI]
     unit: str
-    is_given: bool
+    is_given: bool  # whether the value was given; otherwise it is the default of the rig, or one
 
     @property
     def sentence(self) -> str:
@@ -66,16 +52,7 @@ def open_factor(
 ) -> OpenFactor | None:
     """Return the parameters that records of a free motion determine only up to a common factor, None if the factor is determined.
 
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        The fitted records.
-    constants
-        The rig's constants by name.
-    given
-        Parameters with a known or assumed value; one of them is held if it is among the undetermined ones.
+    Of those with a given value one is held.
     """
     if not rig.is_driven or any(not is_constant(r[s.name]) for r in records for s in rig.inputs):
         return None

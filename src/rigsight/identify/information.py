@@ -78,15 +78,6 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
 def answers_to_states(fit: GreyBoxFit, result: FitResult) -> list[Floats]:
     """Return the derivatives of each record's weighted readings by its initial states and free offsets, at the end of a fit.
 
-    Parameters
-    ----------
-    fit
-        Structure, records and noise.
-    result
-        Its result.
-
-    Returns
-    -------
     Shape (n_readings, n_states + n_offsets) each, per unit of a coordinate of the search.
     """
     return [answers for _, answers in central_sensitivities(*place_of_fit(fit, result, result.values, ()))]

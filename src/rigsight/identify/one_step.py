@@ -25,20 +25,7 @@ _FOLLOWED = 1e-9
 
 
 class OneStep:
-    """Gauss-Newton steps from the end of a fit, with each record's initial state and offsets free as in the fit.
-
-    Parameters
-    ----------
-    fit
-        Structure, records, weights.
-    result
-        Its result, with standard errors.
-
-    Raises
-    ------
-    SimulationError
-        If the derivatives of the readings overflow.
-    """
+    """Gauss-Newton steps from the end of a fit with standard errors; initial states and offsets are free as there."""
 
     def __init__(self, fit: GreyBoxFit, result: FitResult) -> None:
         problem, theta = place_of_fit(fit, result, result.values, result.free)
@@ -59,33 +46,17 @@ class OneStep:
         self._inverse = np.where(np.isfinite(inverse), inverse, 0.0)
 
     def gradients(self, changes: Sequence[Floats]) -> Floats:
-        """Return the projections of changes of the records on the derivatives of the fit, as needed by `covariance`.
+        """Return the projections of changes of the records on the derivatives of the fit, shape (n_free, n_replicates).
 
-        Parameters
-        ----------
-        changes
-            Change of the readings of each record, shape (n_samples, n_outputs, n_replicates).
-
-        Returns
-        -------
-        Shape (n_free, n_replicates).
+        A change of the readings of a record has the shape (n_samples, n_outputs, n_replicates).
         """
         return self._gradients(self._stacked(changes))
 
     def covariance(self, gradients: Floats) -> Floats:
-        """Return the mean product of the steps that changes of the records would cause, as a covariance.
+        """Return the mean product of the steps that changes of the records would cause, from their `gradients`, as a covariance.
 
-        Steps are taken about the estimate and not about their mean: a mean other than zero is a bias of the estimate, which the
-        standard error must include.
-
-        Parameters
-        ----------
-        gradients
-            Of all changes, see `gradients`, shape (n_free, n_replicates).
-
-        Returns
-        -------
-        Shape (n_free, n_free), in units of the parameters, infinite for a parameter that the records do not determine.
+        In units of the parameters, infinite for one that the records do not determine. Steps are taken about the estimate and
+        not about their mean: a mean other than zero is a bias of the estimate, which the standard error must include.
         """
         filling = gradients @ gradients.T / gradients.shape[1]
         found = sandwich_covariance(self._bread, filling, self._error)

@@ -40,20 +40,10 @@ def _equations_of(key: ByIdentity[Rig]) -> RigEquations:
 class RigEquations:
     """The equations of a rig without effects.
 
-    All functions take the states ``z`` of shape (n_states, n_samples), the inputs ``u`` of shape (3 n_inputs, n_samples) (each
-    with its first and second time derivative) and the parameter vector ``p`` of `structure`, shape (n_parameters,).
-
-    Parameters
-    ----------
-    rig
-        The rig.
-
-    Attributes
-    ----------
-    structure
-        The rig with an additional sensor for each of its states, so that one simulation returns all of them.
-    n_coordinates
-        Degrees of freedom; coordinates come first among the states, then their rates, then the rig's own states.
+    All functions take the states ``z`` of shape (n_states, n_samples): coordinates first, then their rates, then the rig's
+    own states; the inputs ``u`` of shape (3 n_inputs, n_samples) (each with its first and second time derivative) and the
+    parameter vector ``p`` of `structure`, shape (n_parameters,). `structure` has an additional sensor for each state, so that
+    one simulation returns all of them.
     """
 
     def __init__(self, rig: Rig) -> None:

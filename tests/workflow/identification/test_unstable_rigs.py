@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigsight.campaign import with_weighed_spring
 from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.identify.identification import Identification
 from rigsight.identify.record_identification import EstimationOptions, identify_record
@@ -110,7 +111,7 @@ def test_a_diagnosis_holds_an_unstable_rig(tmp_path: Path) -> None:
 def test_a_spring_that_is_given_as_absent_is_weighed(tmp_path: Path, k: float, released: bool) -> None:
     records = {name: in_a_loop(2.0, 5.0, k, seed=seed) for seed, name in enumerate("ab")}
     folder = campaign_of(tmp_path, records, "m = 2.0\nd = 5.0\nk = 0.0")
-    weighed = read_campaign(folder).with_weighed_spring()
+    weighed = with_weighed_spring(read_campaign(folder))
     assert weighed.spring_released == released
     assert weighed.drifts
     assert weighed.given["k"] == 0.0

@@ -284,18 +284,9 @@ def known_constant_forces(
 
 
 def candidates_on(rig: Rig, effects: Iterable[Effect], modelled: Iterable[Effect] = ()) -> list[Effect]:
-    """Return effects at the places of a rig, in the order of the effects.
+    """Return effects at the places of a rig, in the order of the effects, without those that the simulation has already.
 
-    On one mass or one element each effect has only one place, so its name needs no place.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    effects
-        Without a place; those that have one keep it.
-    modelled
-        Effects that the simulation has already.
+    An effect that has a place keeps it. On one mass or one element each effect has only one place, so its name needs no place.
     """
     there = {effect.name for effect in modelled}
     found = []

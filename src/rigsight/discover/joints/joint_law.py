@@ -46,24 +46,12 @@ _LOOKED_AT = 2
 
 @dataclass(frozen=True, eq=False)
 class LawTerm:
-    """A term of a law.
+    """A term of a law."""
 
-    Attributes
-    ----------
-    effect
-        The term, placed at its joint.
-    values
-        Its parameters by their own names: coefficients, and nonlinear parameters inside the term.
-    std
-        Standard error of each coefficient.
-    units
-        Of `values`.
-    """
-
-    effect: Effect
-    values: Mapping[str, float]
-    std: Mapping[str, float]
-    units: Mapping[str, str]
+    effect: Effect  # the term, placed at its joint
+    values: Mapping[str, float]  # coefficients, and nonlinear parameters inside the term, by their own names
+    std: Mapping[str, float]  # standard error of each coefficient
+    units: Mapping[str, str]  # of `values`
 
     @property
     def text(self) -> str:

@@ -55,15 +55,7 @@ class LinearizedMotion:
 
 
 class MotionEquations:
-    """The equations of a structure as functions of arrays.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    fitted
-        Names of the parameters with respect to which derivatives are taken.
-    """
+    """The equations of a structure as functions of arrays, with derivatives by some of its parameters."""
 
     def __init__(self, structure: Structure, fitted: Sequence[str]) -> None:
         self.structure = structure

@@ -46,24 +46,13 @@ _MOST_SHARE = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One effect at its best nonlinear parameters, as one column of the library.
-
-    Attributes
-    ----------
-    effect
-        The effect.
-    inner
-        Values of the nonlinear parameters inside the term.
-    linear
-        Share of each of the effect's linear parameters in the coefficient of the column; empty if it has none.
-    column
-        Rows of all records, shape (n_rows,).
-    """
+    """One effect at its best nonlinear parameters, as one column of the library."""
 
     effect: Effect
-    inner: Mapping[str, float]
+    inner: Mapping[str, float]  # values of the nonlinear parameters inside the term
+    # Share of each of the effect's linear parameters in the coefficient of the column; empty if it has none.
     linear: Mapping[str, float]
-    column: Floats
+    column: Floats  # rows of all records, shape (n_rows,)
 
     @property
     def name(self) -> str:

@@ -51,20 +51,10 @@ class _Split:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Maps a vector of search coordinates to the parameters of a structure and back.
-
-    Attributes
-    ----------
-    structure
-        Rig and effects.
-    free
-        Parameters that are fitted.
-    lower, upper
-        Bounds of the coordinates, shape (n_free,).
-    """
+    """Maps a vector of search coordinates to the parameters of a structure and back."""
 
     structure: Structure
-    free: tuple[str, ...]
+    free: tuple[str, ...]  # parameters that are fitted
     base: Floats
     index: NDArray[np.intp]
     scale: Floats
@@ -72,7 +62,7 @@ class Coordinates:
     pairs: tuple[_Pair, ...]
     excesses: tuple[tuple[int, int], ...]
     split: _Split | None
-    lower: Floats
+    lower: Floats  # bounds of the coordinates, shape (n_free,)
     upper: Floats
 
     @classmethod

@@ -103,20 +103,10 @@ def _interval_factors(reads: Sequence[tuple[Floats, Floats, int]]) -> Floats:
 
 
 def sandwich_covariance(bread: Floats, filling: Floats, derivative_error: float = 0.0) -> Floats:
-    """Return ``bread^-1 filling bread^-1``, with infinite variances for coordinates that the bread does not determine.
+    """Return ``bread^-1 filling bread^-1``, shape (n, n), with infinite variances for what the bread does not determine.
 
-    Parameters
-    ----------
-    bread
-        J^T J of the weighted residuals, shape (n, n).
-    filling
-        Covariance of J^T r, shape (n, n); equal to the bread if the residuals are independent with variance 1.
-    derivative_error
-        Relative error of the derivatives in the bread.
-
-    Returns
-    -------
-    Shape (n, n).
+    The bread is J^T J of the weighted residuals, with a relative error of the derivatives. The filling is the covariance of
+    J^T r; it equals the bread if the residuals are independent with variance 1.
     """
     if bread.shape[0] == 0:
         return np.zeros((0, 0))
@@ -150,20 +140,9 @@ def propagated_covariance(covariance: Floats, chain: Floats) -> Floats:
 
 
 def spectral_product(residual: Floats, derivative: Floats, count: int) -> Floats:
-    """Return the covariance of J^T r of one record from the smoothed spectrum of its residual.
+    """Return the covariance of J^T r of one record from the smoothed spectrum of its residual, shape (n, n).
 
-    Parameters
-    ----------
-    residual
-        Residuals of `count` outputs, one after the other, shape (count * n_samples,).
-    derivative
-        J, in the same order, shape (count * n_samples, n).
-    count
-        Number of outputs.
-
-    Returns
-    -------
-    Shape (n, n).
+    Residuals and derivatives are those of `count` outputs, one after the other: (count * n_samples,) and (count * n_samples, n).
     """
     by_output = residual.reshape(count, -1)
     n = by_output.shape[1]

@@ -16,51 +16,23 @@ from rigsight.simulate import Structure, Substeps
 
 @dataclass(frozen=True)
 class FitResult:
-    """Result of an output-error fit.
+    """Result of an output-error fit."""
 
-    Attributes
-    ----------
-    structure
-        Rig and effects that were fitted.
-    success, message
-        Whether the optimizer converged, and its message.
-    values
-        Every parameter of the structure by name, fitted or not.
-    standard_errors
-        Of the fitted parameters by name, allowing for colored residuals; infinite if the records do not determine the parameter.
-    initial_states
-        Per record, shape (n_states + n_offsets,): the states of the structure, followed by the free offsets.
-    offset_names
-        Sensors whose offsets were free in each record, in that order.
-    cost
-        Sum of squared weighted residuals.
-    n_samples
-        Number of residuals in that sum.
-    n_evaluations
-        Number of evaluations of residuals and derivatives.
-    free
-        Names of the fitted parameters, in the order of `covariance`.
-    covariance
-        Shape (n_free, n_free), in units of the parameters.
-    substeps
-        Integration steps per piece of the input that were used for each record.
-    """
-
-    structure: Structure
-    success: bool
-    message: str
-    values: dict[str, float]
-    standard_errors: dict[str, float]
-    initial_states: tuple[Floats, ...]
-    cost: float
-    n_samples: int
-    n_evaluations: int
-    free: tuple[str, ...]
-    covariance: Floats
+    structure: Structure  # rig and effects that were fitted
+    success: bool  # whether the optimizer converged
+    message: str  # that of the optimizer
+    values: dict[str, float]  # every parameter of the structure by name, fitted or not
+    standard_errors: dict[str, float]  # of the fitted ones, for colored residuals; infinite if undetermined
+    initial_states: tuple[Floats, ...]  # per record: states of the structure, then free offsets
+    cost: float  # sum of squared weighted residuals
+    n_samples: int  # number of residuals in that sum
+    n_evaluations: int  # of residuals and derivatives
+    free: tuple[str, ...]  # names of the fitted parameters, in the order of `covariance`
+    covariance: Floats  # shape (n_free, n_free), in units of the parameters
+    # Measured minus simulated per record, shape (n_samples, n_outputs), NaN for an output that was not measured.
     residuals: tuple[Floats, ...]
-    """Measured minus simulated per record, shape (n_samples, n_outputs), NaN for an output that was not measured."""
-    substeps: tuple[Substeps, ...] = ()
-    offset_names: tuple[str, ...] = ()
+    substeps: tuple[Substeps, ...] = ()  # integration steps per piece of the input of each record
+    offset_names: tuple[str, ...] = ()  # sensors whose offsets were free in each record, in that order
 
     @property
     def rig_states(self) -> tuple[Floats, ...]:
@@ -69,13 +41,7 @@ class FitResult:
         return tuple(state[: state.size - count] for state in self.initial_states)
 
     def offsets(self, index: int) -> dict[str, float]:
-        """Return the offset of each sensor in a record, by name; empty if none was free.
-
-        Parameters
-        ----------
-        index
-            Index of the record in the fit.
-        """
+        """Return the offset of each sensor in the record with an index in the fit, by name; empty if none was free."""
         if not self.offset_names:
             return {}
         own = self.initial_states[index][-len(self.offset_names) :]

@@ -43,24 +43,11 @@ _Outcome = tuple[Floats, bool, str]
 class GreyBoxFit:
     """Output-error least squares of a structure on records.
 
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    records
-        Records to fit; a record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of
-        them (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of
-        the result.
-    scales
-        Size of each base quantity, see `characteristic_scales`.
-    output_noise
-        Standard deviation by which the residuals of each output are divided.
-    accuracy
-        Relative accuracy of the simulations; the number of substeps follows from it.
-    memory
-        Storage of outcomes; a stored fit is not repeated and gives the same result.
-    threads
-        Threads among which the records are distributed; None for the calling thread alone.
+    A record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of them
+    (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of the
+    result. `scales` are those of `characteristic_scales`; residuals are divided by `output_noise`. The number of substeps
+    follows from the relative accuracy of the simulations. A fit that the memory holds is not repeated and gives the same
+    result.
     """
 
     def __init__(
@@ -114,29 +101,12 @@ class GreyBoxFit:
         finish: bool = True,
         substeps: Sequence[int] | None = None,
     ) -> FitResult:
-        """Fit the free parameters and every record's initial state.
+        """Fit the free parameters (there may be none) and every record's initial state.
 
-        Parameters
-        ----------
-        start
-            Value of every parameter of the structure.
-        free
-            Names of those to fit; may be empty, then only initial states are.
-        initial_states
-            Start values per record, as in `FitResult`; default from the first samples.
-        max_evaluations
-            Limit for the optimizer.
-        tolerance
-            Relative change of the cost at which the optimizer stops.
-        finish
-            Compute standard errors, and residuals with the accurate integrator. False for a rough fit.
-        substeps
-            Integration steps per piece of the input of each record; by default they follow from the accuracy.
-
-        Returns
-        -------
-        The result; ``success`` is False, with the reason as ``message``, if the start cannot be simulated or the optimizer ran
-        out of evaluations.
+        Without substeps and initial states these follow from the accuracy and from the first samples. `tolerance` is the
+        relative change of the cost at which the optimizer stops; a rough fit (not `finish`) has no standard errors and no
+        accurate residuals. ``success`` is False, with the reason as ``message``, if the start cannot be simulated or the
+        optimizer ran out of evaluations.
         """
         begin = SearchStart.of(self.data, self.scales, start, free, initial_states)
         coordinates, theta = begin.coordinates, begin.theta
@@ -180,21 +150,7 @@ class GreyBoxFit:
         """Fit the free parameters to many short records, each with the best initial state for the parameters.
 
         For motion with friction or hysteresis: there, `fit`, which varies everything together, can stop far from the minimum.
-
-        Parameters
-        ----------
-        start, free
-            As for `fit`.
-        max_evaluations
-            Limit for the optimizer in each round.
-        tolerance
-            Relative change of the cost at which a round ends.
-        most_rounds
-            Largest number of rounds; between them other values of limited states are tried.
-
-        Returns
-        -------
-        As for `fit`.
+        Between rounds other values of limited states are tried.
         """
         begin = SearchStart.of(self.data, self.scales, start, free)
         coordinates, n_free = begin.coordinates, len(free)
@@ -223,17 +179,8 @@ class GreyBoxFit:
     def information(self, start: Mapping[str, float], free: Sequence[str]) -> Floats:
         """Return the information of the records on parameters at their start, with unknown initial states.
 
-        This is the Fisher information of relative changes (of changes in units of the size, if a value is zero); NaN if the start
-        cannot be simulated.
-
-        Parameters
-        ----------
-        start, free
-            As for `fit`.
-
-        Returns
-        -------
-        Shape (n_free, n_free).
+        This is the Fisher information of relative changes (of changes in units of the size, if a value is zero), shape
+        (n_free, n_free); NaN if the start cannot be simulated.
         """
         begin, n = SearchStart.of(self.data, self.scales, start, free), len(free)
         problem = Problem(self.data, begin.coordinates, begin.n_states, np.full(begin.theta.size, np.inf))

@@ -24,63 +24,29 @@ _SHARES = (1.0, 0.3, 0.1, 0.03)
 
 @dataclass(frozen=True)
 class RecordDerivatives:
-    """Residuals of one record and their derivatives, in units of the noise.
+    """Residuals of one record and their derivatives, in units of the noise."""
 
-    Attributes
-    ----------
-    residuals
-        Weighted residuals of all measured outputs one after the other, shape (n_measured * n_samples,).
-    by_coordinate
-        Their derivatives by the coordinates of the free parameters, shape (n, n_free).
-    by_state
-        Their derivatives by the initial state of the record and then its offsets, shape (n, n_states).
-    n_measured
-        Number of outputs that the record contains.
-    """
-
-    residuals: Floats
-    by_coordinate: Floats
-    by_state: Floats
-    n_measured: int
+    residuals: Floats  # of all measured outputs one after the other, shape (n_measured * n_samples,)
+    by_coordinate: Floats  # derivatives by the coordinates of the free parameters, shape (n, n_free)
+    by_state: (
+        Floats  # derivatives by the initial state of the record and then its offsets, shape (n, n_states)
+    )
+    n_measured: int  # number of outputs that the record contains
 
 
 @dataclass(frozen=True)
 class Derivatives:
-    """The same for all records of a fit.
+    """The same for all records of a fit."""
 
-    Attributes
-    ----------
-    free
-        Names of the free parameters.
-    place
-        Their coordinates, shape (n_free,).
-    records
-        Derivatives of each record.
-    coordinates
-        Map from coordinates to parameters.
-    error
-        Relative error of the derivatives.
-    """
-
-    free: tuple[str, ...]
-    place: Floats
+    free: tuple[str, ...]  # names of the free parameters
+    place: Floats  # their coordinates, shape (n_free,)
     records: tuple[RecordDerivatives, ...]
-    coordinates: Coordinates
-    error: float
+    coordinates: Coordinates  # map from coordinates to parameters
+    error: float  # relative error of the derivatives
 
 
 def derivatives(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> Derivatives:
-    """Return residuals and derivatives of every record at the values of a fit.
-
-    Parameters
-    ----------
-    problem
-        The records and the structure.
-    fit
-        Values, and the initial state of each of these records.
-    free
-        Names of the parameters with respect to which derivatives are taken.
-    """
+    """Return residuals and derivatives by the free parameters of every record, at the values and initial states of a fit."""
     evaluated, theta = _at_end(problem, fit, free)
     return Derivatives(
         free=tuple(free),
@@ -107,24 +73,9 @@ class OwnDerivatives:
 def own_derivatives(
     problem: GreyBoxFit, fit: FitResult, free: Sequence[str], most_steps: int, worth_a_step: float
 ) -> OwnDerivatives | None:
-    """Return values and derivatives of one record after some Gauss-Newton steps from the common values.
+    """Return values and derivatives of one record some Gauss-Newton steps from the common values; None if there was no step.
 
-    Parameters
-    ----------
-    problem
-        One record and the structure.
-    fit
-        Common values, and the initial state of this record.
-    free
-        Names of the parameters.
-    most_steps
-        Largest number of steps; a step is not taken if no share of it lowers the cost.
-    worth_a_step
-        Share of the cost by which a step must be expected to lower it.
-
-    Returns
-    -------
-    The estimate; None if no step was taken.
+    A step must be expected to lower the cost by the share `worth_a_step`, and is not taken if no share of it lowers the cost.
     """
     evaluated, start = _at_end(problem, fit, free)
     n_free, coordinates, theta = len(free), evaluated.coordinates, start

@@ -38,16 +38,7 @@ _DEPENDENT_STATE = 1e-9
 class VariableProjection(Problem):
     """Cost, gradient and Gauss-Newton matrix as functions of the parameters' coordinates.
 
-    Parameters
-    ----------
-    data
-        Structure and records of the fit.
-    coordinates
-        Of the parameters.
-    places
-        Initial state of each record in units of its sizes, shape (n_states,) each.
-    lower, upper
-        Bounds of the places, shape (n_states,) each.
+    `places` are the initial states of each record in units of their sizes, between `lower` and `upper`, shape (n_states,) each.
     """
 
     def __init__(

@@ -15,41 +15,22 @@ BEYOND = 2.0
 
 @dataclass(frozen=True)
 class Minimum:
-    """One local minimum, at which the refinement of a search ended.
+    """One local minimum, at which the refinement of a search ended."""
 
-    Attributes
-    ----------
-    values
-        Value of every parameter.
-    cost
-        Mean squared weighted residual.
-    """
-
-    values: dict[str, float]
-    cost: float
+    values: dict[str, float]  # of every parameter
+    cost: float  # mean squared weighted residual
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """Hysteresis parameters, with quantities derived from them.
+    """Hysteresis parameters, with quantities derived from them."""
 
-    Attributes
-    ----------
-    fit
-        Values, covariance and residuals.
-    derived
-        Saturation, pair and loop areas, with intervals.
-    minima
-        Local minima reached from the ends of the search and from the effects' own starts, best first, before special values were
-        released. Several of similar cost show that the data allow several sets.
-    n_simulated
-        Number of parameter sets that the search simulated.
-    """
-
-    fit: FitResult
-    derived: DerivedQuantities
+    fit: FitResult  # values, covariance and residuals
+    derived: DerivedQuantities  # saturation, pair and loop areas, with intervals
+    # Local minima reached from the ends of the search and from the effects' own starts, best first, before special values were
+    # released. Several of similar cost show that the data allow several sets.
     minima: tuple[Minimum, ...]
-    n_simulated: int
+    n_simulated: int  # number of parameter sets that the search simulated
 
     @property
     def values(self) -> dict[str, float]:

@@ -32,21 +32,11 @@ _SUBSTEPS = 2
 
 @dataclass(frozen=True)
 class Derived:
-    """A quantity derived from parameters.
-
-    Attributes
-    ----------
-    name, unit
-        Name and unit.
-    value
-        Value at the fitted parameters; infinite if it has no bound.
-    lower, upper
-        Interval of confidence `LEVEL`; -inf to inf if the parameters are undetermined.
-    """
+    """A quantity derived from parameters, with its interval of confidence `LEVEL`; -inf to inf if they are undetermined."""
 
     name: str
     unit: str
-    value: float
+    value: float  # at the fitted parameters; infinite if it has no bound
     lower: float
     upper: float
 
@@ -61,25 +51,16 @@ class LoopArea:
 
 @dataclass(frozen=True)
 class DerivedQuantities:
-    """Quantities derived from hysteresis parameters.
+    """Quantities derived from hysteresis parameters."""
 
-    Attributes
-    ----------
-    pairs
-        Sum and difference, in this order, of each pair that is searched in this form.
-    saturation
-        Limit of the state of a spring with memory under increasing load, z_max = (A / (beta + gamma))^(1/n) for a Bouc-Wen
-        spring; None for effects without it.
-    saturation_in_words
-        Statement on the saturation from the sign of the pair's sum (beta + gamma); empty without one.
-    loop_areas
-        Energy per cycle at each amplitude.
-    """
-
-    pairs: tuple[Derived, ...]
+    pairs: tuple[
+        Derived, ...
+    ]  # sum and difference, in this order, of each pair that is searched in this form
+    # Limit of the state of a spring with memory under increasing load, z_max = (A / (beta + gamma))^(1/n) for a Bouc-Wen spring;
+    # None for effects without it.
     saturation: Derived | None
-    saturation_in_words: str
-    loop_areas: tuple[LoopArea, ...]
+    saturation_in_words: str  # from the sign of the pair's sum (beta + gamma); empty without one
+    loop_areas: tuple[LoopArea, ...]  # energy per cycle at each amplitude
 
 
 def derived_quantities(
@@ -89,20 +70,9 @@ def derived_quantities(
     rng: np.random.Generator,
     n_draws: int = _DRAWS,
 ) -> DerivedQuantities:
-    """Derive pairs, saturation and loop areas from a fit.
+    """Derive pairs, saturation, and loop areas at some deflections (such as `record_amplitudes`) from a fit with its covariance.
 
-    Parameters
-    ----------
-    fit
-        Fit with values and covariance.
-    amplitudes
-        Deflections at which loop areas are computed, such as those reached in records (`record_amplitudes`).
-    scales
-        Size of each base quantity, as in the fit.
-    rng
-        Draws the parameters.
-    n_draws
-        Number of draws.
+    The scales are those of the fit; the parameters are drawn `n_draws` times.
     """
     structure = fit.structure
     draws = parameter_draws(fit, scales, rng, n_draws)
@@ -196,11 +166,6 @@ def loop_area(structure: Structure, p: Floats, amplitude: float) -> Floats:
 
     The effects that change the spring (its deflection or its torque) are simulated on a bench that moves them slowly and
     sinusoidally; the last of four cycles is used. Damping and friction parallel to the spring are left out.
-
-    Raises
-    ------
-    InputError
-        If no effect changes the spring, or the amplitude is not positive.
     """
     effects = [e for e in structure.effects if e.spring is not None or e.deflection is not None]
     if not any(effect.spring is not None for effect in effects):

@@ -13,21 +13,11 @@ from rigsight.identify.transfer.transfer_function import fit_frequency_response
 
 @dataclass(frozen=True)
 class Peak:
-    """The highest point of a magnitude.
+    """The highest point of a magnitude."""
 
-    Attributes
-    ----------
-    omega
-        Its angular frequency [rad/s].
-    magnitude
-        Its magnitude, in the unit of the response.
-    is_resonance
-        False if the highest point is the first or last of the band, so that the response has no peak in it.
-    """
-
-    omega: float
-    magnitude: float
-    is_resonance: bool
+    omega: float  # angular frequency [rad/s]
+    magnitude: float  # in the unit of the response
+    is_resonance: bool  # False at the first or last line of the band: the response has no peak in it
 
 
 def peak(response: FrequencyResponse) -> Peak:
@@ -47,21 +37,13 @@ def peak(response: FrequencyResponse) -> Peak:
 
 
 def break_frequency(response: FrequencyResponse) -> float:
-    """Return the break frequency [rad/s], at which the phase first passes -90 degrees.
+    """Return the break frequency [rad/s], at which the phase first passes -90 degrees; refused if it does not within the band.
 
     The thesis defines omega_b by the PT2 (2.9), whose phase is "reaching -90 degrees at the break frequency" (section 2.2.2).
     Chapter 6 gives the break frequency of hysteretic simulations without stating how it is determined for a curve that is not a
     PT2. This definition reproduces its statements: compared with the PT2 of Table 4.1 at 1 A, set B has the right break frequency
     (0.4 %) and half the peak, and that of set P is too low (10 %). From the magnitude, that of set B would be 4 % too high.
-
-    Raises
-    ------
-    InputError
-        If the phase does not pass -90 degrees within the band.
-
-    See Also
-    --------
-    fitted_break_frequency : uses the magnitude; for responses whose phase is changed by delays or lags.
+    For responses whose phase is changed by delays or lags see `fitted_break_frequency`.
     """
     phase = response.phase
     phase = phase - 2.0 * np.pi * np.round(phase[0] / (2.0 * np.pi))
@@ -82,11 +64,6 @@ def fitted_break_frequency(response: FrequencyResponse) -> float:
     """Return omega_b [rad/s] of the PT2 that fits the magnitude best, with equal weights in dB, as in a fit by eye.
 
     This is the manual fit of section 4.4 of the thesis, which does not use the phase; delays and lags do not affect it.
-
-    Raises
-    ------
-    InputError
-        If the band shows no break frequency.
     """
     found = fit_frequency_response(response, "pt2", magnitude_only=True, weighting="relative")
     if not found.success:

@@ -23,30 +23,15 @@ class SpectralRatio:
 
     The width grows with the frequency, as suits a logarithmic sweep. Because the source is known in advance, the estimator is one
     matrix that is multiplied with the response: for thousands of simulations its cost is negligible.
-
-    Attributes
-    ----------
-    source, response
-        Names of the signals.
-    omega
-        Frequencies [rad/s], increasing, shape (n_frequencies,).
-    width
-        Standard deviation of the weight, relative to the frequency.
     """
 
     source: str
     response: str
-    omega: Floats
-    width: float = 0.035
+    omega: Floats  # frequencies [rad/s], increasing, shape (n_frequencies,)
+    width: float = 0.035  # standard deviation of the weight, relative to the frequency
 
     def __call__(self, record: Record) -> FrequencyResponse:
-        """Return the frequency response of a record that starts at rest.
-
-        Raises
-        ------
-        InputError
-            If a frequency lies beyond the Nyquist frequency or the source has no content there.
-        """
+        """Return the frequency response of a record that starts at rest."""
         # For a single record, the matrix of `rows` would take a hundred times as long.
         answer = np.fft.rfft(record[self.response])
         sums = [np.sum(weights * answer[near]) for near, weights in self._weights(record)]

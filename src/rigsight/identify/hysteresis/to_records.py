@@ -56,43 +56,15 @@ def calibrate_to_records(
 ) -> Calibration:
     """Calibrate a structure with hysteresis to records, best at several amplitudes below and above saturation.
 
-    Parameters
-    ----------
-    structure
-        Rig and effects; values written into its equations as numbers are kept.
-    records
-        Records to fit.
-    constants
-        The rig's constants by name.
-    rng
-        Random numbers for search and intervals.
-    start
-        Start values of parameters, known or from a simpler fit; missing ones of the rig are estimated from the spectra. Effects
-        need none: their whole declared range is searched.
-    free
-        Parameters to fit; default is all that the records can determine.
-    output_noise
-        Standard deviation of the residuals of each output; default is 1 % of its size. If one output is fitted, standard errors
-        do not depend on it, because they follow from the residuals.
-    spread
-        Factor around the start in which the rig's own parameters are searched.
-    n_generations, n_sets, n_ends
-        Size of the search and number of its ends that are refined, see `search`.
-    n_jobs
-        Records simulated at the same time; the result does not depend on it.
-    progress
-        Called with a short text after each step.
+    Values written into the equations as numbers are kept. Start values of the rig that are missing are estimated from the
+    spectra, and its parameters are searched within a factor `spread` around them; effects need none, because their whole
+    declared range is searched. By default all parameters that the records can determine are free, and residuals are divided
+    by 1 % of the size of an output; if one output is fitted, standard errors do not depend on it, because they follow from
+    the residuals. The result does not depend on `n_jobs`, the number of records simulated at the same time.
 
-    Raises
-    ------
-    InputError
-        If there are no records, a constant or parameter is missing or unknown, or no set of the range can be simulated.
-
-    Notes
-    -----
-    With stiff loops the cost has many local minima, and a search can end in a wrong basin: on simulated records of one stiff set,
-    60 generations of 64 sets did so in one of eight draws, the default in none of fifteen draws of four sets. Compare the
-    residuals with the noise before relying on the parameters.
+    With stiff loops the cost has many local minima, and a search can end in a wrong basin: on simulated records of one stiff
+    set, 60 generations of 64 sets did so in one of eight draws, the default in none of fifteen draws of four sets. Compare
+    the residuals with the noise before relying on the parameters.
     """
     if not records:
         raise InputError("A calibration needs at least one record, got none.")

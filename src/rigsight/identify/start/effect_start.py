@@ -43,19 +43,7 @@ class _Motion:
 
 
 class EffectRegression:
-    """Regression of effects on the records of a driven rig.
-
-    Parameters
-    ----------
-    rig
-        A driven rig.
-    records
-        Estimation records.
-    values
-        Constants and fitted parameters of the rig without the effect.
-    scales
-        Size of each base quantity.
-    """
+    """Regression of effects on the records of a driven rig, about its constants and parameters fitted without the effect."""
 
     def __init__(
         self, rig: Rig, records: Sequence[Record], values: Mapping[str, float], scales: Mapping[str, float]

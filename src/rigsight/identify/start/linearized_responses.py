@@ -49,20 +49,9 @@ class _Lines:
 
 
 class LinearizedResponses:
-    """The error of the spectra of records as a function of a rig's parameters.
+    """The error of the spectra of records as a function of a rig's free parameters, the values of all others being known.
 
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    records
-        Estimation records.
-    values
-        Value of each known constant and parameter.
-    free
-        Names of the unknown parameters.
-    middle
-        States about which the rig moves in each record, shape (n_states,) each.
+    The rig moves about the states `middle` in each record, shape (n_states,) each.
     """
 
     def __init__(

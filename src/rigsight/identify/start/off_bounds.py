@@ -14,19 +14,7 @@ _INSIDE = 0.1
 def off_bounds(
     structure: Structure, values: Mapping[str, float], free: Sequence[str], scales: Mapping[str, float]
 ) -> dict[str, float] | None:
-    """Return start values without free parameters at a bound of their range; None if there are none.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    values
-        Start value of every parameter of the structure.
-    free
-        Names of those that are fitted.
-    scales
-        Size of each base quantity, see `characteristic_scales`.
-    """
+    """Return start values without free parameters at a bound of their range; None if there are none."""
     moved = {
         p.name: min(max(share * characteristic_value(p.dimension, scales), p.lower), p.upper)
         for p in structure.parameters

@@ -17,23 +17,12 @@ from rigsight.simulate.prescribed_motion import smooth_motion
 def characteristic_scales(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the size of each base quantity of `rigsight.units` in these records.
+    """Return the size of each base quantity of `rigsight.units` in these records, for constants and parameters by name.
 
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        Estimation records.
-    values
-        Constants and identified parameters of the rig, by name.
-
-    Returns
-    -------
     ``x`` displacement, ``input``, ``drive`` (force of the drive), ``force`` (of the spring), ``time`` [s] (reciprocal of the
-    angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 if there is none), each without a place
-    and at every joint, drive, sensor and state (``force@shaft``); for a rig with more than one motion also ``size@NAME`` for each
-    of its parameters, coordinates, rates (``size@d(NAME)``) and states.
+    angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 if there is none), each without a
+    place and at every joint, drive, sensor and state (``force@shaft``); for a rig with more than one motion also
+    ``size@NAME`` for each of its parameters, coordinates, rates (``size@d(NAME)``) and states.
     """
     if not rig.has_one_motion:
         return scales_at_places(rig, records, values)

@@ -76,23 +76,9 @@ class _Block:
 
 
 class WeakEquations:
-    """The error of a rig's equations in records as a function of its parameters.
+    """The error of a rig's equations in records as a function of its free parameters, the values of all others being known.
 
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    records
-        Estimation records; those that do not show all states are not used here.
-    values
-        Value of each known constant and parameter.
-    free
-        Names of the unknown parameters.
-
-    Attributes
-    ----------
-    n_records
-        Number of records that show all states; if zero, only `term_sizes` is meaningful.
+    Records that do not show all states are not used here; if none does (`n_records` is zero), only `term_sizes` is meaningful.
     """
 
     def __init__(

@@ -9,7 +9,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-from rigsight.campaign import Campaign
+from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.identify import (
     FitResult,
@@ -98,7 +98,7 @@ def identify_any_rig(
     campaign: Campaign, options: EstimationOptions, n_jobs: int, listener: Listener
 ) -> Identification:
     """Identify a rig of any shape."""
-    campaign = campaign.with_weighed_spring()
+    campaign = with_weighed_spring(campaign)
     rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
     check_option(
         f"The method for the rig '{rig.name}' with these records (h1 and thesis are for built-in rigs of one motion that returns "
