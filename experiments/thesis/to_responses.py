@@ -13,7 +13,7 @@ from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.fit.coordinates import STEP, Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calibration, Minimum, better
 from rigsight.identify.hysteresis.derived import derived_quantities
 from rigsight.identify.hysteresis.parameters import (

@@ -9,10 +9,9 @@ import pytest
 import sympy as sp
 
 from rigsight.discover.bench import Bench
-from rigsight.discover.ensembles import regressed_force
+from rigsight.discover.ensembles import ForceLaw, force_equation, regressed_force
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected
-from rigsight.discover.terms.force_law import ForceLaw, force_equation
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.weak_form import Rows
 from rigsight.effects import CATALOGUE, effect_named

@@ -10,7 +10,7 @@ from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.first_states import first_state
-from rigsight.identify.fit.variable_projection import VariableProjection
+from rigsight.identify.fit.search import VariableProjection
 from rigsight.identify.fit.windows import Windowing
 from rigsight.records import Record
 from rigsight.rigs import AXIS

@@ -1,21 +1,22 @@
 """Physical parameters from records: transfer functions, linear start values, grey-box fits, their uncertainty."""
 
-from rigsight.identify.absent_spring import weighed_spring as weighed_spring
 from rigsight.identify.fit.coordinates import Coordinates as Coordinates
 from rigsight.identify.fit.covariance import SMOOTHED as SMOOTHED
 from rigsight.identify.fit.covariance import sandwich_covariance as sandwich_covariance
 from rigsight.identify.fit.covariance import spectral_product as spectral_product
-from rigsight.identify.fit.fit_result import FitMemory as FitMemory
-from rigsight.identify.fit.fit_result import FitResult as FitResult
+from rigsight.identify.fit.derivatives import Derivatives as Derivatives
+from rigsight.identify.fit.derivatives import OneStep as OneStep
+from rigsight.identify.fit.derivatives import RecordDerivatives as RecordDerivatives
+from rigsight.identify.fit.derivatives import derivatives as derivatives
+from rigsight.identify.fit.derivatives import own_derivatives as own_derivatives
+from rigsight.identify.fit.fit_data import FitMemory as FitMemory
+from rigsight.identify.fit.fit_data import FitResult as FitResult
 from rigsight.identify.fit.grey_box import DEFAULT_ACCURACY as DEFAULT_ACCURACY
 from rigsight.identify.fit.grey_box import GreyBoxFit as GreyBoxFit
 from rigsight.identify.fit.idle_threads import IdleThreads as IdleThreads
-from rigsight.identify.fit.record_derivatives import Derivatives as Derivatives
-from rigsight.identify.fit.record_derivatives import RecordDerivatives as RecordDerivatives
-from rigsight.identify.fit.record_derivatives import derivatives as derivatives
-from rigsight.identify.fit.record_derivatives import own_derivatives as own_derivatives
-from rigsight.identify.free_motion import OpenFactor as OpenFactor
-from rigsight.identify.free_motion import open_factor as open_factor
+from rigsight.identify.held_parameters import OpenFactor as OpenFactor
+from rigsight.identify.held_parameters import open_factor as open_factor
+from rigsight.identify.held_parameters import weighed_spring as weighed_spring
 from rigsight.identify.hysteresis import Calibration as Calibration
 from rigsight.identify.hysteresis import DerivedQuantities as DerivedQuantities
 from rigsight.identify.hysteresis import LoopArea as LoopArea
@@ -28,7 +29,6 @@ from rigsight.identify.joint import JointFit as JointFit
 from rigsight.identify.joint import KindFit as KindFit
 from rigsight.identify.joint import RecordResidual as RecordResidual
 from rigsight.identify.joint import fit_jointly as fit_jointly
-from rigsight.identify.one_step import OneStep as OneStep
 from rigsight.identify.record_offsets import OFFSETS_MEND as OFFSETS_MEND
 from rigsight.identify.record_offsets import DifferingMeans as DifferingMeans
 from rigsight.identify.record_offsets import differing_means as differing_means

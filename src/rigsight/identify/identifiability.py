@@ -19,7 +19,7 @@ from itertools import combinations
 import numpy as np
 
 from rigsight.errors import SimulationError
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.information import Information, information
 from rigsight.identify.undetermined import (

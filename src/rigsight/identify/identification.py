@@ -8,9 +8,9 @@ from typing import Any
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.hysteresis.calibration import Calibration
 from rigsight.identify.identifiability import Identifiability
+from rigsight.identify.information import ReachedBound
 from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
-from rigsight.identify.reached_bounds import ReachedBound
 from rigsight.identify.transfer.conicity import ConicityEstimate
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from rigsight.identify.fit.covariance import SMOOTHED
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure

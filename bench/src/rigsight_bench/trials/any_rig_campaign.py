@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.rig_equations import equations_of
-from rigsight.identify.start.rig_motion import simulated_motion
+from rigsight.identify.start.scales import simulated_motion
 from rigsight.records import Kind
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, simulate

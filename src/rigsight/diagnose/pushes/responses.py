@@ -23,7 +23,7 @@ from rigsight.effects import Effect
 from rigsight.identify import FitResult
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.windows import observed_sensors
-from rigsight.identify.start.place_scales import scales_at_places
+from rigsight.identify.start.scales import scales_at_places
 from rigsight.records.record import Record
 from rigsight.simulate import compose, parameter_vector, record_input, record_values, simulate_sets
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion

@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigsight.discover.doubts import still_missing
+from rigsight.discover.assembly import equations, held_numbers, still_missing
 from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_force import JointForce, missing_forces, not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm
 from rigsight.discover.regression import STRONG, RegressionData, information_criterion
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import independent_samples
-from rigsight.discover.terms.equations import equations, held_numbers
 from rigsight.effects import effect_named, placed
 from rigsight.effects.placed import kind_of
 from rigsight.errors import SimulationError

@@ -12,9 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.joints.followed_motion import DECADES, FollowedMotion, improved, with_unknown_forces
+from rigsight.discover.joints.followed_motion import (
+    DECADES,
+    FollowedMotion,
+    improved,
+    joint_motion,
+    with_unknown_forces,
+)
 from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionEquations
-from rigsight.discover.joints.unknown_force import joint_motion
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Joint, Rig
 from rigsight.simulate import parameter_vector, record_input, rest_state

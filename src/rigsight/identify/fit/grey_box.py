@@ -19,13 +19,11 @@ import numpy as np
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.fit.fit_data import FitData, record_data
+from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
-from rigsight.identify.fit.fit_result import FitMemory, FitResult, fit_key, record_digest
 from rigsight.identify.fit.idle_threads import IdleThreads
-from rigsight.identify.fit.search import FINE_TOLERANCE, off_kinks, searched
+from rigsight.identify.fit.search import FINE_TOLERANCE, VariableProjection, off_kinks, searched
 from rigsight.identify.fit.settled_states import SearchStart
-from rigsight.identify.fit.variable_projection import VariableProjection
 from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, Substeps, simulate_outputs, structure_of_fit
 from rigsight.units import characteristic_value

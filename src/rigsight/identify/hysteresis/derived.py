@@ -16,7 +16,7 @@ from rigsight.effects.effect import Effect, SumAndDifference
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import ELEMENT
 from rigsight.simulate import Structure, compose, simulate_sets

@@ -17,11 +17,11 @@ from scipy.linalg import qr
 from rigsight.errors import InputError
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.first_states import rig_state
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.start.linearized_responses import LinearizedResponses
-from rigsight.identify.start.place_scales import scales_at_places
+from rigsight.identify.start.scales import scales_at_places
 from rigsight.identify.start.spread_search import AGREEING, PERSISTENT, balanced, ends_of_search
 from rigsight.identify.start.weak_equations import WeakEquations
 from rigsight.identify.typical_size import size_of_signal

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.start.linearized_responses import USABLE_BAND
-from rigsight.identify.start.projection import SIGNIFICANT_POWER
+from rigsight.identify.start.measured_states import SIGNIFICANT_POWER
 from rigsight.records.record import Floats, Record
 
 _ITERATIONS = 20

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.rig_equations import RigEquations
-from rigsight.identify.start.projection import SIGNIFICANT_POWER
+from rigsight.identify.start.measured_states import SIGNIFICANT_POWER
 from rigsight.records.record import Floats, Record
 from rigsight.simulate.equations.structure import input_symbols
 

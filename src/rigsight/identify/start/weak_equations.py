@@ -26,11 +26,12 @@ from numpy.typing import NDArray
 from rigsight.identify.rig_equations import FUNCTIONS, RigEquations, rows_of
 from rigsight.identify.start.measured_states import (
     MeasuredStates,
+    Projection,
     measured_states,
+    projected,
     sensor_factors,
     supposed_states,
 )
-from rigsight.identify.start.projection import Projection, projected
 from rigsight.records.record import Floats, Record
 from rigsight.simulate.equations.structure import input_symbols
 

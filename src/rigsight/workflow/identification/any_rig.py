@@ -29,7 +29,7 @@ from rigsight.identify.identification import (
     PathIdentification,
     RecordIdentification,
 )
-from rigsight.identify.information import Information, information
+from rigsight.identify.information import Information, information, reached_bounds
 from rigsight.identify.linear_view import (
     LinearView,
     by_constants,
@@ -38,7 +38,6 @@ from rigsight.identify.linear_view import (
     measured_responses,
     near_rest,
 )
-from rigsight.identify.reached_bounds import reached_bounds
 from rigsight.identify.record_identification import EstimationOptions
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
