@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -80,6 +81,23 @@ _NEAR = 1.5
 """Factor of the held-out error within which another equation is nearly as good."""
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Results of the stages of a discovery, from which its result is assembled."""
+
+    estimation: tuple[Record, ...]
+    held_out: tuple[Record, ...]
+    how: str
+    selection: Selection
+    chosen: Trial
+    judged: Trial
+    final: FitResult
+    inclusion: Mapping[str, float]
+    force: ForceEquation | None
+    same: Mapping[str, list[str]]
+    held: str
+
+
 def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, same: Sequence[str]) -> str:
     """Return the reasons to doubt a kept term; empty if there are none."""
     found = []
@@ -101,26 +119,16 @@ def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, sam
 
 
 def warnings_of(
-    data: RegressionData,
-    estimation: Sequence[Record],
-    held_out: Sequence[Record],
-    how: str,
-    selection: Selection,
-    chosen: Trial,
-    error_over_noise: float,
-    terms: Sequence[Term],
-    held: str,
-    force: ForceEquation | None,
-    floor: float,
-    likeliest: str,
+    data: RegressionData, stages: Found, terms: Sequence[Term], floor: float, likeliest: str
 ) -> tuple[str, ...]:
     """Return the warnings for the user, one sentence each."""
-    found = [note for note in (how, held) if note]
+    selection, chosen, force = stages.selection, stages.chosen, stages.force
+    found = [note for note in (stages.how, stages.held) if note]
     source = data.rig.inputs[0].name
-    sizes = [float(np.std(record[source])) for record in estimation]
+    sizes = [float(np.std(record[source])) for record in stages.estimation]
     if max(sizes) < 1.2 * min(sizes):
         found.append(_one_amplitude(selection, chosen))
-    found += _same_input(source, estimation, held_out)
+    found += _same_input(source, stages.estimation, stages.held_out)
     best = criterion(chosen, selection.independent)
     rivals = [
         trial
@@ -149,7 +157,7 @@ def warnings_of(
             f"less: every omitted term is in doubt. Regression would select {likeliest} next, which proves nothing at this noise "
             f"level."
         )
-    found += still_missing(error_over_noise)
+    found += still_missing(stages.judged.error_over_noise)
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
     if force is not None:
         fitted = {p.name for p in force.law.effect.parameters if p.fitted}
@@ -226,77 +234,63 @@ def _one_amplitude(selection: Selection, chosen: Trial) -> str:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Results of the stages of a discovery, from which its result is assembled."""
-
-    estimation: tuple[Record, ...]
-    held_out: tuple[Record, ...]
-    how: str
-    selection: Selection
-    chosen: Trial
-    judged: Trial
-    final: FitResult
-    inclusion: Mapping[str, float]
-    force: ForceEquation | None
-    same: Mapping[str, list[str]]
-    held: str
-
-
 def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, found: Found) -> Discovery:
     """Return the result of a discovery: equations, terms with their doubts, alternatives, free runs, model."""
-    rig, final, selection = data.rig, found.final, found.selection
-    output = rig.outputs[0].name
-    structure = final.structure
-    text, latex = equations(structure, held_numbers(final))
-    own = {p.name for p in rig.parameters}
-    units = {p.name: p.unit for p in structure.parameters}
-    coefficients = {
-        name: Coefficient(final.values[name], final.standard_errors[name], units[name]) for name in final.free
-    }
-    terms = _terms(bench, found, coefficients)
+    selection, output, error = found.selection, data.rig.outputs[0].name, found.judged.error_over_noise
+    terms = _terms(bench, found)
     measured = np.concatenate([record[output] for record in found.held_out])
-    size = float(np.std(measured)) or 1.0
-    warnings = warnings_of(
+    floor = data.noise[output] / (float(np.std(measured)) or 1.0)
+    likeliest = next(iter(next_terms(bench, found.chosen.support)), "")
+    return discovery_of(
         data,
-        found.estimation,
-        found.held_out,
-        found.how,
-        selection,
-        found.chosen,
-        found.judged.error_over_noise,
-        terms,
-        found.held,
-        found.force,
-        data.noise[output] / size,
-        next(iter(next_terms(bench, found.chosen.support)), ""),
-    )
-    return Discovery(
-        title=data.campaign.title,
-        rig=rig.name,
+        found.final,
+        (found.estimation, found.held_out),
         method=method,
         form="pointwise" if pointwise else "weak",
-        equations=text,
-        latex=latex,
-        rig_parameters={name: c for name, c in coefficients.items() if name in own},
         terms=terms,
         alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
         force_equation={} if found.force is None else dict(found.force.inclusion),
-        held_out=tuple(record.name for record in found.held_out),
-        held_out_error=found.judged.error_over_noise,
-        held_out_nrmse=found.judged.error_over_noise * data.noise[output] / size,
-        noise_floor=data.noise[output] / size,
+        held_out_error=error,
+        held_out_nrmse=error * floor,
+        noise_floor=floor,
         independent=selection.independent,
         runs=_runs(bench, found, output),
-        output=output,
-        unit=rig.outputs[0].unit,
-        model=Model.of(structure, final.values, found.estimation[0].hold).to_json(),
-        warnings=warnings,
+        warnings=warnings_of(data, found, terms, floor, likeliest),
     )
 
 
-def _terms(bench: Bench, found: Found, coefficients: Mapping[str, Coefficient]) -> tuple[Term, ...]:
-    structure = found.final.structure
+def discovery_of(
+    data: RegressionData,
+    final: FitResult,
+    records: tuple[Sequence[Record], Sequence[Record]],
+    **further: Any,
+) -> Discovery:
+    """Return a discovery with all that its last fit and the fitted and the held-out records say, and further fields."""
+    rig, structure = data.rig, final.structure
+    text, latex = equations(structure, held_numbers(final))
+    own = {p.name for p in rig.parameters}
+    return Discovery(
+        title=data.campaign.title,
+        rig=rig.name,
+        equations=text,
+        latex=latex,
+        rig_parameters={name: c for name, c in coefficients_of(final).items() if name in own},
+        held_out=tuple(record.name for record in records[1]),
+        output=rig.outputs[0].name,
+        unit=rig.outputs[0].unit,
+        model=Model.of(structure, final.values, records[0][0].hold).to_json(),
+        **further,
+    )
+
+
+def coefficients_of(fit: FitResult) -> dict[str, Coefficient]:
+    """Return the fitted parameters with standard errors and units."""
+    units = {p.name: p.unit for p in fit.structure.parameters}
+    return {name: Coefficient(fit.values[name], fit.standard_errors[name], units[name]) for name in fit.free}
+
+
+def _terms(bench: Bench, found: Found) -> tuple[Term, ...]:
+    structure, coefficients = found.final.structure, coefficients_of(found.final)
     kept = {effect.name for effect in structure.effects}
     terms = []
     for name in bench.own_terms:

@@ -69,15 +69,6 @@ class Attempt:
 
 
 @dataclass(frozen=True, eq=False)
-class _Screening:
-    """The result of the first evaluations of a fit; attempts with a much higher cost than the best are dropped here."""
-
-    attempt: Attempt
-    problem: GreyBoxFit
-    fit: FitResult
-
-
-@dataclass(frozen=True, eq=False)
 class _RoughTrial:
     """A fit with the first evaluations of its score; None if the fit is not scored."""
 
@@ -210,16 +201,14 @@ class Bench:
         They are compared with all earlier trials, and with all of these attempts at the same stage, so that the result does not
         depend on the order in which the threads finish.
         """
-        screenings = self._screened(attempts)
-        costs = [trial.fit.cost for trial in self.trials.values()] + [
-            screening.fit.cost for screening in screenings
-        ]
-        hopeless = HOPELESS**2 * min(costs, default=float("inf"))
+        begun = self._begun(attempts)
+        fits = [*(trial.fit for trial in self.trials.values()), *(fit for _, _, fit in begun)]
+        hopeless = HOPELESS**2 * min((fit.cost for fit in fits), default=float("inf"))
 
-        def further(screening: _Screening) -> _RoughTrial:
-            fit = screening.fit
+        def further(one: tuple[Attempt, GreyBoxFit, FitResult]) -> _RoughTrial:
+            attempt, problem, fit = one
             if not fit.success and fit.cost < hopeless:
-                fit = screening.problem.fit(
+                fit = problem.fit(
                     fit.values,
                     fit.free,
                     fit.initial_states,
@@ -228,17 +217,14 @@ class Bench:
                     finish=False,
                     substeps=fit.substeps,
                 )
-            attempt = screening.attempt
             worth = float("inf") if attempt.to_beat is None else min(attempt.to_beat, hopeless)
             return self._roughly_scored(attempt.support, fit, worth)
 
         rough = []
-        for trial in self.threads.side_by_side(further, screenings):
+        for trial in self.threads.side_by_side(further, begun):
             progress(trial.support)
             rough.append(trial)
-        errors = [trial.error_over_noise for trial in self.trials.values()] + [
-            trial.error_over_noise for trial in rough
-        ]
+        errors = (trial.error_over_noise for trial in (*self.trials.values(), *rough))
         far = _FAR * min(errors, default=float("inf"))
 
         def finished(trial: _RoughTrial) -> Trial:
@@ -246,8 +232,8 @@ class Bench:
 
         return list(self.threads.side_by_side(finished, rough))
 
-    def _screened(self, attempts: Sequence[Attempt]) -> list[_Screening]:
-        """Return the best fit of each attempt over its start values."""
+    def _begun(self, attempts: Sequence[Attempt]) -> list[tuple[Attempt, GreyBoxFit, FitResult]]:
+        """Return each attempt with its problem and, after the first evaluations, its best fit over its start values."""
         structures = [self.structure(attempt.support, attempt.release) for attempt in attempts]
         problems = [
             GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
@@ -276,7 +262,7 @@ class Bench:
         for (number, _), fit in zip(begun, self.threads.side_by_side(looked, begun), strict=True):
             if number not in best or fit.cost < best[number].cost:
                 best[number] = fit
-        return [_Screening(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
+        return [(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
 
     def _own_starts(self, attempt: Attempt, structure: Structure) -> list[dict[str, float]]:
         """Return the start values from the regression, and those from the best fit of a support contained in this one.

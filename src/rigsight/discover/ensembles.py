@@ -28,13 +28,14 @@ from rigsight.discover.regression import (
 )
 from rigsight.discover.selection import Selection, proposals
 from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import candidates, torque_along
+from rigsight.discover.terms.library import along, candidates
 from rigsight.discover.weak_form import Rows
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats
+from rigsight.rigs import evaluated
 from rigsight.simulate.printing.text import TermPrinter
 
 _FORCE = sp.Symbol("F", real=True)
@@ -206,26 +207,22 @@ def regressed_force(
     if any(effect.torque is None for effect in others):
         return None
     motion = rig.motion
-
-    def number(expression: sp.Expr) -> float:
-        return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
-
+    gain, bias, inertia, damping, stiffness = (
+        evaluated(part, values)
+        for part in (motion.drive_gain, motion.bias, motion.inertia, motion.damping, motion.stiffness)
+    )
     own_values = final.structure.values_of(law.effect, values)
     assert law.effect.post_yield_stiffness_ratio is not None
-    without_memory = own_values[law.effect.post_yield_stiffness_ratio] * number(motion.stiffness)
+    without_memory = own_values[law.effect.post_yield_stiffness_ratio] * stiffness
     # Springs act about the polished rest position, not about the one about which the motion was smoothed.
     shift = _rest_shift(bench, final)
     moved = [replace(own, x=own.x - shift) for own in motions]
     forces = []
     for own in moved:
-        force = (
-            number(motion.drive_gain) * own.u
-            + number(motion.bias)
-            - number(motion.inertia) * own.acceleration
-        )
-        force -= number(motion.damping) * own.v + without_memory * own.x
+        force = gain * own.u + bias - inertia * own.acceleration
+        force -= damping * own.v + without_memory * own.x
         for effect in others:
-            force -= torque_along(effect, final.structure.values_of(effect, values), own)
+            force -= along(effect.torque, final.structure.values_of(effect, values), own)
         forces.append(force)
     return force_equation(law, moved, rows, forces, own_values, rng)
 

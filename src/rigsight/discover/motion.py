@@ -15,11 +15,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import sympy as sp
 from scipy.linalg import expm, solve_discrete_are
 
 from rigsight.records.record import Floats, Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _DECADES = (-4.0, -2.0, 0.0, 2.0, 4.0, 6.0)
@@ -46,30 +45,14 @@ class Motion:
         return self.record.dt
 
 
-@dataclass(frozen=True)
-class Carrier:
+class _Carrier:
     """The linear model of the smoother: ``m x'' = g u - k (x - rest) - d x' + missing force``."""
 
-    inertia: float
-    damping: float
-    stiffness: float
-    gain: float
-    rest: float
-
-    @classmethod
-    def of(cls, rig: Rig, values: Mapping[str, float]) -> Carrier:
-        """Evaluate the coefficients of a driven rig's equation."""
-
-        def number(expression: sp.Expr) -> float:
-            return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
-
+    def __init__(self, rig: Rig, values: Mapping[str, float]) -> None:
         motion = rig.motion
-        return cls(
-            number(motion.inertia),
-            number(motion.damping),
-            number(motion.stiffness),
-            number(motion.drive_gain),
-            number(motion.rest),
+        self.inertia, self.damping, self.stiffness, self.gain, self.rest = (
+            evaluated(part, values)
+            for part in (motion.inertia, motion.damping, motion.stiffness, motion.drive_gain, motion.rest)
         )
 
 
@@ -79,7 +62,7 @@ def motion_of(rig: Rig, record: Record, values: Mapping[str, float], noise: floa
     if not rig.is_driven:
         x, v = smooth_motion(source, record.dt)
         return Motion(record, x, v, np.gradient(v, record.dt), x, response)
-    carrier = Carrier.of(rig, values)
+    carrier = _Carrier(rig, values)
     smoother = _Smoother(carrier, record.dt, record.hold == "zoh", noise**2)
     displacement = response - carrier.rest
     intensity = smoother.likeliest(displacement[:_LONGEST_TRIAL], source[:_LONGEST_TRIAL])
@@ -92,7 +75,7 @@ def motion_of(rig: Rig, record: Record, values: Mapping[str, float], noise: floa
 class _Smoother:
     """Steady-state filter and smoother of displacement, velocity, missing force and its rate."""
 
-    def __init__(self, carrier: Carrier, dt: float, held: bool, variance: float) -> None:
+    def __init__(self, carrier: _Carrier, dt: float, held: bool, variance: float) -> None:
         self._carrier, self._dt, self._variance = carrier, dt, variance
         m, d, k = carrier.inertia, carrier.damping, carrier.stiffness
         rates = np.array([[0, 1, 0, 0], [-k / m, -d / m, 1 / m, 0], [0, 0, 0, 1], [0, 0, 0, 0]], dtype=float)

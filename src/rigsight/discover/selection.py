@@ -71,7 +71,6 @@ class Selection:
 
     best: Trial  # the chosen support
     trials: tuple[Trial, ...]  # all polished supports, best first
-    criteria: tuple[float, ...]  # information criterion of each
     independent: float  # number of independent samples of the held-out errors
 
 
@@ -130,7 +129,7 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
     for trial in sorted(pool, key=cost):
         by_support.setdefault(trial.support, trial)
     ordered = list(by_support.values())
-    return Selection(best, tuple(ordered), tuple(cost(trial) for trial in ordered), independent)
+    return Selection(best, tuple(ordered), independent)
 
 
 def _better(held: Trial, released: Trial | None) -> Trial:

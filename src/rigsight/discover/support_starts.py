@@ -12,7 +12,7 @@ from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure, carried_over
 
 _SMALL = 1e-3
@@ -101,7 +101,7 @@ def _rig_values(rig: Rig, known: Mapping[str, float], base: Floats) -> tuple[dic
     if not rig.is_driven:
         values |= {motion.damping.name: base[0], motion.stiffness.name: base[1], motion.bias.name: base[2]}
         return values, 1.0
-    gain = float(motion.drive_gain.subs({s: known[s.name] for s in motion.drive_gain.free_symbols}))
+    gain = evaluated(motion.drive_gain, known)
     assert motion.inertia is not None
     inertia = gain / base[0] if base[0] * gain > 0.0 else known[motion.inertia.name]
     values[motion.inertia.name] = inertia

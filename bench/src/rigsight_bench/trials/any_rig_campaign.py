@@ -105,8 +105,8 @@ def _unit(
     record = _trial("sweep", waves).record()
     shown = simulate(structure, values, record)
     equations = equations_of(rig)
-    motion = simulated_motion(equations, shown, values)
-    moved = [float(np.ptp(z)) / 2.0 for z in motion.z[: equations.n_coordinates]]
+    states, _ = simulated_motion(equations, shown, values)
+    moved = [float(np.ptp(z)) / 2.0 for z in states[: equations.n_coordinates]]
     prescribed = [c.prescribed_by for c in rig.mechanism.prescribed]
     return max([*moved, small if name in prescribed else 0.0]) / small
 

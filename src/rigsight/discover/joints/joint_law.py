@@ -19,11 +19,10 @@ from rigsight.discover.regression import STRONG, alike, inclusion_probabilities,
 from rigsight.discover.terms.library import (
     Candidate,
     TermSignals,
-    deflection_along,
+    along,
     mixed,
     offered_effects,
     term_signals,
-    torque_along,
 )
 from rigsight.discover.terms.monomials import LINEAR
 from rigsight.effects import Effect, Place, placed
@@ -103,9 +102,9 @@ def force_along(term: LawTerm, found: JointMotion, index: int, parameters: Mappi
     """Return the resisting force of a term along the motion of its joint in a record, shape (n_samples,)."""
     motion = _motion(found, index)
     if term.effect.torque is not None:
-        return torque_along(term.effect, term.values, motion)
+        return along(term.effect.torque, term.values, motion)
     return evaluated(found.joint.stiffness, parameters) * (
-        deflection_along(term.effect, term.values, motion) - motion.x
+        along(term.effect.deflection, term.values, motion) - motion.x
     )
 
 
@@ -120,10 +119,7 @@ def regressed_laws(
     """Return, for each joint, the law with the fewest terms that the sensors do not distinguish from the most likely one."""
     records = found[0].records
     offered = [_offered(one, sizes) for one, sizes in zip(found, scales, strict=True)]
-    signals = [
-        [np.column_stack([part for s in own for part in s.parts[i]]) for i in range(len(records))]
-        for own in offered
-    ]
+    signals = [_columns(own, len(records)) for own in offered]
     regressions = sensor_regressions([one.followed for one in found], records, noise, signals)
     return [
         _best_law(of_joint, own, np.concatenate(course), one)
@@ -140,9 +136,7 @@ def inclusion(
 ) -> dict[str, float]:
     """Return inclusion probabilities: the shares of resampled data sets in which terms are selected, by name of the effect."""
     offered = _offered(found, scales)
-    signals = [
-        np.column_stack([part for s in offered for part in s.parts[i]]) for i in range(len(found.records))
-    ]
+    signals = _columns(offered, len(found.records))
     ((*regressions,),) = sensor_regressions([found.followed], found.records, noise, [signals])
     regression = min(regressions, key=lambda one: abs(one.decade - law.decade))
     library = _library(regression, offered, np.concatenate(signals), found)
@@ -161,6 +155,11 @@ def _offered(found: JointMotion, scales: Mapping[str, float]) -> list[TermSignal
     motions = [_motion(found, index) for index in range(len(found.records))]
     offered = [s for effect in joint_effects(rig, found.joint) for s in term_signals(effect, motions, scales)]
     return [s for s in offered if all(np.all(np.isfinite(part)) for own in s.parts for part in own)]
+
+
+def _columns(offered: Sequence[TermSignals], n_records: int) -> list[Floats]:
+    """Return the parts of all terms along each record, shape (n_samples, n_parts) each."""
+    return [np.column_stack([part for s in offered for part in s.parts[i]]) for i in range(n_records)]
 
 
 @dataclass(frozen=True, eq=False)

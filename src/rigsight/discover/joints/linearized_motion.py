@@ -15,6 +15,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.identify.rig_equations import FUNCTIONS, rows_of
 from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, parameter_vector, record_input
 from rigsight.simulate.equations.derivatives import slopes_of
@@ -31,7 +32,6 @@ _MOST_STEPS = 32
 """Largest number of steps per piece of the input; a state too stiff for it is assumed to follow without delay."""
 _LOOKED_AT = 25
 """Number of samples of a record at which the fastest rate is computed."""
-_FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +221,7 @@ def _in_parts(
     begun = elimination.begun(structure.steps)
     values = straight_line([*elimination.entries, *elimination.loads, *others], begun)
     slopes = slopes_of(straight_line([*elimination.left, *others], begun), directions)
-    modules = [_FUNCTIONS, "numpy"]
+    modules = [FUNCTIONS, "numpy"]
     return values.function(arguments, modules), slopes.function(
         [*arguments, *elimination.accelerations], modules
     )
@@ -231,16 +231,12 @@ def _compiled(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) ->
     # Names of states contain points and parentheses.
     plain = {symbol: sp.Symbol(f"a{i}", real=True) for i, symbol in enumerate(arguments)}
     written = [sp.sympify(expression).xreplace(plain) for expression in expressions]
-    return sp.lambdify(list(plain.values()), written, [_FUNCTIONS, "numpy"], cse=True)
+    return sp.lambdify(list(plain.values()), written, [FUNCTIONS, "numpy"], cse=True)
 
 
 def _evaluated(function: Any, arguments: Sequence[Any], count: int) -> Floats:
     with np.errstate(all="ignore"):
-        values = function(*arguments)
-    found = np.empty((len(values), count))
-    for row, value in zip(found, values, strict=True):
-        row[:] = value
-    return found
+        return rows_of(function(*arguments), count)
 
 
 def _input_at(held: HeldInput, pieces: NDArray[np.int_], tau: Floats) -> Floats:

@@ -119,24 +119,12 @@ def candidates(
 
     def at_best_values(effect: Effect) -> Candidate | None:
         if is_loop(effect):
-            return _loop(effect, motions, rows, projected, scales, driven, helpers)
+            loop = best_loop(effect, motions, rows, projected, scales, driven, helpers)
+            return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
         return _best_inner(effect, motions, rows, projected, scales, sign)
 
     others = [effect for effect in effects if effect not in plain]
     return found + [best for best in helpers.side_by_side(at_best_values, others) if best is not None]
-
-
-def _loop(
-    effect: Effect,
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    driven: bool,
-    threads: IdleThreads,
-) -> Candidate | None:
-    loop = best_loop(effect, motions, rows, projected, scales, driven, threads)
-    return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
 
 
 def _best_inner(
@@ -265,34 +253,23 @@ def _signals(
     """Return the parts of an effect as resisting forces per unit of their coefficient."""
     if effect.delay is not None:
         time = motion.dt * np.arange(motion.u.size)
-        return [motion.u - np.interp(time - _evaluated(effect.delay, inner, motion), time, motion.u)]
+        return [motion.u - np.interp(time - along(effect.delay, inner, motion), time, motion.u)]
     if effect.torque is not None:
-        return [_evaluated(_slope(effect, p), inner, motion) for p in linear]
+        return [along(_slope(effect, p), inner, motion) for p in linear]
     if effect.deflection is not None:
-        return [_evaluated(effect.deflection, inner, motion) - motion.x]
+        return [along(effect.deflection, inner, motion) - motion.x]
     assert effect.drive is not None
     defaults = {p.name: p.default for p in effect.parameters if p.default is not None}
     states = states_along(effect, {**defaults, **inner}, motion) if effect.states else {}
-    return [motion.u - _evaluated(effect.drive, {**inner, **states}, motion)]
+    return [motion.u - along(effect.drive, {**inner, **states}, motion)]
 
 
-def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> Floats:
-    """Return the torque of a static effect along a measured motion, shape (n_samples,)."""
-    assert effect.torque is not None
-    return _evaluated(effect.torque, values, motion)
-
-
-def deflection_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> Floats:
-    """Return the deflection of the spring along a measured motion with a static effect (such as play), shape (n_samples,)."""
-    assert effect.deflection is not None
-    return _evaluated(effect.deflection, values, motion)
-
-
-def _evaluated(expression: sp.Expr, inner: Mapping[str, float | Floats], motion: Motion) -> Floats:
-    function = _compiled(expression, tuple(inner))
-    return np.broadcast_to(function(motion.x, motion.v, motion.u, *inner.values()), motion.x.shape).astype(
-        np.float64
-    )
+def along(expression: sp.Expr | None, values: Mapping[str, float | Floats], motion: Motion) -> Floats:
+    """Return a static part of an effect (torque, deflection) along a measured motion, shape (n_samples,)."""
+    assert expression is not None
+    function = _compiled(expression, tuple(values))
+    shown = function(motion.x, motion.v, motion.u, *values.values())
+    return np.broadcast_to(shown, motion.x.shape).astype(np.float64)
 
 
 @lru_cache(maxsize=256)

@@ -219,73 +219,65 @@ class GreyBoxFit:
         return fit_key([*self._problem, values, list(coordinates.free)], theta, settings)
 
     def _failed(self, problem: Problem, theta: Floats, message: str) -> FitResult:
-        coordinates = problem.coordinates
-        p = coordinates.to_parameters(theta[: len(coordinates.free)])
-        n = len(coordinates.free)
-        return FitResult(
-            structure=self.structure,
-            success=False,
-            message=message,
-            values=self._values(p),
-            standard_errors=dict.fromkeys(coordinates.free, float("inf")),
-            initial_states=tuple(problem.states(theta)),
-            cost=float("inf"),
-            n_samples=self.n_samples,
-            n_evaluations=1,
-            free=coordinates.free,
-            covariance=np.full((n, n), np.inf),
-            residuals=(),
-            substeps=(Substeps(MOST_SUBSTEPS),) * len(self.data.records),
-            offset_names=self.data.structure.offsets,
-        )
+        n = problem.n_free
+        problem.n_evaluations, problem.substeps = 1, [Substeps(MOST_SUBSTEPS)] * len(self.data.records)
+        return self._found(problem, theta, (False, message), float("inf"), np.full((n, n), np.inf), ())
 
     def _result(
         self, problem: Problem, theta: Floats, success: bool, message: str, finish: bool
     ) -> FitResult:
-        coordinates, n_evaluations = problem.coordinates, problem.n_evaluations
-        n_free = len(coordinates.free)
-        p = coordinates.to_parameters(theta[:n_free])
-        states = problem.states(theta)
-        cost = problem.at(theta).cost
-        residuals: tuple[Floats, ...] = ()
-        covariance = np.full((n_free, n_free), np.nan)
-        if finish:
-            try:
-                residuals = tuple(self.data.of_each_record(lambda i: self._remainder(i, p, states[i])))
-            except SimulationError as error:
-                return self._failed(problem, theta, str(error))
-            cost = float(
-                sum(
-                    np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self.data.records, strict=True)
-                )
-            )
-        if finish and n_free:
-            outputs = [int(np.count_nonzero(d.weights)) for d in self.data.records]
+        outcome, n_free = (success, message), problem.n_free
+        own, states = theta[:n_free], problem.states(theta)
+        evaluations, cost = problem.n_evaluations, problem.at(theta).cost
+        # The evaluation at the end is no part of the search.
+        problem.n_evaluations = evaluations
+        if not finish:
+            return self._found(problem, theta, outcome, cost, np.full((n_free, n_free), np.nan), ())
+        p = problem.coordinates.to_parameters(own)
+        try:
+            residuals = tuple(self.data.of_each_record(lambda i: self._remainder(i, p, states[i])))
+        except SimulationError as error:
+            return self._failed(problem, theta, str(error))
+        weights = [record.weights for record in self.data.records]
+        cost = float(sum(np.nansum((r * w) ** 2) for r, w in zip(residuals, weights, strict=True)))
+        covariance = np.zeros((0, 0))
+        if n_free:
+            sensitivities, outputs = problem.sensitivities(theta), list(map(np.count_nonzero, weights))
             covariance = colored_covariance(
-                problem.sensitivities(theta), n_free, outputs, problem.derivative_error, for_intervals=True
+                sensitivities, n_free, outputs, problem.derivative_error, for_intervals=True
             )
-            covariance = propagated_covariance(covariance, coordinates.jacobian(theta[:n_free]))
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if n_free else np.zeros(0)
+            covariance = propagated_covariance(covariance, problem.coordinates.jacobian(own))
+        return self._found(problem, theta, outcome, cost, covariance, residuals)
+
+    def _found(
+        self,
+        problem: Problem,
+        theta: Floats,
+        outcome: tuple[bool, str],
+        cost: float,
+        covariance: Floats,
+        residuals: tuple[Floats, ...],
+    ) -> FitResult:
+        free = problem.coordinates.free
+        p = problem.coordinates.to_parameters(theta[: problem.n_free])
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return FitResult(
             structure=self.structure,
-            success=success,
-            message=message,
-            values=self._values(p),
-            standard_errors=dict(zip(coordinates.free, map(float, errors), strict=True)),
-            initial_states=tuple(states),
+            success=outcome[0],
+            message=outcome[1],
+            # The bandwidths of an observer come after all other parameters.
+            values=dict(zip(self.structure.names, map(float, p), strict=False)),
+            standard_errors=dict(zip(free, map(float, errors), strict=True)),
+            initial_states=tuple(problem.states(theta)),
             cost=cost,
             n_samples=self.n_samples,
-            n_evaluations=n_evaluations,
-            free=coordinates.free,
+            n_evaluations=problem.n_evaluations,
+            free=free,
             covariance=covariance,
             residuals=residuals,
             substeps=tuple(problem.substeps),
             offset_names=self.data.structure.offsets,
         )
-
-    def _values(self, p: Floats) -> dict[str, float]:
-        # The bandwidths of an observer come after all other parameters.
-        return dict(zip(self.structure.names, map(float, p), strict=False))
 
     def _remainder(self, index: int, p: Floats, state: Floats) -> Floats:
         """Return measured minus accurately simulated outputs of a record."""

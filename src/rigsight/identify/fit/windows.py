@@ -190,6 +190,12 @@ def cut(records: Sequence[Record], length: float | None) -> tuple[Record, ...]:
     return tuple(windows)
 
 
+def pieces(record: Record, count: int) -> list[Record]:
+    """Return a record in about equally long pieces; fewer than `count` where it has fewer samples."""
+    edges = np.unique(np.linspace(0, record.n_samples, count + 1).astype(int))
+    return [record.slice(int(start), int(stop)) for start, stop in itertools.pairwise(edges)]
+
+
 def _at(record: Record, edges: Sequence[int]) -> list[Record]:
     return [
         replace(record.slice(start, stop), name=f"{record.name} window {i}", window_of=record.origin)

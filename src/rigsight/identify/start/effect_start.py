@@ -32,14 +32,10 @@ _LOWEST_SHARE = 0.01
 
 @dataclass(frozen=True)
 class _Motion:
-    """Measured signals of a record about the rest position."""
+    """Measured signals of a record about the rest position, in the order of `_SIGNALS`."""
 
     spectra: Spectra
-    x: Floats
-    v: Floats
-    u: Floats
-    position: Floats
-    load: Floats
+    signals: tuple[Floats, ...]
 
 
 class EffectRegression:
@@ -63,7 +59,7 @@ class EffectRegression:
             if spectra.omega.size == 0:
                 continue  # the input is at rest in this stretch
             load = self._gain * record[source] + stiffness * (x - rest)
-            self._motions.append(_Motion(spectra, x - rest, v, record[source], x, load))
+            self._motions.append(_Motion(spectra, (x - rest, v, record[source], x, load)))
         inertia, damping = self._number(rig.motion.inertia), self._number(rig.motion.damping)
         self._denominators = [
             stiffness - inertia * m.spectra.omega**2 + 1j * damping * m.spectra.omega for m in self._motions
@@ -157,7 +153,6 @@ def _function(expression: sp.Expr, inner: Mapping[str, float]):  # type: ignore[
     compiled = sp.lambdify(_SIGNALS, plain, "numpy", cse=True)
 
     def evaluate(motion: _Motion) -> Floats:
-        signals = (motion.x, motion.v, motion.u, motion.position, motion.load)
-        return np.broadcast_to(compiled(*signals), motion.x.shape).astype(np.float64)
+        return np.broadcast_to(compiled(*motion.signals), motion.signals[0].shape).astype(np.float64)
 
     return evaluate

@@ -6,13 +6,12 @@ For any rig they follow from its motion in the records according to its equation
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.first_states import rig_state
+from rigsight.identify.fit.windows import pieces
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.typical_size import size_about_zero, size_of_signal, typical_size
 from rigsight.records.plausibility import is_constant
@@ -31,31 +30,24 @@ _BEYOND = 3.0
 """Largest ratio of simulated to measured motion; a rig with estimated parameters at its resonance stays below."""
 
 
-@dataclass(frozen=True)
-class RigMotion:
-    """States (n_states, n_samples) and inputs with their derivatives (3 n_inputs, n_samples) in a record."""
-
-    z: Floats
-    u: Floats
-
-
-def simulated_motion(equations: RigEquations, record: Record, values: Mapping[str, float]) -> RigMotion:
-    """Return the motion of a rig in a record according to its equations."""
+def simulated_motion(
+    equations: RigEquations, record: Record, values: Mapping[str, float]
+) -> tuple[Floats, Floats]:
+    """Return states and inputs with their derivatives in a record according to a rig's equations, by rows."""
     u = equations.inputs_of(record)[1]
     found: Floats | None = None
     for count in _PIECES:
-        edges = np.unique(np.linspace(0, record.n_samples, count + 1).astype(int))
-        pieces = [record.slice(int(a), int(b)) for a, b in pairwise(edges)]
         try:
-            found = np.concatenate([_states(equations, piece, values) for piece in pieces], axis=1)
+            own = [_states(equations, piece, values) for piece in pieces(record, count)]
         except SimulationError:
             continue
+        found = np.concatenate(own, axis=1)
         if _within_reach(equations, record, values, found, u):
             break
     if found is None:
         # Used if the motion cannot be simulated.
         found = np.repeat(rig_state(equations, record, values)[:, None], record.n_samples, axis=1)
-    return RigMotion(found, u)
+    return found, u
 
 
 def _states(equations: RigEquations, record: Record, values: Mapping[str, float]) -> Floats:
@@ -135,8 +127,8 @@ def _in_record(
     equations: RigEquations, record: Record, values: Mapping[str, float]
 ) -> tuple[dict[str, Floats], Floats]:
     """Return motions and forces at each place in a record, and the size at which each parameter matters."""
-    motion, p = simulated_motion(equations, record, values), equations.parameters(values, record)
-    z, u, n = motion.z, motion.u, equations.n_coordinates
+    z, u = simulated_motion(equations, record, values)
+    p, n = equations.parameters(values, record), equations.n_coordinates
     rates = equations.rates(z, u, p)
     accelerations = rates[n : 2 * n]
     found = equations.at_places(z, u, p)
