@@ -118,7 +118,7 @@ def calibrate_to_responses(
     amplitudes = sorted(
         {float(np.max(r.measured.magnitude)) * r.amplitude for r in responses if _of_motion(structure, r)}
     )
-    return Calibration(fit, derived_quantities(fit, amplitudes, scales, rng), minima, ends.n_evaluations)
+    return Calibration(fit, derived_quantities(fit, amplitudes, scales, rng), minima)
 
 
 def _of_motion(structure: Structure, response: SweptResponse) -> bool:

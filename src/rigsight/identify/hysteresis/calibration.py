@@ -19,6 +19,7 @@ from rigsight.identify.hysteresis.parameters import (
     declared_starts,
     free_parameters,
     neighbors,
+    numbers_of_motion,
     special_structure,
     start_values,
 )
@@ -51,7 +52,6 @@ class Calibration:
     # Local minima reached from the ends of the search and from the effects' own starts, best first, before special values were
     # released. Several of similar cost show that the data allow several sets.
     minima: tuple[Minimum, ...]
-    n_simulated: int  # number of parameter sets that the search simulated
 
     @property
     def values(self) -> dict[str, float]:
@@ -154,7 +154,7 @@ def calibrate_to_records(
     minima = tuple(Minimum(f.values | dict(f.structure.fixed), f.cost / f.n_samples) for f in rough)
     amplitudes = record_amplitudes(structure, records, fit.values)
     derived = derived_quantities(fit, amplitudes, scales, rng)
-    return Calibration(fit, derived, minima, ends.n_evaluations)
+    return Calibration(fit, derived, minima)
 
 
 def _refined(
@@ -211,15 +211,7 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: Floats) -> Floats
 
 def _shifts(structure: Structure) -> set[str]:
     """Return parameters that affect only means, or outputs other than the first; the search does not need them."""
-    motion = structure.rig.motion
-    own = {p.name for p in structure.rig.parameters}
-    moved = {
-        s.name
-        for e in (motion.stiffness, motion.damping, motion.inertia)
-        if e is not None
-        for s in e.free_symbols
-    }
-    return own - moved
+    return {p.name for p in structure.rig.parameters} - numbers_of_motion(structure.rig)
 
 
 def _size(records: Sequence[Record], name: str) -> float:

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-import sympy as sp
-
-from rigsight.effects import symbols as canonical
-from rigsight.effects.effect import Effect, Start
 from rigsight.errors import InputError, check_option
-from rigsight.rigs import evaluated
+from rigsight.identify.start.declared_starts import declared_values, in_structure, moved_starts
+from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.units import characteristic_value
+
+
+def numbers_of_motion(rig: Rig) -> set[str]:
+    """Return the parameters and constants in stiffness, damping and inertia of a rig with one motion."""
+    parts = (rig.motion.stiffness, rig.motion.damping, rig.motion.inertia)
+    return {symbol.name for part in parts if part is not None for symbol in part.free_symbols}
 
 
 def free_parameters(structure: Structure, outputs: Collection[str]) -> tuple[str, ...]:
     """Return the parameters that records of these outputs determine, without constants and those of unmeasured outputs."""
     rig = structure.rig
     motion = rig.motion
-    moved = {
-        s.name
-        for e in (motion.stiffness, motion.damping, motion.inertia)
-        if e is not None
-        for s in e.free_symbols
-    }
+    moved = numbers_of_motion(rig)
     rest = {symbol.name for symbol in motion.rest.free_symbols}
     bias = {symbol.name for symbol in motion.bias.free_symbols}
     # With a spring a constant force is equivalent to a shifted rest position; a bench has no rest position.
@@ -90,15 +88,14 @@ def declared_starts(
         for p in effect.parameters
         if p.fitted and p.starts and p.default is None
     }
-    sizes = {
-        canonical.drive_size: scales["drive"],
-        canonical.input_size: scales["input"],
-        canonical.x_size: scales["x"],
-        canonical.v_size: scales["x"] / scales["time"],
-        canonical.time_size: scales["time"],
-    }
     return [
-        {**begin, **own_sizes, **_moved(structure, effect, start, begin, sizes)}
+        {
+            **begin,
+            **own_sizes,
+            **in_structure(
+                structure, effect, declared_values(structure.rig, effect, start.values, begin, scales)
+            ),
+        }
         for effect in structure.effects
         for start in effect.starts
         if start.parent is None
@@ -108,33 +105,7 @@ def declared_starts(
 def neighbors(structure: Structure, values: Mapping[str, float]) -> list[dict[str, float]]:
     """Return the start values that the effects declare for another fit: a fit may have ended in a nearby local minimum."""
     return [
-        {**values, **_moved(structure, effect, start, structure.values_of(effect, values), {})}
+        {**values, **moved}
         for effect in structure.effects
-        for start in effect.starts
-        if start.parent == effect.name
+        for moved in moved_starts(structure, effect, values)
     ]
-
-
-def _moved(
-    structure: Structure,
-    effect: Effect,
-    start: Start,
-    values: Mapping[str, float],
-    sizes: Mapping[sp.Symbol, float],
-) -> dict[str, float]:
-    """Return the parameters that a declared start of an effect changes, by their names in the structure."""
-    motion = structure.rig.motion
-    known = dict(sizes)
-    # If the stiffness of the rig depends on several parameters, only the effect's own ones are changed.
-    for symbol, part in ((canonical.k, motion.stiffness), (canonical.m, motion.inertia)):
-        if sizes and part is not None:
-            known[symbol] = evaluated(part, values)
-    moved = {}
-    for name, formula in start.values.items():
-        own = {symbol: values[symbol.name] for symbol in formula.free_symbols if symbol not in known}
-        value = float(formula.subs({**known, **own}))
-        if name != str(canonical.k):
-            moved[structure.parameter_name(effect, name)] = value
-        elif isinstance(motion.stiffness, sp.Symbol):
-            moved[motion.stiffness.name] = value
-    return {name: value for name, value in moved.items() if name in structure.names}

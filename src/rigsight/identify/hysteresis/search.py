@@ -68,7 +68,6 @@ class Found:
 
     coordinates: Floats  # shape (n_ends, n_free)
     costs: Floats  # shape (n_ends,)
-    n_evaluations: int  # number of simulated parameter sets
 
     @property
     def usable(self) -> Floats:
@@ -132,7 +131,7 @@ def search(
     # The population ends in one basin, which may be wrong because the simulation is coarse; other basins were visited before.
     places, costs = np.concatenate(seen), np.concatenate(paid)
     kept = _different(places, costs, n_ends)
-    return Found(box.coordinates(places[kept]), costs[kept], costs.size)
+    return Found(box.coordinates(places[kept]), costs[kept])
 
 
 def _sobol(n_sets: int, n_free: int, rng: np.random.Generator) -> Floats:
