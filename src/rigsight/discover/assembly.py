@@ -260,10 +260,7 @@ def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, 
 
 
 def discovery_of(
-    data: RegressionData,
-    final: FitResult,
-    records: tuple[Sequence[Record], Sequence[Record]],
-    **further: Any,
+    data: RegressionData, final: FitResult, records: tuple[Sequence[Record], Sequence[Record]], **further: Any
 ) -> Discovery:
     """Return a discovery with all that its last fit and the fitted and the held-out records say, and further fields."""
     rig, structure = data.rig, final.structure

@@ -57,9 +57,8 @@ class Attempt:
     release: Release = frozenset()  # parameters that are not held at their special values
     start: Mapping[str, float] | None = None  # start values; None for those of the regression
     left_out: Support = frozenset()  # rig parameters that are held at their start values
-    # Cost of the fit of the same terms, if they have been scored already; infinite if that equation has other
-    # parameters. A new fit whose cost is not lower, or much higher than the best, is not scored. None if they
-    # have not been scored.
+    # Cost of the fit of the same terms, if they have been scored already; infinite if that equation has other parameters. A
+    # new fit whose cost is not lower, or much higher than the best, is not scored. None if they have not been scored.
     to_beat: float | None = None
 
     @property
@@ -224,7 +223,8 @@ class Bench:
         for trial in self.threads.side_by_side(further, begun):
             progress(trial.support)
             rough.append(trial)
-        errors = (trial.error_over_noise for trial in (*self.trials.values(), *rough))
+        errors = [trial.error_over_noise for trial in self.trials.values()]
+        errors += [trial.error_over_noise for trial in rough]
         far = _FAR * min(errors, default=float("inf"))
 
         def finished(trial: _RoughTrial) -> Trial:

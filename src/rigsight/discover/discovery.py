@@ -12,7 +12,6 @@ import numpy as np
 from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.ensembles import inclusion, regressed_force
-from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_discovery import discover_at_joints
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.regression import (
@@ -23,6 +22,7 @@ from rigsight.discover.regression import (
     own_regression,
     own_terms,
     rows_of,
+    split,
 )
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import Selection, criterion, select

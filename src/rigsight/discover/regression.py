@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -39,6 +39,8 @@ _CLEARLY = 1.1
 STRONG = 10.0
 """Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
 _TINY = 1e-10
+_LEAST_SAMPLES = 200
+_HELD_BACK = 0.3
 _RIDGE = 1e-12
 
 
@@ -89,7 +91,7 @@ def sparse_path(projected: Projected, columns: Floats) -> list[tuple[int, ...]]:
     The supports of FROLS, which adds terms instead, are included; the two differ if columns are similar.
     """
     matrix, target = _compressed(projected.rest_of(columns), projected.rest)
-    paths = [_shrinking(matrix, target), _growing(matrix, target)]
+    paths = [_path(matrix, target, shrinking) for shrinking in (True, False)]
     supports = {support for path in paths for support in path if support}
     return sorted(supports, key=lambda s: (len(s), s))
 
@@ -106,7 +108,7 @@ def inclusion_probabilities(projected: Projected, columns: Floats, rng: np.rando
     for _ in range(N_ENSEMBLE):
         rows = np.concatenate([blocks[i] for i in rng.integers(len(blocks), size=len(blocks))])
         own_matrix, own_target = _compressed(matrix[rows], target[rows])
-        supports = [(), *_shrinking(own_matrix, own_target)]
+        supports = [(), *_path(own_matrix, own_target, shrinking=True)]
         remainder = np.array([_remainder(own_matrix, own_target, support) for support in supports])
         costs = [
             information_criterion(square / rows.size, len(support), projected.independent)
@@ -144,28 +146,19 @@ def _compressed(matrix: Floats, target: Floats) -> tuple[Floats, Floats]:
     return factor[:, :-1], factor[:, -1]
 
 
-def _shrinking(matrix: Floats, target: Floats) -> list[tuple[int, ...]]:
+def _path(matrix: Floats, target: Floats, shrinking: bool) -> list[tuple[int, ...]]:
+    """Return the supports that remain when SSR drops term after term, or those that FROLS reaches by adding terms."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        from pysindy import SSR
+        from pysindy import FROLS, SSR
         from sklearn import config_context
 
-        optimizer = SSR(
-            alpha=_RIDGE, max_iter=max(1, matrix.shape[1]), criteria="model_residual", unbias=False
+        n = matrix.shape[1]
+        optimizer = (
+            SSR(alpha=_RIDGE, max_iter=max(1, n), criteria="model_residual", unbias=False)
+            if shrinking
+            else FROLS(alpha=_RIDGE, max_iter=min(6, n), unbias=False)
         )
-        # Each of its hundreds of regressions of a few rows would be examined for longer than it takes.
-        with config_context(skip_parameter_validation=True, assume_finite=True):
-            optimizer.fit(matrix, target)
-    return _supports(optimizer.history_)
-
-
-def _growing(matrix: Floats, target: Floats) -> list[tuple[int, ...]]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from pysindy import FROLS
-        from sklearn import config_context
-
-        optimizer = FROLS(alpha=_RIDGE, max_iter=min(6, matrix.shape[1]), unbias=False)
         # Each of its hundreds of regressions of a few rows would be examined for longer than it takes.
         with config_context(skip_parameter_validation=True, assume_finite=True):
             optimizer.fit(matrix, target)
@@ -206,7 +199,7 @@ class RegressionData:
     @property
     def has_stiffness(self) -> bool:
         """False for an axis that is given without a spring."""
-        return has_stiffness(self.campaign)
+        return self.campaign.absent_spring is None
 
     @property
     def held(self) -> dict[str, float]:
@@ -215,9 +208,38 @@ class RegressionData:
         return {} if factor is None else {factor.held: factor.value}
 
 
-def has_stiffness(campaign: Campaign) -> bool:
-    """Return False for one motion that is given without a spring."""
-    return campaign.absent_spring is None
+def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
+    """Return the records to fit, those to score, and a sentence on the choice of the latter (empty for validation records)."""
+    estimation = tuple(r for r in data.records if r.role == "estimation")
+    validation = tuple(r for r in data.records if r.role == "validation")
+    if not estimation:
+        raise InputError('A discovery needs at least one record with role = "estimation".')
+    for record in estimation:
+        if record.n_samples < _LEAST_SAMPLES:
+            raise InputError(
+                f"Record '{record.name}' has {record.n_samples} samples; a discovery needs at least {_LEAST_SAMPLES} in each."
+            )
+    if validation:
+        return estimation, validation, ""
+    if len(estimation) > 1:
+        names = [signal.name for signal in data.rig.inputs or data.rig.outputs]
+
+        def strength(record: Record) -> float:
+            return float(np.sqrt(sum(np.var(record[name]) for name in names if name in record)))
+
+        middle = sorted(estimation, key=strength)[len(estimation) // 2]
+        rest = tuple(record for record in estimation if record is not middle)
+        return (
+            rest,
+            (middle,),
+            f"There is no validation record; '{middle.name}' was set aside to select the terms.",
+        )
+    cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
+    return (
+        (estimation[0].slice(0, cut),),
+        (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
+        "There is a single record; its last part was set aside to select the terms, so no other amplitude is tested.",
+    )
 
 
 def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> Rows:

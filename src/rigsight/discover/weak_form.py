@@ -28,8 +28,7 @@ _LEAST_WIDTH = 11
 class Windows:
     """Test functions for one sample time."""
 
-    # Test function and its first two derivatives with respect to time, integration weights included, shape
-    # (3, width).
+    # Test function and its first two derivatives with respect to time, integration weights included, shape (3, width).
     weights: Floats
     step: int  # samples from row to row
 

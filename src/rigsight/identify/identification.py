@@ -43,8 +43,7 @@ class RecordIdentification:
     # Angular frequency at which the measured magnitude is largest [rad/s]; None if it has no peak.
     resonance: float | None = None
     warnings: tuple[str, ...] = ()  # warnings for the user, a sentence each
-    # Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it
-    # failed.
+    # Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it failed.
     own: PhysicalEstimates | None = None
     moved: str = ""  # the output to which the amplitude of a free motion refers
 

@@ -38,8 +38,7 @@ class Information:
     # Their bounds, shape (n,).
     lower: Floats
     upper: Floats
-    # The values after one step to the minimum without bounds, shape (n,); at a minimum inside the bounds
-    # `values`.
+    # The values after one step to the minimum without bounds, shape (n,); at a minimum inside the bounds `values`.
     asked: Floats
     root: Floats  # ``root.T @ root`` is the information matrix in units of the noise, shape (m, n)
     # Length of the change of all outputs, in units of the noise, when parameters take other values.

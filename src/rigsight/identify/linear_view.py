@@ -53,11 +53,9 @@ class LinearView:
     modes: tuple[Mode, ...]  # its poles by their size, with standard errors
     # Frequency responses of these records together; None if no input moves.
     measured: ResponsesOfInputs | None
-    # The linearized response at the measured frequencies with its standard error, shape (n,) each, by
-    # (source, response).
+    # The linearized response at the measured frequencies with its standard error, shape (n,) each, by (source, response).
     model: Mapping[tuple[str, str], tuple[NDArray[np.complex128], Floats]]
-    # Contribution of a held input to the measured response, shape (n,), by (source, response); none for a
-    # prescribed motion.
+    # Contribution of a held input to the measured response, shape (n,), by (source, response); none for a prescribed motion.
     images: Mapping[tuple[str, str], NDArray[np.complex128]]
 
     def misfit(self, source: str, response: str) -> float:

@@ -28,8 +28,7 @@ class FittedModel:
 
     effects: tuple[Effect, ...]  # the effects added
     fit: FitResult  # the fit to the estimation records
-    # The same numbers on the scoring records, only initial states fitted; without residuals where they cannot
-    # be simulated.
+    # The same numbers on the scoring records, only initial states fitted; without residuals where they cannot be simulated.
     held_out: FitResult
     error_over_noise: float  # RMS of the residuals in units of the noise floor
 
@@ -70,11 +69,9 @@ class FitContext:
     look: tuple[Record, ...]
     scales: Mapping[str, float]  # size of each base quantity
     noise: Mapping[str, float]  # noise floor of each output
-    # Parameters of the rig that are held in all fits (such as those of an absent spring or of outputs that
-    # were not measured).
+    # Parameters of the rig that are held in all fits (such as those of an absent spring or of outputs that were not measured).
     held: frozenset[str]
-    # Values before any fit, from the given simulation or a regression: fits without the effect may distort
-    # them too much.
+    # Values before any fit, from the given simulation or a regression: fits without the effect may distort them too much.
     start: Mapping[str, float] = field(default_factory=dict)
     given: Mapping[str, float] = field(default_factory=dict)  # parameters of the rig in the given simulation
     # Effects already in the given simulation; every candidate is added to them.

@@ -50,8 +50,7 @@ class Cases:
     start: Floats  # covariance of the first state, shape (n_cases, n_states, n_states)
     # Covariance that an intensity of one adds from sample to sample, shape (n_cases, n_states, n_states).
     walk: Floats
-    # Directions in which the state may jump after some samples, shape (n_samples - 1, n_cases, n_states,
-    # n_directions).
+    # Directions in which the state may jump after some samples, shape (n_samples - 1, n_cases, n_states, n_directions).
     jump: Floats
     jumps: NDArray[np.bool_]  # true for the samples after which it may, shape (n_samples, n_cases)
 

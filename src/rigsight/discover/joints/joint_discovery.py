@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigsight.discover.assembly import coefficients_of, discovery_of, still_missing
-from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_force import JointForce, missing_forces, not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm
-from rigsight.discover.regression import STRONG, RegressionData, information_criterion
+from rigsight.discover.regression import STRONG, RegressionData, information_criterion, split
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import independent_samples
 from rigsight.effects import effect_named, placed

@@ -42,14 +42,12 @@ class LinearizedMotion:
     transition: Floats  # derivative of the next state by this one, shape (n_samples - 1, n_states, n_states)
     # Derivative of the next state by parameters, shape (n_samples - 1, n_states, n_parameters).
     by_parameter: Floats
-    # State simulated one sample ahead from a reference state, minus the next reference state, shape
-    # (n_samples - 1, n_states).
+    # State simulated one sample ahead from a reference state, minus the next reference state, shape (n_samples - 1, n_states).
     defect: Floats
     seen: Floats  # derivative of the readings by the state, shape (n_samples, n_outputs, n_states)
     # Derivative of the readings by parameters, shape (n_samples, n_outputs, n_parameters).
     seen_by_parameter: Floats
-    # Measured minus the readings of the reference, shape (n_samples, n_outputs); NaN where nothing was
-    # measured.
+    # Measured minus the readings of the reference, shape (n_samples, n_outputs); NaN where nothing was measured.
     residual: Floats
     dt: float  # sample time [s]
 

@@ -211,8 +211,7 @@ class TermSignals:
 
     effect: Effect
     inner: Mapping[str, float]  # values of the nonlinear parameters inside the term
-    # Linear parameters, one for each part; empty if the term has a single part without a coefficient of its
-    # own.
+    # Linear parameters, one for each part; empty if the term has a single part without a coefficient of its own.
     names: tuple[str, ...]
     # For each record, the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
     parts: tuple[tuple[Floats, ...], ...]

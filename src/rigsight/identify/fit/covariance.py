@@ -49,26 +49,23 @@ def colored_covariance(
     (1987) 703; F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110, for the degrees of freedom of a sum.
     """
     own_sizes = [derivative.shape[1] - n_common for _, derivative in sensitivities]
-    n_total = n_common + sum(own_sizes)
-    bread = np.zeros((n_total, n_total))
-    filling = np.zeros((n_total, n_total))
-    first = n_common
+    firsts = n_common + np.cumsum([0, *own_sizes])
+    bread = np.zeros((int(firsts[-1]), int(firsts[-1])))
+    filling = np.zeros_like(bread)
     stacked = [1] * len(sensitivities) if n_outputs is None else n_outputs
-    for (residual, derivative), n_own, count in zip(sensitivities, own_sizes, stacked, strict=True):
-        columns = np.concatenate([np.arange(n_common), first + np.arange(n_own)]).astype(np.intp)
-        first += n_own
+    places = [
+        np.concatenate([np.arange(n_common), first + np.arange(size)]).astype(np.intp)
+        for first, size in zip(firsts, own_sizes, strict=False)
+    ]
+    for (residual, derivative), columns, count in zip(sensitivities, places, stacked, strict=True):
         bread[np.ix_(columns, columns)] += derivative.T @ derivative
         filling[np.ix_(columns, columns)] += spectral_product(residual, derivative, count)
     covariance = sandwich_covariance(bread, filling, derivative_error)[:n_common, :n_common]
     if for_intervals and n_common:
         inverse = sandwich_covariance(bread, bread, derivative_error)[:, :n_common]
         inverse = np.where(np.isfinite(inverse), inverse, 0.0)
-        places = [
-            np.concatenate([np.arange(n_common), np.arange(size) + n_common + sum(own_sizes[:index])])
-            for index, size in enumerate(own_sizes)
-        ]
         reads = [
-            (residual, derivative @ inverse[place.astype(np.intp)], count)
+            (residual, derivative @ inverse[place], count)
             for (residual, derivative), place, count in zip(sensitivities, places, stacked, strict=True)
         ]
         widened = np.sqrt(_interval_factors(reads))

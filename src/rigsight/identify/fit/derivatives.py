@@ -74,8 +74,7 @@ def derivatives(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> Der
 class OwnDerivatives:
     """Estimate from one record alone, near the common values."""
 
-    # Derivatives at the record's own values, with residuals extrapolated linearly from there to the common
-    # values.
+    # Derivatives at the record's own values, with residuals extrapolated linearly from there to the common values.
     derivatives: RecordDerivatives
     fit: FitResult  # the record's own values and initial state
 

@@ -242,7 +242,7 @@ class GreyBoxFit:
         cost = float(sum(np.nansum((r * w) ** 2) for r, w in zip(residuals, weights, strict=True)))
         covariance = np.zeros((0, 0))
         if n_free:
-            sensitivities, outputs = problem.sensitivities(theta), list(map(np.count_nonzero, weights))
+            sensitivities, outputs = problem.sensitivities(theta), [int(np.count_nonzero(w)) for w in weights]
             covariance = colored_covariance(
                 sensitivities, n_free, outputs, problem.derivative_error, for_intervals=True
             )

@@ -88,18 +88,13 @@ def declared_starts(
         for p in effect.parameters
         if p.fitted and p.starts and p.default is None
     }
-    return [
-        {
-            **begin,
-            **own_sizes,
-            **in_structure(
-                structure, effect, declared_values(structure.rig, effect, start.values, begin, scales)
-            ),
-        }
-        for effect in structure.effects
-        for start in effect.starts
-        if start.parent is None
-    ]
+    found = []
+    for effect, start in (
+        (e, start) for e in structure.effects for start in e.starts if start.parent is None
+    ):
+        own = declared_values(structure.rig, effect, start.values, begin, scales)
+        found.append({**begin, **own_sizes, **in_structure(structure, effect, own)})
+    return found
 
 
 def neighbors(structure: Structure, values: Mapping[str, float]) -> list[dict[str, float]]:

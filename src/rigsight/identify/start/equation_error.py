@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.identify.start.linearized_responses import USABLE_BAND
+from rigsight.identify.start.linearized_responses import USABLE_BAND, response_of_hold
 from rigsight.identify.start.measured_states import SIGNIFICANT_POWER
 from rigsight.records.record import Floats, Record
 
@@ -60,13 +60,7 @@ def spectra_of(record: Record, source: str, response: str) -> Spectra:
     x = record[response] - np.mean(record[response])
     omega = 2.0 * np.pi * np.fft.rfftfreq(u.size, record.dt)[1:]
     drive, spectrum = np.fft.rfft(u)[1:] / u.size, np.fft.rfft(x)[1:] / u.size
-    phase = omega * record.dt / 2.0
-    sinc = np.sin(phase) / phase
-    hold = np.ones_like(drive)
-    if record.hold == "zoh":
-        hold = sinc * np.exp(-1j * phase)
-    elif record.hold == "foh":
-        hold = (sinc**2).astype(np.complex128)
+    hold = response_of_hold(record, omega)
     power = np.abs(spectrum) ** 2
     floor = np.median(power[int(0.9 * power.size) :])
     significant = (power > SIGNIFICANT_POWER * floor) & (omega < USABLE_BAND * np.pi / record.dt)

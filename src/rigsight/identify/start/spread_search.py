@@ -44,8 +44,7 @@ class SearchSpace:
     """Coordinates of unknown parameters: logarithms of those with one sign, others in units of their size."""
 
     parameters: tuple[Parameter, ...]  # the unknown parameters
-    # The expected value of each, or the expected size of one that may have either sign, shape
-    # (n_parameters,).
+    # The expected value of each, or the expected size of one that may have either sign, shape (n_parameters,).
     expected: Floats
 
     @property

@@ -64,8 +64,7 @@ class _Block:
     omega: Floats  # angular frequencies [rad/s], shape (n_points,)
     terms: Complexes  # projected signals of the terms, shape (n_terms, n_points)
     squares: Floats  # their squared absolute values
-    # Derivatives of the terms by coordinates and own states, for each power of ``j omega``: (n_terms, 3,
-    # n_states').
+    # Derivatives of the terms by coordinates and own states, for each power of ``j omega``: (n_terms, 3, n_states').
     slopes: Floats
     # Square root of the covariance of coordinates and own states, shape (n_points, n_states', n_sensors).
     noise: Complexes
