@@ -14,13 +14,17 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.identify.fit.coordinates import STEP, Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.fit.fit_data import FitResult
-from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calibration, Minimum, better
-from rigsight.identify.hysteresis.derived import derived_quantities
-from rigsight.identify.hysteresis.parameters import (
+from rigsight.identify.hysteresis.calibration import (
+    BEYOND,
+    RELEASE_GAIN,
+    Calibration,
+    Minimum,
+    better,
     checked_free,
     special_structure,
     start_values,
 )
+from rigsight.identify.hysteresis.derived import derived_quantities
 from rigsight.identify.hysteresis.search import SearchBox, search
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.simulate import Structure

@@ -10,10 +10,9 @@ import sympy as sp
 
 from rigsight.discover.bench import Bench
 from rigsight.discover.ensembles import ForceLaw, force_equation, regressed_force
-from rigsight.discover.motion import Motion
+from rigsight.discover.motion import Motion, Rows
 from rigsight.discover.regression import Projected
 from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.weak_form import Rows
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.effects.symbols import deflection_rate
 from rigsight.identify import FitResult

@@ -10,7 +10,7 @@ import numpy as np
 from rigsight.discover.regression import Projected
 from rigsight.discover.support_starts import SupportStarts
 from rigsight.discover.terms.library import Candidate
-from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
+from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, free_names
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over, compose, unique_names
@@ -145,14 +145,7 @@ class Bench:
 
     def free_parameters(self, structure: Structure, held: frozenset[str] = frozenset()) -> list[str]:
         """Return the parameters that a fit of a structure varies."""
-        fixed = dict(structure.fixed)
-        names = {p.name for p in self.rig.parameters} - self.held - held
-        for effect in structure.effects:
-            for parameter in effect.parameters:
-                name = structure.parameter_name(effect, parameter.name)
-                if parameter.fitted and name not in fixed:
-                    names.add(name)
-        return [name for name in structure.names if name in names]
+        return free_names(structure, {p.name for p in self.rig.parameters} - self.held - held)
 
     def trial(self, attempt: Attempt) -> Trial:
         """Polish a support and score it; an attempt that was made before is not repeated."""

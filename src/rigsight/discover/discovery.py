@@ -13,7 +13,7 @@ from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.ensembles import inclusion, regressed_force
 from rigsight.discover.joints.joint_discovery import discover_at_joints
-from rigsight.discover.motion import Motion, motion_of
+from rigsight.discover.motion import Motion, Rows, motion_of
 from rigsight.discover.regression import (
     STRONG,
     Projected,
@@ -28,7 +28,6 @@ from rigsight.discover.result import Discovery
 from rigsight.discover.selection import Selection, criterion, select
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate, candidates, offered_effects
-from rigsight.discover.weak_form import Rows
 from rigsight.effects import Place
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import (

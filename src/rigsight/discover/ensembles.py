@@ -18,7 +18,7 @@ import numpy as np
 import sympy as sp
 
 from rigsight.discover.bench import Bench
-from rigsight.discover.motion import Motion
+from rigsight.discover.motion import Motion, Rows
 from rigsight.discover.regression import (
     Projected,
     RegressionData,
@@ -29,7 +29,6 @@ from rigsight.discover.regression import (
 from rigsight.discover.selection import Selection, proposals
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import along, candidates
-from rigsight.discover.weak_form import Rows
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative

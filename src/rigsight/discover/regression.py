@@ -19,8 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.discover.motion import Motion
-from rigsight.discover.weak_form import Rows
+from rigsight.discover.motion import Motion, Rows
 from rigsight.errors import InputError
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Floats, Record

@@ -11,6 +11,7 @@ from rigsight.identify.fit.derivatives import derivatives as derivatives
 from rigsight.identify.fit.derivatives import own_derivatives as own_derivatives
 from rigsight.identify.fit.fit_data import FitMemory as FitMemory
 from rigsight.identify.fit.fit_data import FitResult as FitResult
+from rigsight.identify.fit.fit_data import free_names as free_names
 from rigsight.identify.fit.grey_box import DEFAULT_ACCURACY as DEFAULT_ACCURACY
 from rigsight.identify.fit.grey_box import GreyBoxFit as GreyBoxFit
 from rigsight.identify.fit.idle_threads import IdleThreads as IdleThreads
@@ -35,7 +36,7 @@ from rigsight.identify.record_offsets import differing_means as differing_means
 from rigsight.identify.record_offsets import swallowed_by_offsets as swallowed_by_offsets
 from rigsight.identify.record_offsets import without_offsets as without_offsets
 from rigsight.identify.start.declared_starts import off_bounds as off_bounds
-from rigsight.identify.start.effect_start import EffectRegression as EffectRegression
+from rigsight.identify.start.equation_error import EffectRegression as EffectRegression
 from rigsight.identify.start.linear_start import linear_start as linear_start
 from rigsight.identify.start.scales import characteristic_scales as characteristic_scales
 from rigsight.identify.transfer.conicity import ConicityEstimate as ConicityEstimate

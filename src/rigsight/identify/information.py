@@ -126,8 +126,7 @@ def _triangle(rows: Floats) -> Floats:
 
 def _coloring(root: Floats, result: FitResult, names: Sequence[str], sizes: Floats) -> float:
     """Return the ratio of the standard errors to those for white residuals, as the median over the parameters."""
-    remainder, singular, right = np.linalg.svd(root, full_matrices=False)
-    del remainder
+    _, singular, right = np.linalg.svd(root, full_matrices=False)
     known = singular > 1e-6 * singular[:1]
     white = np.sqrt(np.sum((right[known] / singular[known, None]) ** 2, axis=0))
     reported = np.array([result.standard_errors[name] for name in names]) / np.abs(sizes)

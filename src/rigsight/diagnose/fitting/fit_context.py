@@ -11,7 +11,7 @@ import numpy as np
 from rigsight.diagnose.policy import HORIZON
 from rigsight.effects import Effect, Place, placed
 from rigsight.effects import symbols as canonical
-from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
+from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads, free_names
 from rigsight.identify.fit.windows import cut, strongest
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Floats, Record
@@ -144,14 +144,8 @@ class FitContext:
             elif rest:
                 # A linear spring cannot tell a constant force from a shifted rest position.
                 names -= self._bias
-        fixed = dict(structure.fixed)
-        for effect in structure.effects:
-            for parameter in effect.parameters:
-                name = structure.parameter_name(effect, parameter.name)
-                if parameter.fitted and name not in fixed:
-                    names.add(name)
-        names -= self.constant_forces_beside(structure.effects).keys()
-        return [name for name in structure.names if name in names]
+        held = self.constant_forces_beside(structure.effects).keys()
+        return [name for name in free_names(structure, names) if name not in held]
 
     def constant_forces_beside(self, effects: Iterable[Effect]) -> dict[str, float]:
         """Return the values at which constant forces are held beside effects with a mean force of their own."""

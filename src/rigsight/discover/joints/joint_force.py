@@ -17,6 +17,7 @@ from rigsight.discover.joints.followed_motion import FollowedMotion, within_reac
 from rigsight.discover.joints.joint_law import LawTerm, RegressedLaw, force_along, inclusion, regressed_laws
 from rigsight.discover.joints.joint_motion import JointMotion, followed_again, joint_motions, noise_of
 from rigsight.errors import InputError, SimulationError
+from rigsight.identify.typical_size import typical_size
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
@@ -29,8 +30,6 @@ _RULED_OUT = 3.0
 """Factor over the smallest sensor residual (RMS) at which a joint is ruled out."""
 _SETTLED = 0.01
 """Relative change of parameters and coefficients below which the rounds have converged."""
-_LARGE = 98.0
-"""Percentile of the magnitude of a motion or force that is taken as its size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,12 +198,7 @@ def _law_change(before: RegressedLaw | None, law: RegressedLaw) -> float:
 
 def _sizes(one: JointMotion) -> dict[str, float]:
     """Return the size of each base quantity at a joint."""
-
-    def size(signals: Sequence[Floats]) -> float:
-        together = np.concatenate([np.abs(signal - np.median(signal)) for signal in signals])
-        return float(np.percentile(together, _LARGE)) or 1.0
-
-    x, v, force = size(one.displacement), size(one.velocity), size(one.force)
+    x, v, force = (typical_size(own) for own in (one.displacement, one.velocity, one.force))
     return {"x": x, "time": x / v, "force": force, "drive": force}
 
 

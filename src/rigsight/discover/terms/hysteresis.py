@@ -15,9 +15,8 @@ import numpy as np
 import sympy as sp
 from scipy.optimize import least_squares
 
-from rigsight.discover.motion import Motion
+from rigsight.discover.motion import Motion, Rows
 from rigsight.discover.regression import Projected
-from rigsight.discover.weak_form import Rows
 from rigsight.effects import Effect, SumAndDifference
 from rigsight.effects import symbols as canonical
 from rigsight.identify import IdleThreads

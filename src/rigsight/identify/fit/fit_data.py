@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeVar
 
@@ -177,3 +177,12 @@ def weighted(record: RecordData, out: Floats) -> tuple[Floats, Floats]:
         np.subtract(out[:, i, :1], out[:, i, 1:], out=differences[rows])
         differences[rows] *= record.weights[i]
     return residuals, differences
+
+
+def free_names(structure: Structure, of_rig: Iterable[str]) -> list[str]:
+    """Return these parameters of the rig and all of the effects that a fit may move, in the order of the structure."""
+    names, fixed = set(of_rig), dict(structure.fixed)
+    for effect in structure.effects:
+        own = (structure.parameter_name(effect, p.name) for p in effect.parameters if p.fitted)
+        names.update(name for name in own if name not in fixed)
+    return [name for name in structure.names if name in names]
