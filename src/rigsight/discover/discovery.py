@@ -13,21 +13,12 @@ from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.ensembles import inclusion, regressed_force
 from rigsight.discover.joints.joint_discovery import discover_at_joints
-from rigsight.discover.motion import Motion, Rows, motion_of
-from rigsight.discover.regression import (
-    STRONG,
-    Projected,
-    RegressionData,
-    alike,
-    own_regression,
-    own_terms,
-    rows_of,
-    split,
-)
+from rigsight.discover.motion import motion_of
+from rigsight.discover.regression import STRONG, Projected, Regressed, RegressionData, alike, own_terms, split
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import Selection, criterion, select
 from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import Candidate, candidates, offered_effects
+from rigsight.discover.terms.library import Candidate, candidates, offered_effects, usable
 from rigsight.effects import Place
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import (
@@ -94,10 +85,9 @@ def discover(
         [record.n_samples for record in estimation],
     )
     say("motion smoothed")
-    rows = rows_of(motions, scales["time"], pointwise)
-    projected = own_regression(data.rig, data.has_stiffness, motions, rows)
-    library = _library(data, motions, rows, projected, scales, threads)
-    library, same = _distinct(library, projected)
+    regressed = Regressed.of(data.rig, data.has_stiffness, motions, scales, pointwise, threads)
+    projected = regressed.projected
+    library, same = _distinct(_library(data, regressed), projected)
     say("library")
     bench = Bench(
         rig=data.rig.motion_alone(),
@@ -123,8 +113,8 @@ def discover(
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     say("polished")
-    included = inclusion(data, bench, selection, final, motions, rows, rng)
-    force = regressed_force(bench, final, motions, rows, rng)
+    included = inclusion(data, bench, selection, final, regressed, rng)
+    force = regressed_force(bench, final, regressed, rng)
     say("ensembles")
     found = Found(estimation, held_out, how, selection, chosen, judged, final, included, force, same, held)
     return assembled(data, method, pointwise, bench, found)
@@ -176,19 +166,11 @@ def _without_downstream(rig: Rig, record: Record) -> Record:
     return replace(record, signals={name: s for name, s in record.signals.items() if name in keep})
 
 
-def _library(
-    data: RegressionData,
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    threads: IdleThreads,
-) -> list[Candidate]:
+def _library(data: RegressionData, regressed: Regressed) -> list[Candidate]:
     effects = offered_effects(data.rig, data.has_stiffness)
-    if all(is_constant(motion.u) for motion in motions):
+    if all(is_constant(motion.u) for motion in regressed.motions):
         effects = [effect for effect in effects if effect.place is not Place.ACTUATOR]
-    found = candidates(effects, motions, rows, projected, scales, data.rig.is_driven, threads)
-    return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
+    return usable(candidates(effects, regressed))
 
 
 def _distinct(

@@ -21,6 +21,7 @@ from rigsight.discover.bench import Bench
 from rigsight.discover.motion import Motion, Rows
 from rigsight.discover.regression import (
     Projected,
+    Regressed,
     RegressionData,
     inclusion_probabilities,
     own_regression,
@@ -144,8 +145,7 @@ def inclusion(
     bench: Bench,
     selection: Selection,
     final: FitResult,
-    motions: Sequence[Motion],
-    rows: Rows,
+    regressed: Regressed,
     rng: np.random.Generator,
 ) -> dict[str, float]:
     """Return the inclusion probability of the most likely terms, and of the rig's own in the full form.
@@ -168,17 +168,17 @@ def inclusion(
     shift = _rest_shift(bench, final)
     if abs(shift) < _SAME_REST * bench.scales["x"]:
         shift = 0.0
-    moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
-    projected = own_regression(data.rig, data.has_stiffness, moved, rows) if shift else bench.projected
-    own_columns = own_terms(data.rig, data.has_stiffness, projected) if bench.own_terms else {}
     library = [bench.candidates[name] for name in names]
     if shift:
+        moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in regressed.motions]
+        projected = own_regression(data.rig, data.has_stiffness, moved, regressed.rows)
         # The columns of loops do not depend on the rest position.
         loops = [candidate for candidate in library if is_loop(candidate.effect)]
         effects = [candidate.effect for candidate in library if not is_loop(candidate.effect)]
-        library = loops + candidates(
-            effects, moved, rows, projected, bench.scales, data.rig.is_driven, bench.threads
-        )
+        library = loops + candidates(effects, replace(regressed, motions=moved, projected=projected))
+    else:
+        projected = bench.projected
+    own_columns = own_terms(data.rig, data.has_stiffness, projected) if bench.own_terms else {}
     again = replace(
         bench,
         candidates={candidate.name: candidate for candidate in library},
@@ -194,7 +194,7 @@ def inclusion(
 
 
 def regressed_force(
-    bench: Bench, final: FitResult, motions: Sequence[Motion], rows: Rows, rng: np.random.Generator
+    bench: Bench, final: FitResult, regressed: Regressed, rng: np.random.Generator
 ) -> ForceEquation | None:
     """Regress the equation of the hysteretic force, the residual of the polished model's other forces along the motion."""
     rig, values = bench.rig, {**dict(final.structure.fixed), **final.values}
@@ -215,7 +215,7 @@ def regressed_force(
     without_memory = own_values[law.effect.post_yield_stiffness_ratio] * stiffness
     # Springs act about the polished rest position, not about the one about which the motion was smoothed.
     shift = _rest_shift(bench, final)
-    moved = [replace(own, x=own.x - shift) for own in motions]
+    moved = [replace(own, x=own.x - shift) for own in regressed.motions]
     forces = []
     for own in moved:
         force = gain * own.u + bias - inertia * own.acceleration
@@ -223,7 +223,7 @@ def regressed_force(
         for effect in others:
             force -= along(effect.torque, final.structure.values_of(effect, values), own)
         forces.append(force)
-    return force_equation(law, moved, rows, forces, own_values, rng)
+    return force_equation(law, moved, regressed.rows, forces, own_values, rng)
 
 
 def _ancestors(bench: Bench, name: str) -> set[str]:

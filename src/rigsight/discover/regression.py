@@ -12,8 +12,8 @@ Proc. R. Soc. A 478 (2022) 20210904, for inclusion probabilities from ensembles.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,7 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.discover.motion import Motion, Rows
 from rigsight.errors import InputError
+from rigsight.identify import IdleThreads
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
@@ -277,6 +278,38 @@ def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], row
             f"windows of {rows.width:.3g} s. Add a longer record."
         )
     return Projected(base, np.concatenate(targets), max(independent, 10.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Regressed:
+    """Motions of records, the form of their rows, and the regression of the rig's own terms to which candidates are added."""
+
+    motions: Sequence[Motion]
+    rows: Rows
+    projected: Projected
+    scales: Mapping[str, float]  # size of each base quantity
+    driven: bool  # whether the acceleration is regressed; else the force
+    threads: IdleThreads = field(default_factory=IdleThreads)
+
+    @classmethod
+    def of(
+        cls,
+        rig: Rig,
+        has_stiffness: bool,
+        motions: Sequence[Motion],
+        scales: Mapping[str, float],
+        pointwise: bool = False,
+        threads: IdleThreads | None = None,
+    ) -> Regressed:
+        """Regress the rig's own terms."""
+        rows = rows_of(motions, scales["time"], pointwise)
+        projected = own_regression(rig, has_stiffness, motions, rows)
+        return cls(motions, rows, projected, scales, rig.is_driven, threads or IdleThreads())
+
+    def column(self, signals: Iterable[Floats]) -> Floats:
+        """Return the rows of a resisting force along all records, shape (n_rows,), with its sign in the regression."""
+        own = [self.rows.of(signal, m.dt) for signal, m in zip(signals, self.motions, strict=True)]
+        return (-1.0 if self.driven else 1.0) * np.concatenate(own)
 
 
 def own_terms(rig: Rig, has_stiffness: bool, projected: Projected) -> dict[str, Floats]:

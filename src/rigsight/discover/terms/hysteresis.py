@@ -15,11 +15,9 @@ import numpy as np
 import sympy as sp
 from scipy.optimize import least_squares
 
-from rigsight.discover.motion import Motion, Rows
-from rigsight.discover.regression import Projected
+from rigsight.discover.regression import Projected, Regressed
 from rigsight.effects import Effect, SumAndDifference
 from rigsight.effects import symbols as canonical
-from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
 from rigsight.records.record import Floats
 from rigsight.rigs import RIGS
@@ -150,26 +148,17 @@ def loop_structure(effect: Effect) -> Structure:
     return compose(RIGS["element"], [effect])
 
 
-def best_loop(
-    effect: Effect,
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    driven: bool,
-    threads: IdleThreads,
-) -> Loop | None:
+def best_loop(effect: Effect, regressed: Regressed) -> Loop | None:
     """Return the loop that explains most of the residual of the rig's own terms; None if none explains any of it."""
-    shape = LoopShape.of(effect)
-    structure = loop_structure(effect)
+    shape, structure, projected = LoopShape.of(effect), loop_structure(effect), regressed.projected
     grid, bounds = shape.grid, shape.bounds
     n_refined = bounds[0].size
 
     def columns_at(points: Sequence[Point]) -> Floats:
-        shapes = [shape.values(point, scales) for point in points]
-        return _columns(structure, effect, motions, rows, shapes, scales["x"], threads)
+        shapes = [shape.values(point, regressed.scales) for point in points]
+        return _columns(structure, effect, regressed, shapes)
 
-    sign = -1.0 if driven else 1.0
+    sign = -1.0 if regressed.driven else 1.0
     columns = sign * columns_at(grid)
     shares = [_share(projected, columns[:, i]) for i in range(len(grid))]
     starts = _apart(grid, shares)
@@ -210,7 +199,7 @@ def best_loop(
         solution = least_squares(here, first, jac=slopes, bounds=bounds, ftol=1e-6, max_nfev=_REFINEMENTS)
         point = (*map(float, solution.x), *kept)
         column = sign * columns_at([point])[:, 0]
-        return Loop(shape.values(point, scales), column, _share(projected, column))
+        return Loop(shape.values(point, regressed.scales), column, _share(projected, column))
 
     return max(map(refined, starts), key=lambda loop: loop.share)
 
@@ -234,13 +223,7 @@ def _share(projected: Projected, column: Floats) -> float:
 
 
 def _columns(
-    structure: Structure,
-    effect: Effect,
-    motions: Sequence[Motion],
-    rows: Rows,
-    shapes: Sequence[Mapping[str, float]],
-    x_size: float,
-    threads: IdleThreads,
+    structure: Structure, effect: Effect, regressed: Regressed, shapes: Sequence[Mapping[str, float]]
 ) -> Floats:
     """Return the rows of several loops' deflections, shape (n_rows, n_loops)."""
     motion_of_element = structure.rig.motion
@@ -251,14 +234,14 @@ def _columns(
     p = np.array([[v[name] for v in values] for name in structure.names])
 
     def block(index: int) -> Floats:
-        motion = motions[index]
+        motion = regressed.motions[index]
         held = hold_motion(motion.x, motion.v, motion.dt)
         start = np.zeros((len(structure.states), len(shapes)))
         with np.errstate(all="ignore"):
             z = simulate_sets(structure, held, p, start, motion.x.size, _SUBSTEPS)[:, 0, :]
-            z = np.where(np.abs(z) < _RUNAWAY * x_size, z, np.nan)
+            z = np.where(np.abs(z) < _RUNAWAY * regressed.scales["x"], z, np.nan)
         return np.column_stack(
-            [rows.of(np.ascontiguousarray(z[:, i]), motion.dt) for i in range(len(shapes))]
+            [regressed.rows.of(np.ascontiguousarray(z[:, i]), motion.dt) for i in range(len(shapes))]
         )
 
-    return np.concatenate(threads.results(block, [motion.x.size for motion in motions]))
+    return np.concatenate(regressed.threads.results(block, [m.x.size for m in regressed.motions]))

@@ -8,8 +8,7 @@ the rest. Each effect then contributes one column to the library, at its best no
 from __future__ import annotations
 
 import itertools
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal
@@ -18,15 +17,14 @@ import numpy as np
 import sympy as sp
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
-from rigsight.discover.motion import Motion, Rows
-from rigsight.discover.regression import Projected
+from rigsight.discover.motion import Motion
+from rigsight.discover.regression import Projected, Regressed
 from rigsight.discover.terms.hysteresis import best_loop, is_loop
 from rigsight.discover.terms.monomials import MONOMIALS
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Place
 from rigsight.effects.symbols import derivative
-from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
 from rigsight.records.record import Floats
 from rigsight.rigs import Rig
@@ -99,51 +97,38 @@ def _filters_drive(effect: Effect) -> bool:
     return effect.place is Place.ACTUATOR and effect.drive is not None and is_filter(effect)
 
 
-def candidates(
-    effects: Sequence[Effect],
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    driven: bool,
-    threads: IdleThreads | None = None,
-) -> list[Candidate]:
+def candidates(effects: Sequence[Effect], regressed: Regressed) -> list[Candidate]:
     """Return one candidate per effect, at the nonlinear parameters that explain most of the residual of the rig's own terms."""
-    sign = -1.0 if driven else 1.0
-    helpers = threads or IdleThreads()
     plain = [effect for effect in effects if _is_plain(effect)]
     found = []
-    for effect, column in zip(plain, _library_columns(plain, motions, rows), strict=True):
-        found.append(Candidate(effect, {}, {effect.parameters[0].name: 1.0}, sign * column))
+    for effect in plain:
+        (parameter,) = effect.parameters
+        shape = _slope(effect, parameter)
+        column = regressed.column(along(shape, {}, motion) for motion in regressed.motions)
+        found.append(Candidate(effect, {}, {parameter.name: 1.0}, column))
 
     def at_best_values(effect: Effect) -> Candidate | None:
-        if is_loop(effect):
-            loop = best_loop(effect, motions, rows, projected, scales, driven, helpers)
-            return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
-        return _best_inner(effect, motions, rows, projected, scales, sign)
+        if not is_loop(effect):
+            return _best_inner(effect, regressed)
+        loop = best_loop(effect, regressed)
+        return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
 
     others = [effect for effect in effects if effect not in plain]
-    return found + [best for best in helpers.side_by_side(at_best_values, others) if best is not None]
+    fitted = regressed.threads.side_by_side(at_best_values, others)
+    return found + [best for best in fitted if best is not None]
 
 
-def _best_inner(
-    effect: Effect,
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    sign: float,
-) -> Candidate | None:
+def usable(found: Iterable[Candidate]) -> list[Candidate]:
+    """Return the candidates whose columns are finite and not zero."""
+    return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
+
+
+def _best_inner(effect: Effect, regressed: Regressed) -> Candidate | None:
     best: Candidate | None = None
     highest = 0.0
-    for signals in term_signals(effect, motions, scales):
-        parts = sign * np.column_stack(
-            [
-                np.concatenate([rows.of(one, m.dt) for one, m in zip(part, motions, strict=True)])
-                for part in zip(*signals.parts, strict=True)
-            ]
-        )
-        candidate, share = mixed(signals, parts, projected)
+    for signals in term_signals(effect, regressed.motions, regressed.scales):
+        parts = np.column_stack([regressed.column(part) for part in zip(*signals.parts, strict=True)])
+        candidate, share = mixed(signals, parts, regressed.projected)
         if share > highest:
             best, highest = candidate, share
     return best
@@ -163,40 +148,6 @@ def mixed(signals: TermSignals, parts: Floats, projected: Projected) -> tuple[Ca
 def _is_plain(effect: Effect) -> bool:
     """Return True for a torque with one coefficient and no other parameter."""
     return effect.torque is not None and not effect.states and len(effect.parameters) == 1
-
-
-def _library_columns(effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows) -> list[Floats]:
-    """Return the columns of the terms without nonlinear parameters, computed by a pysindy library from [x, x']."""
-    if not effects:
-        return []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from pysindy import CustomLibrary
-
-    library = CustomLibrary(
-        library_functions=[_term(effect) for effect in effects],
-        function_names=[_constant_name(effect.name) for effect in effects],
-    )
-    columns: list[list[Floats]] = [[] for _ in effects]
-    for motion in motions:
-        # In SI, because a sine requires the angle in radians; every regression scales its columns itself.
-        values = np.asarray(library.fit_transform(np.column_stack([motion.x, motion.v])))
-        for i in range(len(effects)):
-            columns[i].append(rows.of(np.ascontiguousarray(values[:, i]), motion.dt))
-    return [np.concatenate(parts) for parts in columns]
-
-
-def _term(effect: Effect) -> Any:
-    compiled = sp.lambdify((canonical.x, canonical.v), _slope(effect, effect.parameters[0]), "numpy")
-
-    def term(x: Floats, v: Floats) -> Floats:
-        return np.asarray(compiled(x, v))
-
-    return term
-
-
-def _constant_name(name: str) -> Any:
-    return lambda _x, _v: name
 
 
 def _slope(effect: Effect, parameter: Parameter) -> sp.Expr:
