@@ -31,8 +31,9 @@ def test_a_column_is_the_term_along_the_motion(
     values, data = make_data("cubic", 2e-5, amplitudes=(0.6,), validation=False)
     motion = motion_of(data.rig, data.records[0], values, 2e-5)
     scales = characteristic_scales(data.rig, data.records, values)
-    (found,) = candidates([effect_named(name)], Regressed.of(data.rig, True, [motion], scales))
+    regressed = Regressed.of(data.rig, True, [motion], scales)
+    (found,) = candidates([effect_named(name)], regressed)
     # A force that resists: it takes acceleration away.
     np.testing.assert_allclose(
-        found.column, -rows.of(term(motion.x, motion.v), motion.dt), rtol=1e-6, atol=1e-15
+        found.column, -regressed.rows.of(term(motion.x, motion.v), motion.dt), rtol=1e-6, atol=1e-15
     )
