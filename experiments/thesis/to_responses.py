@@ -109,7 +109,7 @@ def calibrate_to_responses(
         progress=lambda generation: tell(f"generation {generation}"),
     )
     rough = []
-    for theta in ends.usable:
+    for theta in ends:
         rough.append(look.refined(theta, 1e-4))
         tell("refined an end of the search")
     rough.sort(key=lambda solution: float(solution.cost))

@@ -19,8 +19,6 @@ from rigsight.identify.held_parameters import OpenFactor as OpenFactor
 from rigsight.identify.held_parameters import open_factor as open_factor
 from rigsight.identify.held_parameters import weighed_spring as weighed_spring
 from rigsight.identify.hysteresis import Calibration as Calibration
-from rigsight.identify.hysteresis import DerivedQuantities as DerivedQuantities
-from rigsight.identify.hysteresis import LoopArea as LoopArea
 from rigsight.identify.hysteresis import SpectralRatio as SpectralRatio
 from rigsight.identify.hysteresis import calibrate_to_records as calibrate_to_records
 from rigsight.identify.hysteresis import derived_quantities as derived_quantities

@@ -134,7 +134,7 @@ def calibrate_to_records(
         )
 
     rough = []
-    for theta in ends.usable:
+    for theta in ends:
         values = dict(zip(simple.names, map(float, coordinates.to_parameters(theta)), strict=True))
         rough.append(refined(values))
         tell("refined an end of the search")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -62,24 +63,6 @@ class SearchBox:
         return np.asarray(_EVENLY * np.sinh(low + places * (high - low)))
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Ends of a global search, best first."""
-
-    coordinates: Floats  # shape (n_ends, n_free)
-    costs: Floats  # shape (n_ends,)
-
-    @property
-    def usable(self) -> Floats:
-        """Coordinates of the ends that can be simulated."""
-        usable = self.coordinates[self.costs < _UNUSABLE]
-        if usable.size == 0:
-            raise InputError(
-                "No parameter set in the search range can be simulated. Give better start values or a smaller spread."
-            )
-        return usable
-
-
 def search(
     cost: Cost,
     box: SearchBox,
@@ -88,9 +71,9 @@ def search(
     n_generations: int = 100,
     n_sets: int = 96,
     n_ends: int = 8,
-    progress: Callable[[int], None] | None = None,
-) -> Found:
-    """Search the lowest cost over the whole box."""
+    progress: Callable[[int], None] = lambda _: None,
+) -> Floats:
+    """Search the lowest cost over the whole box; return the coordinates of its ends, best first, shape (n_ends, n_free)."""
     n_free = box.lower.size
     seen: list[Floats] = []
     paid: list[Floats] = []
@@ -103,13 +86,10 @@ def search(
         paid.append(usable)
         return usable
 
-    generation = 0
+    generations = itertools.count(1)
 
     def count_generation(*_: object) -> None:
-        nonlocal generation
-        generation += 1
-        if progress is not None:
-            progress(generation)
+        progress(next(generations))
 
     # scipy's stubs do not know that a vectorized cost returns one value per column.
     vectorized: Any = of_places
@@ -131,7 +111,12 @@ def search(
     # The population ends in one basin, which may be wrong because the simulation is coarse; other basins were visited before.
     places, costs = np.concatenate(seen), np.concatenate(paid)
     kept = _different(places, costs, n_ends)
-    return Found(box.coordinates(places[kept]), costs[kept])
+    usable = [place for place in kept if costs[place] < _UNUSABLE]
+    if not usable:
+        raise InputError(
+            "No parameter set in the search range can be simulated. Give better start values or a smaller spread."
+        )
+    return box.coordinates(places[usable])
 
 
 def _sobol(n_sets: int, n_free: int, rng: np.random.Generator) -> Floats:
