@@ -121,4 +121,5 @@ def with_weighed_spring(campaign: Campaign) -> Campaign:
     )
     if weighed is None:
         return campaign
-    return replace(campaign, spring_released=weighed.found, notes=(*campaign.notes, weighed.note))
+    found, note = weighed
+    return replace(campaign, spring_released=found, notes=(*campaign.notes, note))

@@ -126,14 +126,6 @@ _LEAVES = 0.9
 like a weak spring, and lower the error less."""
 
 
-@dataclass(frozen=True)
-class WeighedSpring:
-    """Whether records show a spring although none was given, and the finding in words."""
-
-    found: bool
-    note: str
-
-
 def weighed_spring(
     rig: Rig,
     records: Sequence[Record],
@@ -142,8 +134,8 @@ def weighed_spring(
     modelled: Sequence[Effect],
     stiffness: str,
     held: Mapping[str, float],
-) -> WeighedSpring | None:
-    """Weigh an absent spring against the records of an axis; None if they cannot be fitted.
+) -> tuple[bool, str] | None:
+    """Return whether the records of an axis show an absent spring, and a note; None if they cannot be fitted.
 
     A stiffness of zero that is given states that there is no spring. It is fitted to windows of the records, beside the same fit
     with zero: if it differs from zero beyond its error and lowers the error, the records contradict the statement.
@@ -185,4 +177,4 @@ def weighed_spring(
         f"{stiffness} is {value:.3g} +/- {std:.2g} {unit} "
         f"and leaves {share:.2f} times the error without a spring: {done}."
     )
-    return WeighedSpring(found, note)
+    return found, note

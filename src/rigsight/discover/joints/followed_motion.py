@@ -144,15 +144,15 @@ def improved(
         one.decade = float(own[int(np.argmin(known))])
     chosen = np.array([[one.decade] for one in followed])
     gains = gains_of(cases, _intensities(followed, chosen, n_records), keep=True)
-    found = smoothed(cases, gains, cases.drive[..., 0], cases.data[..., 0])
+    deviation, error = smoothed(cases, gains, cases.drive[..., 0], cases.data[..., 0])
     moved = 0.0
     for i, one in enumerate(followed):
         one.errors = []
         others = np.setdiff1d(np.arange(one.sizes.size), np.ravel(one.forces))
         for j, motion in enumerate(one.motions):
-            step = found.deviation[: motion.shape[0], i * n_records + j]
+            step = deviation[: motion.shape[0], i * n_records + j]
             one.motions[j] = motion + step * one.sizes
-            one.errors.append(found.error[: motion.shape[0], i * n_records + j] * one.sizes)
+            one.errors.append(error[: motion.shape[0], i * n_records + j] * one.sizes)
             moved = max(moved, float(np.max(np.abs(step[:, others]))))
     return moved
 
