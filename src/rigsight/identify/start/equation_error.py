@@ -71,7 +71,7 @@ def spectra_of(record: Record, source: str, response: str) -> Spectra:
     """Return the spectra of a record on the lines on which input and response exceed the noise."""
     u = record[source] - np.mean(record[source])
     x = record[response] - np.mean(record[response])
-    omega = 2.0 * np.pi * np.fft.rfftfreq(u.size, record.dt)[1:]
+    omega: Floats = 2.0 * np.pi * np.asarray(np.fft.rfftfreq(u.size, record.dt)[1:], dtype=np.float64)
     drive, spectrum = np.fft.rfft(u)[1:] / u.size, np.fft.rfft(x)[1:] / u.size
     hold = response_of_hold(record, omega)
     power = np.abs(spectrum) ** 2
