@@ -239,7 +239,8 @@ def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, 
     selection, output, error = found.selection, data.rig.outputs[0].name, found.judged.error_over_noise
     terms = _terms(bench, found)
     measured = np.concatenate([record[output] for record in found.held_out])
-    floor = data.noise[output] / (float(np.std(measured)) or 1.0)
+    size = float(np.std(measured)) or 1.0
+    floor = data.noise[output] / size
     likeliest = next(iter(next_terms(bench, found.chosen.support)), "")
     return discovery_of(
         data,
@@ -251,7 +252,7 @@ def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, 
         alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
         force_equation={} if found.force is None else dict(found.force.inclusion),
         held_out_error=error,
-        held_out_nrmse=error * floor,
+        held_out_nrmse=error * data.noise[output] / size,
         noise_floor=floor,
         independent=selection.independent,
         runs=_runs(bench, found, output),
