@@ -18,7 +18,7 @@ from rigsight.discover.regression import STRONG, Projected, Regressed, Regressio
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import Selection, criterion, select
 from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import Candidate, candidates, offered_effects, usable
+from rigsight.discover.terms.library import Candidate, candidates, offered_effects
 from rigsight.effects import Place
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import (
@@ -170,7 +170,8 @@ def _library(data: RegressionData, regressed: Regressed) -> list[Candidate]:
     effects = offered_effects(data.rig, data.has_stiffness)
     if all(is_constant(motion.u) for motion in regressed.motions):
         effects = [effect for effect in effects if effect.place is not Place.ACTUATOR]
-    return usable(candidates(effects, regressed))
+    found = candidates(effects, regressed)
+    return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
 
 
 def _distinct(

@@ -8,7 +8,7 @@ the rest. Each effect then contributes one column to the library, at its best no
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal
@@ -116,11 +116,6 @@ def candidates(effects: Sequence[Effect], regressed: Regressed) -> list[Candidat
     others = [effect for effect in effects if effect not in plain]
     fitted = regressed.threads.side_by_side(at_best_values, others)
     return found + [best for best in fitted if best is not None]
-
-
-def usable(found: Iterable[Candidate]) -> list[Candidate]:
-    """Return the candidates whose columns are finite and not zero."""
-    return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
 
 
 def _best_inner(effect: Effect, regressed: Regressed) -> Candidate | None:
