@@ -38,6 +38,7 @@ PACKAGES = (
 COMMANDS = (
     "campaign.read_campaign",
     "diagnose",
+    "power",
     "identify",
     "discover",
     "compare",

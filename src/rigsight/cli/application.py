@@ -19,6 +19,7 @@ from rigsight.cli.export import export
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
+from rigsight.cli.power import power
 from rigsight.cli.rigs import list_rigs
 from rigsight.cli.signals import ended_by_signals
 from rigsight.cli.simulate import simulate
@@ -29,6 +30,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "inspect": inspect,
     "init": init,
     "diagnose": diagnose,
+    "power": power,
     "identify": identify,
     "discover": discover,
     "compare": compare,

@@ -14,6 +14,10 @@ from rigsight.inverse.joint_force import joint_motion as joint_motion
 from rigsight.inverse.measured_motion import RecordMotion as RecordMotion
 from rigsight.inverse.measured_motion import record_motion as record_motion
 from rigsight.inverse.missing_force import MissingForce as MissingForce
+from rigsight.inverse.power import NAMED_IN as NAMED_IN
+from rigsight.inverse.power import NamedSize as NamedSize
+from rigsight.inverse.power import named_sizes as named_sizes
 from rigsight.inverse.proposal import Proposal as Proposal
 from rigsight.inverse.proposal import ProposedCause as ProposedCause
+from rigsight.inverse.propose import along_motion as along_motion
 from rigsight.inverse.propose import propose as propose

@@ -10,13 +10,13 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import Diagnosis, candidates_on, diagnose, structures_to_fit
+from rigsight.diagnose import Diagnosis, diagnose, structures_to_fit
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.own.effect_names import effects_on
+from rigsight.workflow.own.effect_names import candidates_of
 from rigsight.workflow.run.fit_journal import FitJournal
 from rigsight.workflow.run.json_file import versions
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
@@ -74,11 +74,7 @@ def diagnose_campaign(
 ) -> Diagnosis:
     """Diagnose the gap between the simulation that a campaign gives and its records."""
     tell(campaign.notes, listener)
-    # An effect without a place is skipped if it does not apply; a place that was named must exist.
-    named = [effect for effect in effects if effect.at is None] + [
-        *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
-    ]
-    candidates = candidates_on(campaign.rig, named, campaign.modelled)
+    candidates = candidates_of(campaign, effects)
     tried = structures_to_try(campaign.rig, candidates, campaign.modelled)
     prepare_kernels(structures_to_fit(campaign, tried), n_jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
+from rigsight.campaign import Campaign
+from rigsight.diagnose import candidates_on
 from rigsight.effects import AT, CATALOGUE, Effect, kind_of, placed
 from rigsight.errors import InputError, nearest
 from rigsight.rigs import Rig
@@ -54,3 +56,14 @@ def _check_place(rig: Rig, effect: Effect, place: str, where: str) -> None:
             f"{where}: '{kind_of(effect.name)}{AT}{place}': {rig.name} has no such place for it.{nearest(place, places)} "
             f"Its places: {listed}."
         )
+
+
+def candidates_of(campaign: Campaign, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the candidates at every place of a campaign's rig.
+
+    An effect without a place is skipped if it does not apply; a place that was named must exist.
+    """
+    named = [effect for effect in effects if effect.at is None] + [
+        *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
+    ]
+    return candidates_on(campaign.rig, named, campaign.modelled)
