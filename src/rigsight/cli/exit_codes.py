@@ -86,13 +86,7 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
 
 
 class CommandExit(SystemExit):
-    """The process ends after its message was printed.
-
-    Attributes
-    ----------
-    is_of_the_machine
-        True if disk, memory or limits of this machine are the cause, so that the same command may succeed elsewhere or later.
-    """
+    """The process ends after its message was printed."""
 
     def __init__(self, code: int, is_of_the_machine: bool = False) -> None:
         super().__init__(code)

@@ -43,34 +43,19 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class RecordComparison:
-    """All models on one record.
+    """All models on one record."""
 
-    Attributes
-    ----------
-    record
-        The measured record.
-    measured
-        Path -> measured frequency response.
-    simulated
-        Model -> path -> response of its simulation.
-    step
-        Where a step is compared, None for other records.
-    moved
-        Output -> model -> samples inside the step window, offset removed, shape (n_inside,).
-    scores, failures
-        What was found, and what was not.
-    notes
-        What is to be known about the record here.
-    """
-
-    record: Record
-    measured: dict[str, FrequencyResponse]
+    record: Record  # the measured record
+    measured: dict[str, FrequencyResponse]  # path -> measured frequency response
+    # Model -> path -> response of its simulation.
     simulated: dict[str, dict[str, FrequencyResponse]] = field(default_factory=dict)
-    step: StepWindow | None = None
+    step: StepWindow | None = None  # where a step is compared, None for other records
+    # Output -> model -> samples inside the step window, offset removed, shape (n_inside,).
     moved: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
+    # What was found, and what was not.
     scores: tuple[Score, ...] = ()
     failures: tuple[Failure, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what is to be known about the record here
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,13 +103,7 @@ class Comparison:
         return tuple(failure for record in self.records for failure in record.failures)
 
     def columns(self, record: str | None = None) -> tuple[Column, ...]:
-        """Return what was compared, path by path and output by output.
-
-        Parameters
-        ----------
-        record
-            Name of a record; None for all of them.
-        """
+        """Return what was compared, path by path and output by output."""
         found = dict.fromkeys(s.column for s in self.scores if record is None or s.record == record)
         kinds = list(QUANTITIES)
         signals = list(dict.fromkeys(column.signal for column in found))
@@ -136,13 +115,7 @@ class Comparison:
         )
 
     def table(self, record: str) -> dict[str, dict[Column, float]]:
-        """Return model -> column -> error on one record; what could not be found is left out.
-
-        Parameters
-        ----------
-        record
-            Name of the record.
-        """
+        """Return model -> column -> error on one record; what could not be found is left out."""
         rows: dict[str, dict[Column, float]] = {c.name: {} for c in self.competitors}
         for score in self.scores:
             if score.record == record:
@@ -166,15 +139,7 @@ class Comparison:
         return rows
 
     def floor(self, column: Column, record: str | None = None) -> float | None:
-        """Return the noise floor of a column, in its unit; None if unknown.
-
-        Parameters
-        ----------
-        column
-            What was compared.
-        record
-            Name of a record; None for the root mean square over all that show the column.
-        """
+        """Return the noise floor of a column, in its unit; None if unknown."""
         known = {
             s.record: s.noise_floor
             for s in self.scores

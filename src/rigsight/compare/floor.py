@@ -14,46 +14,20 @@ _SEGMENT = 256
 
 @dataclass(frozen=True)
 class Floor:
-    """Noise floor of an output.
+    """Noise floor of an output."""
 
-    Attributes
-    ----------
-    output, unit
-        Name of the output and its unit.
-    std
-        Standard deviation of what no model can explain.
-    method
-        How it was found.
-    lower_bound
-        True if only part of the noise was seen.
-    stretches
-        Pieces of noise alone, shape (n_samples,) each, with their sample time [s]. They give the spectrum of the noise;
-        without any it is taken for white.
-    """
-
+    # Name of the output and its unit.
     output: str
     unit: str
-    std: float
-    method: str
-    lower_bound: bool = False
+    std: float  # standard deviation of what no model can explain
+    method: str  # how it was found
+    lower_bound: bool = False  # true if only part of the noise was seen
+    # Pieces of noise alone, shape (n_samples,) each, with their sample time [s]. They give the spectrum of
+    # the noise; without any it is taken for white.
     stretches: tuple[tuple[NDArray[np.float64], float], ...] = field(default=(), compare=False, repr=False)
 
     def noise(self, n_samples: int, dt: float, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return Gaussian noise with this standard deviation and the spectrum of the stretches.
-
-        Parameters
-        ----------
-        n_samples
-            Length.
-        dt
-            Sample time [s].
-        rng
-            Randomness.
-
-        Returns
-        -------
-        Shape (n_samples,), in the unit of the output.
-        """
+        """Return Gaussian noise of shape (n_samples,) with this standard deviation and the spectrum of the stretches."""
         white = rng.normal(size=n_samples)
         pieces = [(samples, step) for samples, step in self.stretches if np.ptp(samples) > 0.0]
         if not pieces:

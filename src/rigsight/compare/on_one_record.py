@@ -49,24 +49,14 @@ _FEWER = 0.95
 
 @dataclass(frozen=True)
 class Yardstick:
-    """What all models are measured by.
+    """What all models are measured by."""
 
-    Attributes
-    ----------
-    rig
-        The rig.
-    floors
-        Noise floor of each output that was measured. They belong to the records, not to the models, and are handed in.
-    method
-        Estimator of frequency responses.
-    step_seconds
-        Length of the step window [s].
-    """
-
-    rig: Rig
+    rig: Rig  # the rig
+    # Noise floor of each output that was measured. They belong to the records, not to the models, and are
+    # handed in.
     floors: tuple[Floor, ...]
-    method: Method = "local_rational"
-    step_seconds: float = DEFAULT_SECONDS
+    method: Method = "local_rational"  # estimator of frequency responses
+    step_seconds: float = DEFAULT_SECONDS  # length of the step window [s]
 
 
 def compare_on_record(
@@ -74,19 +64,6 @@ def compare_on_record(
 ) -> RecordComparison:
     """Score all models on one record.
 
-    Parameters
-    ----------
-    competitors
-        Models of the same rig.
-    record
-        A measured record.
-    windows
-        Its parts with their own initial states in free run; the record alone where it is run as a whole.
-    yardstick
-        How errors are counted.
-
-    Notes
-    -----
     A model that cannot be simulated on the record, or whose response cannot be read, becomes a `Failure`; the others go on.
     """
     paths = signal_paths(yardstick.rig)

@@ -18,44 +18,22 @@ QUANTITIES: dict[Quantity, str] = {
 
 @dataclass(frozen=True)
 class Column:
-    """What is compared.
+    """What is compared."""
 
-    Attributes
-    ----------
-    quantity
-        A key of `QUANTITIES`.
-    signal
-        Signal path (``"u -> psi"``) or output.
-    unit
-        Unit of the error.
-    """
-
-    quantity: Quantity
-    signal: str
-    unit: str
+    quantity: Quantity  # a key of `QUANTITIES`
+    signal: str  # signal path (``"u -> psi"``) or output
+    unit: str  # unit of the error
 
 
 @dataclass(frozen=True)
 class Score:
-    """One error of one model on one record.
+    """One error of one model on one record."""
 
-    Attributes
-    ----------
-    model, record
-        Their names.
-    column
-        What was compared.
-    value
-        The error in the column's unit.
-    noise_floor
-        What noise alone makes of it, in the same unit; None where the record does not tell.
-    n_values
-        Lines or samples that the error is of.
-    """
-
+    # Their names.
     model: str
     record: str
-    column: Column
-    value: float
+    column: Column  # what was compared
+    value: float  # the error in the column's unit
+    # What noise alone makes of it, in the same unit; None where the record does not tell.
     noise_floor: float | None
-    n_values: int
+    n_values: int  # lines or samples that the error is of

@@ -32,35 +32,19 @@ class AmplitudePoint:
 
 @dataclass(frozen=True)
 class AmplitudePanel:
-    """One parameter over the amplitude.
+    """One parameter over the amplitude."""
 
-    Attributes
-    ----------
-    name, unit
-        Of the parameter.
-    points
-        One per record.
-    common
-        Value and standard error of the joint set; None where there is none.
-    """
-
+    # Of the parameter.
     name: str
     unit: str
-    points: tuple[AmplitudePoint, ...]
+    points: tuple[AmplitudePoint, ...]  # one per record
+    # Value and standard error of the joint set; None where there is none.
     common: tuple[float, float] | None = None
 
 
 @in_style
 def amplitude_dependence(panels: Sequence[AmplitudePanel], input_label: str) -> Figure:
-    """Draw each parameter over the amplitude with 95 % intervals, and the joint set as a line.
-
-    Parameters
-    ----------
-    panels
-        One or more parameters.
-    input_label
-        Label of the amplitude axis, with its unit.
-    """
+    """Draw each parameter over the amplitude with 95 % intervals, and the joint set as a line."""
     columns = min(_COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
     figure = new_figure(3.05 * columns, 0.55 + 2.15 * rows)

@@ -116,19 +116,7 @@ def _largest(residual: NDArray[np.float64], length: int) -> slice:
 def gap_budget(
     diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | None = None, is_given: bool = True
 ) -> Figure:
-    """Draw the gap of each output as a waterfall: given, explained by parameters and by the effect, remaining, noise floor.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    after_label
-        What the last step adds, e.g. ``"Adding cubic stiffness"``.
-    labels
-        Panel title by output; default is its name.
-    is_given
-        False where no simulation was given: the waterfall then starts at the identified equations.
-    """
+    """Draw the gap of each output as a waterfall: given, explained by parameters and by the effect, remaining, noise floor."""
     outputs = list(diagnosis.gap)
     figure = new_figure(_WIDTH, 0.45 + 1.75 * max(1, len(outputs)), layout=None)
     axes = figure.subplots(max(1, len(outputs)), 1, squeeze=False)[:, 0]
@@ -183,17 +171,7 @@ def _waterfall_step(
 
 @in_style
 def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figure:
-    """Draw the error of each candidate on the validation records, in units of the noise floor on a logarithmic axis.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    names
-        Label of each candidate, in their order.
-    limit
-        Candidates drawn, best first.
-    """
+    """Draw the error of each candidate on the validation records, in units of the noise floor on a logarithmic axis."""
     candidates = diagnosis.candidates[:limit]
     shown = [fill(name, _LONGEST_NAME) for name in names[: len(candidates)]]
     # A name of several lines needs a higher row; rows are counted from the top edge of the first.
@@ -249,23 +227,7 @@ def comparison(
     after_label: str = "after",
     stages: Mapping[Stage, str] | None = None,
 ) -> Figure:
-    """Draw measured against simulated, by default given and after, with the residuals below.
-
-    Parameters
-    ----------
-    diagnosis
-        The result; gives units and noise floor.
-    trace
-        One record.
-    output
-        Name of the output.
-    window
-        Samples to draw; all where None.
-    after_label
-        What the simulation after the diagnosis is called in the legend.
-    stages
-        What is drawn instead of given and after, with its name in the legend.
-    """
+    """Draw measured against simulated, by default given and after, with the residuals below."""
     from matplotlib.ticker import MaxNLocator
 
     shown = window or slice(None)

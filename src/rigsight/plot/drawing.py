@@ -104,15 +104,7 @@ class DisplayScale:
 
 
 def display_scale(unit: str, size: float) -> DisplayScale:
-    """Return the scale by which a quantity of typical `size` is shown, e.g. mrad for 0.01 rad.
-
-    Parameters
-    ----------
-    unit
-        SI unit; units that take no prefix (``"m/s"``, ``"1"``) are left alone.
-    size
-        Largest absolute value to be shown.
-    """
+    """Return the scale by which a quantity of typical `size` is shown, e.g. mrad for 0.01 rad."""
     if unit not in _PREFIXED or not np.isfinite(size) or size <= 0.0:
         return DisplayScale(1.0, unit)
     exponent = int(np.clip(3 * np.floor(np.log10(size) / 3.0), -9, 6))
@@ -125,20 +117,7 @@ def display_scale(unit: str, size: float) -> DisplayScale:
 def envelope(
     t: NDArray[np.float64], values: NDArray[np.float64], n_bins: int = _ENVELOPE_BINS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a shorter line with the same picture: lowest and highest finite sample of each bin, in their order in time.
-
-    Parameters
-    ----------
-    t, values
-        Shape (n_samples,).
-    n_bins
-        Bins; a line of at most ``2 * n_bins`` samples is returned unchanged.
-
-    Returns
-    -------
-    t, values
-        Shape (at most 2 * n_bins,).
-    """
+    """Return a shorter line with the same picture: lowest and highest finite sample of each bin, in their order in time."""
     if values.size <= 2 * n_bins:
         return t, values
     size = -(-values.size // n_bins)

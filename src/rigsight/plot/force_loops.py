@@ -21,41 +21,24 @@ _WIDTH = 5.4
 
 @dataclass(frozen=True, eq=False)
 class ForceLoop:
-    """A stretch of motion and the force over it.
+    """A stretch of motion and the force over it."""
 
-    Attributes
-    ----------
-    motion, force
-        Names of the signals.
-    motion_unit, force_unit
-        SI units.
-    displacement, velocity, measured
-        Shape (n_samples,).
-    simulated
-        Stage -> its force, shape (n_samples,).
-    """
-
+    # Names of the signals.
     motion: str
     force: str
+    # SI units.
     motion_unit: str
     force_unit: str
+    # Shape (n_samples,).
     displacement: NDArray[np.float64]
     velocity: NDArray[np.float64]
     measured: NDArray[np.float64]
-    simulated: Mapping[Stage, NDArray[np.float64]]
+    simulated: Mapping[Stage, NDArray[np.float64]]  # stage -> its force, shape (n_samples,)
 
 
 @in_style
 def force_loops(loop: ForceLoop, stages: Mapping[Stage, str]) -> Figure:
-    """Draw the force over displacement and, beside it, over velocity: measured, and each stage.
-
-    Parameters
-    ----------
-    loop
-        What is drawn.
-    stages
-        Stages drawn, with their names for people.
-    """
+    """Draw the force over displacement and, beside it, over velocity: measured, and each stage."""
     from matplotlib.ticker import MaxNLocator
 
     figure = new_figure(_WIDTH, 2.9, layout=None)

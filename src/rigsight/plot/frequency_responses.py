@@ -34,57 +34,27 @@ _FACES = ("#440154", "#3b528b", "#21918c", "#5ec962", "#d8b40a", "#d55e00")
 
 @dataclass(frozen=True, eq=False)
 class FittedCurve:
-    """A fitted frequency response.
+    """A fitted frequency response."""
 
-    Attributes
-    ----------
-    omega
-        Angular frequencies [rad/s], shape (n,).
-    values
-        Complex response, shape (n,).
-    std
-        ``sqrt(E |error|^2)``, shape (n,).
-    label
-        What it is called.
-    """
-
-    omega: NDArray[np.float64]
-    values: NDArray[np.complex128]
-    std: NDArray[np.float64]
-    label: str
+    omega: NDArray[np.float64]  # angular frequencies [rad/s], shape (n,)
+    values: NDArray[np.complex128]  # complex response, shape (n,)
+    std: NDArray[np.float64]  # ``sqrt(E |error|^2)``, shape (n,)
+    label: str  # what it is called
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One signal path of a Bode plot.
+    """One signal path of a Bode plot."""
 
-    Attributes
-    ----------
-    title
-        Which path.
-    measured
-        The frequency response.
-    fitted
-        The fit, None where there is none.
-    label
-        Name in a plot of several, e.g. the amplitude.
-    """
-
-    title: str
-    measured: FrequencyResponse
-    fitted: FittedCurve | None = None
-    label: str = ""
+    title: str  # which path
+    measured: FrequencyResponse  # the frequency response
+    fitted: FittedCurve | None = None  # the fit, None where there is none
+    label: str = ""  # name in a plot of several, e.g. the amplitude
 
 
 @in_style
 def bode(panels: Sequence[Panel]) -> Figure:
-    """Draw measured against fitted as magnitude and phase, one column per path, with 95 % bands.
-
-    Parameters
-    ----------
-    panels
-        One or two paths of a record.
-    """
+    """Draw measured against fitted as magnitude and phase, one column per path, with 95 % bands."""
     figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 4.9)
     axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", height_ratios=[3, 2])
     for column, whole in enumerate(panels):
@@ -108,15 +78,7 @@ def bode(panels: Sequence[Panel]) -> Figure:
 
 @in_style
 def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "fitted") -> Figure:
-    """Draw the magnitudes of several records over each other: measured as lines, fitted dashed in the same color.
-
-    Parameters
-    ----------
-    columns
-        One sequence of panels per path, in the order of the amplitudes; their titles name the path, their labels the record.
-    fitted_label
-        What the dashed lines are called.
-    """
+    """Draw the magnitudes of several records over each other: measured as lines, fitted dashed in the same color."""
     labels = list(dict.fromkeys(panel.label for panels in columns for panel in panels))
     legend_rows = -(-(len(labels) + 1) // _LEGEND_COLUMNS)
     width, height = 4.6 * len(columns) + (1.4 if len(columns) == 1 else 0.0), 3.8 + 0.2 * legend_rows

@@ -116,15 +116,7 @@ def _legend(figure: Figure, ax: Axes) -> None:
 
 @in_style
 def gap_bands(parts: Sequence[BandPart], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage in each frequency band; squares add up to that of the whole gap.
-
-    Parameters
-    ----------
-    parts
-        Bands of one output.
-    stages
-        What is drawn, with its name for people.
-    """
+    """Draw the error of each stage in each frequency band; squares add up to that of the whole gap."""
     figure, ax = _bar_figure()
     _bars(ax, parts, stages)
     labels = [_band_label(part) for part in parts]
@@ -144,17 +136,7 @@ def _band_label(part: BandPart) -> str:
 
 @in_style
 def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage on each record, relative to the record's own motion.
-
-    Parameters
-    ----------
-    parts
-        Records of one output.
-    labels
-        What each is called.
-    stages
-        What is drawn, with its name for people.
-    """
+    """Draw the error of each stage on each record, relative to the record's own motion."""
     figure, ax = _bar_figure(lines=1)
     _bars(ax, parts, stages)
     ax.set_xticks(range(len(parts)), list(labels), fontsize=8)
@@ -168,17 +150,7 @@ def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], stages: Mapp
 def gap_amplitudes(
     parts: Sequence[AmplitudePart], labels: Sequence[str], stages: Mapping[Stage, str]
 ) -> Figure:
-    """Draw the error of each stage at each amplitude of the input, relative to the motion there.
-
-    Parameters
-    ----------
-    parts
-        Amplitudes of one output, in ascending order.
-    labels
-        What each is called.
-    stages
-        What is drawn, with its name for people.
-    """
+    """Draw the error of each stage at each amplitude of the input, relative to the motion there."""
     figure, ax = _bar_figure()
     _bars(ax, parts, stages)
     ax.set_xticks(range(len(parts)), list(labels), fontsize=8)
@@ -190,15 +162,7 @@ def gap_amplitudes(
 
 @in_style
 def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage over time, one panel per scored record, with the noise floor.
-
-    Parameters
-    ----------
-    parts
-        Stretches of one output, record by record.
-    stages
-        What is drawn, with its name for people.
-    """
+    """Draw the error of each stage over time, one panel per scored record, with the noise floor."""
     records = list(dict.fromkeys(part.record for part in parts))
     figure = new_figure(_WIDTH, 0.5 + 1.6 * len(records), layout=None)
     axes = figure.subplots(len(records), 1, squeeze=False)[:, 0]
@@ -227,17 +191,7 @@ def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
 
 @in_style
 def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
-    """Draw the error over the plane of displacement and velocity and, where it is known, the missing force.
-
-    Parameters
-    ----------
-    parts
-        Cells of one output.
-    output
-        What the error is of.
-    motion
-        Symbol of the displacement.
-    """
+    """Draw the error over the plane of displacement and velocity and, where it is known, the missing force."""
     with_force = any(np.isfinite(part.force_mean) for part in parts)
     figure = new_figure(_WIDTH, _STATES_HEIGHT, layout=None)
     axes = figure.subplots(1, 2 if with_force else 1, squeeze=False, sharey=True)[0]

@@ -47,69 +47,35 @@ _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.2, 1, 1.2
 
 @dataclass(frozen=True, eq=False)
 class ResponsesPanel:
-    """One signal path: measured, and as each model has it.
+    """One signal path: measured, and as each model has it."""
 
-    Attributes
-    ----------
-    title
-        Which path.
-    measured
-        The measured response.
-    simulated
-        Model -> its response at lines of the measured one.
-    """
-
-    title: str
-    measured: FrequencyResponse
-    simulated: Mapping[str, FrequencyResponse]
+    title: str  # which path
+    measured: FrequencyResponse  # the measured response
+    simulated: Mapping[str, FrequencyResponse]  # model -> its response at lines of the measured one
 
 
 @dataclass(frozen=True, eq=False)
 class StepPanel:
-    """One output after a step, offsets removed.
+    """One output after a step, offsets removed."""
 
-    Attributes
-    ----------
-    title, unit
-        Which output.
-    t
-        Time from the step [s], shape (n_samples,).
-    measured
-        Shape (n_samples,).
-    simulated
-        Model -> shape (n_samples,).
-    """
-
+    # Which output.
     title: str
     unit: str
-    t: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    simulated: Mapping[str, NDArray[np.float64]]
+    t: NDArray[np.float64]  # time from the step [s], shape (n_samples,)
+    measured: NDArray[np.float64]  # shape (n_samples,)
+    simulated: Mapping[str, NDArray[np.float64]]  # model -> shape (n_samples,)
 
 
 @dataclass(frozen=True)
 class ErrorPanel:
-    """One column of a comparison.
+    """One column of a comparison."""
 
-    Attributes
-    ----------
-    title
-        What was compared, with the unit.
-    overall
-        Model -> root mean square over records; a model without one is said to lack it.
-    single
-        Model -> error on each record.
-    best
-        Models with the smallest root mean square.
-    floor
-        Noise floor over all records, None if unknown.
-    """
-
-    title: str
+    title: str  # what was compared, with the unit
+    # Model -> root mean square over records; a model without one is said to lack it.
     overall: Mapping[str, float]
-    single: Mapping[str, Sequence[float]]
-    best: frozenset[str]
-    floor: float | None
+    single: Mapping[str, Sequence[float]]  # model -> error on each record
+    best: frozenset[str]  # models with the smallest root mean square
+    floor: float | None  # noise floor over all records, None if unknown
 
 
 def model_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -122,15 +88,7 @@ def model_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
 
 @in_style
 def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Draw magnitude above phase, one column per path: measured as points with its 95 % band, each model as a line.
-
-    Parameters
-    ----------
-    panels
-        Paths of one record.
-    styles
-        Line style by model, see `model_styles`.
-    """
+    """Draw magnitude above phase, one column per path: measured as points with its 95 % band, each model as a line."""
     figure, axes = _responses_grid(2, len(panels), len(styles), 5.2)
     for place, panel in enumerate(panels):
         row, column = divmod(place, axes.shape[1])
@@ -195,15 +153,7 @@ def _responses_grid(rows: int, panels: int, n_models: int, height: float) -> tup
 
 @in_style
 def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Draw each output after a step, offsets removed: measured as a wide gray line, each model over it.
-
-    Parameters
-    ----------
-    panels
-        Outputs of one record.
-    styles
-        Line style by model, see `model_styles`.
-    """
+    """Draw each output after a step, offsets removed: measured as a wide gray line, each model over it."""
     figure, axes = _responses_grid(1, len(panels), len(styles), 3.4)
     for ax, panel in zip(axes.flat, panels, strict=False):
         factor, unit = shown_in(panel.unit, panel.measured)
@@ -225,15 +175,7 @@ def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, A
 
 @in_style
 def model_errors(panels: Sequence[ErrorPanel], names: Sequence[str]) -> Figure:
-    """Draw the errors of all models as bars on logarithmic axes, each record as a point, the noise floor as a dashed line.
-
-    Parameters
-    ----------
-    panels
-        What was compared.
-    names
-        Models, the first on top.
-    """
+    """Draw the errors of all models as bars on logarithmic axes, each record as a point, the noise floor as a dashed line."""
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
     figure = new_figure(2.0 + 2.9 * columns, rows * (0.9 + 0.24 * len(names)))

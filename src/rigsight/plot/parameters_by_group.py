@@ -25,39 +25,20 @@ _STYLES = {False: (WITH_EFFECT, "o", "the same within errors"), True: (GIVEN, "D
 
 @dataclass(frozen=True)
 class GroupPanel:
-    """One number in several groups.
+    """One number in several groups."""
 
-    Attributes
-    ----------
-    name, unit
-        Of the number.
-    by
-        What groups are of, such as ``"record"``.
-    groups
-        Label, value and standard error of each group, in order.
-    common
-        Value and standard error of the common fit.
-    differs
-        Whether groups differ beyond chance.
-    """
-
+    # Of the number.
     name: str
     unit: str
-    by: str
-    groups: tuple[tuple[str, float, float], ...]
-    common: tuple[float, float]
-    differs: bool
+    by: str  # what groups are of, such as ``"record"``
+    groups: tuple[tuple[str, float, float], ...]  # label, value and standard error of each group, in order
+    common: tuple[float, float]  # value and standard error of the common fit
+    differs: bool  # whether groups differ beyond chance
 
 
 @in_style
 def parameters_by_group(panels: Sequence[GroupPanel]) -> Figure:
-    """Draw each number as groups alone have it, with 95 % intervals, against the common estimate.
-
-    Parameters
-    ----------
-    panels
-        One or more numbers.
-    """
+    """Draw each number as groups alone have it, with 95 % intervals, against the common estimate."""
     columns = min(_COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
     heights = [

@@ -31,37 +31,20 @@ _MOST_LINES = 250
 
 @dataclass(frozen=True, eq=False)
 class ResponseCell:
-    """One path of a grid.
+    """One path of a grid."""
 
-    Attributes
-    ----------
-    source, response, unit
-        Input, sensor, and the unit of their ratio.
-    measured
-        None where the records do not show it.
-    model
-        None where there is none.
-    remark
-        Stands in an empty panel.
-    """
-
+    # Input, sensor, and the unit of their ratio.
     source: str
     response: str
     unit: str
-    measured: FrequencyResponse | None
-    model: FittedCurve | None
-    remark: str = ""
+    measured: FrequencyResponse | None  # None where the records do not show it
+    model: FittedCurve | None  # None where there is none
+    remark: str = ""  # stands in an empty panel
 
 
 @in_style
 def response_grid(cells: Sequence[Sequence[ResponseCell]]) -> Figure:
-    """Draw magnitude over phase of every path, with 95 % bands.
-
-    Parameters
-    ----------
-    cells
-        Rows of sensors, each of all inputs.
-    """
+    """Draw magnitude over phase of every path, with 95 % bands."""
     n_rows, n_columns = len(cells), len(cells[0])
     figure = new_figure(max(3.9 * n_columns, 6.0), 3.9 * n_rows + 0.3)
     axes = figure.subplots(2 * n_rows, n_columns, squeeze=False, height_ratios=[3, 2] * n_rows)

@@ -40,34 +40,16 @@ _SURE = 0.5
 
 @dataclass(frozen=True)
 class PlaceMark:
-    """A suspected place.
+    """A suspected place."""
 
-    Attributes
-    ----------
-    strength
-        From 0 to 1.
-    label
-        What it is suspected of.
-    is_state
-        True for a state, which may be called as a sensor is.
-    """
-
-    strength: float
-    label: str = ""
-    is_state: bool = False
+    strength: float  # from 0 to 1
+    label: str = ""  # what it is suspected of
+    is_state: bool = False  # true for a state, which may be called as a sensor is
 
 
 @in_style
 def rig_picture(rig: Rig, marks: Mapping[str, PlaceMark] | None = None) -> Figure:
-    """Return a schematic of a rig.
-
-    Parameters
-    ----------
-    rig
-        Any rig.
-    marks
-        Suspected joints, drives, sensors and states by name.
-    """
+    """Return a schematic of a rig."""
     return _Sheet(rig_content(rig), marks or {}).figure()
 
 

@@ -50,19 +50,7 @@ class View:
 def render_comparison(
     comparison: Comparison, figures: Sequence[ComparisonFigure], command: str, versions: Mapping[str, str]
 ) -> str:
-    """Return the comparison as one HTML page: no script, no network, nothing beside the file.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    figures
-        Its figures.
-    command
-        The command line that made it.
-    versions
-        Package -> version.
-    """
+    """Return the comparison as one HTML page: no script, no network, nothing beside the file."""
     overall, *records = _views(comparison, figures)
     return environment().get_template("comparison.html.jinja").render(
         comparison=comparison,
@@ -109,13 +97,7 @@ class ComparisonSummary:
 
 
 def comparison_summary(comparison: Comparison) -> ComparisonSummary:
-    """Return the comparison as a rich renderable.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    """
+    """Return the comparison as a rich renderable."""
     return ComparisonSummary(comparison)
 
 

@@ -92,13 +92,7 @@ class IdentificationSummary:
 
 
 def identification_summary(identification: Identification) -> IdentificationSummary:
-    """Return the identification as a rich renderable.
-
-    Parameters
-    ----------
-    identification
-        The result.
-    """
+    """Return the identification as a rich renderable."""
     return IdentificationSummary(identification)
 
 

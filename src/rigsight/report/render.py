@@ -56,21 +56,7 @@ def render_report(
     seed: int | None = None,
     own_effects: Iterable[Effect] = (),
 ) -> str:
-    """Return the report as one HTML page.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    command
-        The command line that made it.
-    versions
-        Package -> version, as in ``{"rigsight": "0.1.0", "numpy": "2.0.0"}``.
-    seed
-        Seed of everything random; None where nothing was.
-    own_effects
-        Effects beside those of the catalogue that the simulation may have.
-    """
+    """Return the report as one HTML page."""
     known = known_effects(own_effects)
     responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
     script = _script()

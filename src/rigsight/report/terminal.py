@@ -84,13 +84,7 @@ def plain_text(words: str, encoding: str, style: str = "") -> Text:
 
 
 def summary(diagnosis: Diagnosis) -> Summary:
-    """Return the diagnosis as a rich renderable of about ten lines.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    """
+    """Return the diagnosis as a rich renderable of about ten lines."""
     return Summary(diagnosis)
 
 

@@ -23,13 +23,6 @@ class FitJournal:
     """The fits of one diagnosis, kept on disk until it is done.
 
     Used as a context: the file is removed if the context ends without an error, otherwise it is kept.
-
-    Parameters
-    ----------
-    campaign
-        The campaign's file or folder; its path determines the journal's name. Fits are identified by their keys.
-    going_on
-        Called once with the number of stored fits, when the first of them is reused.
     """
 
     def __init__(self, campaign: Path, going_on: Callable[[int], None] | None = None) -> None:
