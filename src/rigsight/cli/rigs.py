@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +11,7 @@ from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import check_option
-from rigsight.plot import rig_picture, style, svg_text
+from rigsight.plot import png_bytes, rig_picture, svg_text
 from rigsight.rigs import Rig
 from rigsight.workflow.run.results import check_target, write_together
 
@@ -86,12 +85,5 @@ def write_rig_picture(rig: Rig, file: Path) -> Path:
     ending = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
     check_target(file)
     figure = rig_picture(rig)
-    content: str | bytes
-    if ending == ".svg":
-        content = svg_text(figure, rig.name)
-    else:
-        stream = io.BytesIO()
-        with style():
-            figure.savefig(stream, format="png", dpi=_DPI)
-        content = stream.getvalue()
+    content = svg_text(figure, rig.name) if ending == ".svg" else png_bytes(figure, _DPI)
     return write_together(file.parent, {file.name: content})[0]

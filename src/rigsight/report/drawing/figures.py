@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import base64
-import io
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup, escape
 
-from rigsight.plot import style, svg_text
+from rigsight.plot import png_bytes, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,8 +68,5 @@ def _short_path(path: re.Match[str]) -> str:
 
 
 def _png(figure: Figure, alt: str) -> Markup:
-    stream = io.BytesIO()
-    with style():
-        figure.savefig(stream, format="png", dpi=_PNG_DPI)
-    data = base64.b64encode(stream.getvalue()).decode("ascii")
+    data = base64.b64encode(png_bytes(figure, _PNG_DPI)).decode("ascii")
     return Markup('<img alt="{}" src="data:image/png;base64,{}">').format(alt, data)

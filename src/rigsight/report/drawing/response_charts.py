@@ -11,7 +11,8 @@ from rigsight import plot
 from rigsight.diagnose.location.trace import STAGES, Stage
 from rigsight.diagnose.result import Diagnosis
 from rigsight.frequency import FrequencyResponse
-from rigsight.plot.frequency_responses import TWO_SIDED, decibel, thinned
+from rigsight.plot.drawing import TWO_SIDED
+from rigsight.plot.frequency_responses import decibel, thinned
 from rigsight.report.drawing.charts import Chart, ChartPanel, Curve, chart_data, curve_names
 from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.responses import PathResponse
