@@ -12,7 +12,7 @@ from rigsight.api.estimator import campaign_of
 from rigsight.api.tables import data_frame
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor
-from rigsight.report.drawing.comparison_figures import overall_figure, record_figures
+from rigsight.report.comparison import overall_figure, record_figures
 from rigsight.report.notebook import comparison_html
 from rigsight.simulate.model import Model
 from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig, write_comparison

@@ -61,7 +61,7 @@ def discover(
     if json:
         show_json(out / "discovery.json")
     elif not quiet:
-        from rigsight.report.discovery import discovery_summary
+        from rigsight.report.terminal import discovery_summary
 
         show(discovery_summary(found))
         show_files({"Results": out / "discovery.json", "Model": out / "model.json"})

@@ -9,8 +9,8 @@ from rigsight.compare import Comparison
 from rigsight.diagnose.result import Diagnosis
 from rigsight.discover import Discovery
 from rigsight.identify.identification import Identification
+from rigsight.plot import with_unit
 from rigsight.report.comparison import comparison_view
-from rigsight.report.discovery import discovery_rows
 from rigsight.report.identification import (
     ERROR_HEADS,
     HEADING,
@@ -19,10 +19,9 @@ from rigsight.report.identification import (
     estimate_cell,
     hysteresis_rows,
     joint_rows,
-    unit_in_brackets,
 )
 from rigsight.report.render import environment
-from rigsight.report.terminal import diagnosis_rows
+from rigsight.report.terminal import diagnosis_rows, discovery_rows
 from rigsight.report.trust import trust_line
 from rigsight.report.wording import (
     advice_sentences,
@@ -70,7 +69,7 @@ def identification_html(identification: Identification) -> str:
             tuple(amplitude_row(identification, records)),
             *(
                 (
-                    f"{name}{unit_in_brackets(identification.units.get(name, ''))}",
+                    with_unit(name, identification.units.get(name, "")),
                     *(estimate_cell(record, name) for record in records),
                 )
                 for name in names

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rigsight import plot
@@ -12,8 +11,8 @@ from rigsight.diagnose.trust.patterns import Pattern
 from rigsight.diagnose.trust.result import ParameterTrust
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
 from rigsight.errors import InputError
-from rigsight.report.drawing.figures import PageFigure, page_figure
-from rigsight.report.quantities import Written, written
+from rigsight.report.figures import page_figure
+from rigsight.report.quantities import written
 from rigsight.report.wording import sentence_case
 
 if TYPE_CHECKING:
@@ -23,37 +22,19 @@ TRUST_COLUMNS = ("parameter", "by", "group", "value", "std", "unit", "pattern", 
 """Columns of the table."""
 _BY = {PORTION: "part of the records", WINDOW_LENGTH: "window length"}
 _MOST_PANELS = 6
-_TOLD_IN_A_LINE = 3
+_NAMED_IN_A_LINE = 3
 
 
-@dataclass(frozen=True)
-class TrustRow:
-    """One number in the table of the report."""
+def trust_view(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """Return figure and rows of the section; None where the question was not asked.
 
-    name: str
-    number: Written
-    unit: str
-    same: str
-    p_value: str
-    points_to: str
-
-
-@dataclass(frozen=True)
-class TrustView:
-    """The section of the report; `figure` is None where no number was estimated in two groups."""
-
-    statement: str
-    figure: PageFigure | None
-    rows: tuple[TrustRow, ...]
-
-
-def trust_view(diagnosis: Diagnosis) -> TrustView | None:
-    """Return what the section shows; None where the question was not asked."""
+    There is no figure where no number was estimated in two groups.
+    """
     if diagnosis.trust is None:
         return None
     figure = None
-    if _drawn(diagnosis):
-        reported = "; ".join(f"{n.name}: {_how(n)}" for n in _drawn(diagnosis))
+    if drawn := _drawn(diagnosis):
+        reported = "; ".join(f"{number.name}: {_how(number)}" for number in drawn)
         figure = page_figure(
             trust_drawing(diagnosis),
             "figure-trust",
@@ -61,7 +42,7 @@ def trust_view(diagnosis: Diagnosis) -> TrustView | None:
             "Each parameter as estimated from one record, level or window alone, with 95 % intervals. Dashed line with band: the "
             "common fit.",
         )
-    return TrustView(diagnosis.trust.statement, figure, tuple(map(_row, diagnosis.trust.parameters)))
+    return {"figure": figure, "rows": [_row(number) for number in diagnosis.trust.parameters]}
 
 
 def trust_drawing(diagnosis: Diagnosis) -> Figure:
@@ -91,7 +72,7 @@ def trust_line(diagnosis: Diagnosis) -> str:
     differing = [number for number in diagnosis.trust.parameters if not number.stable]
     if not differing:
         return f"Trust: {diagnosis.trust.statement}"
-    reported = [f"{number.name} {_how(number)}" for number in differing[:_TOLD_IN_A_LINE]]
+    reported = [f"{number.name} {_how(number)}" for number in differing[:_NAMED_IN_A_LINE]]
     more = len(differing) - len(reported)
     rest = f"; {more} more {'differs' if more == 1 else 'differ'}" if more > 0 else ""
     first = differing[0].points_to
@@ -103,16 +84,8 @@ def trust_rows(diagnosis: Diagnosis) -> Iterator[dict[str, Any]]:
     for number in () if diagnosis.trust is None else diagnosis.trust.parameters:
         for kind, groups in number.groups.items():
             for one in groups:
-                row = (
-                    number.name,
-                    kind,
-                    one.group,
-                    one.value,
-                    one.std,
-                    number.unit,
-                    str(number.pattern),
-                    number.p_value,
-                )
+                estimate = (number.name, kind, one.group, one.value, one.std, number.unit)
+                row = (*estimate, str(number.pattern), number.p_value)
                 yield dict(zip(TRUST_COLUMNS, row, strict=True))
 
 
@@ -146,17 +119,14 @@ def _how(number: ParameterTrust) -> str:
     return f"{number.moves} with {' and '.join(number.goes_with)}"
 
 
-def _row(number: ParameterTrust) -> TrustRow:
-    reported = number.points_to
-    return TrustRow(
-        name=number.name,
-        number=written(number.value, number.std),
-        unit=number.unit,
-        same=sentence_case(_how(number)),
-        p_value=""
-        if number.pattern is Pattern.UNKNOWN
-        else f"{number.p_value:.2g}"
-        if number.p_value > 1e-6
-        else "< 1e-6",
-        points_to="" if reported is None else f"{sentence_case(reported.cause)}. Next: {reported.experiment}",
-    )
+def _row(number: ParameterTrust) -> dict[str, Any]:
+    p_value = f"{number.p_value:.2g}" if number.p_value > 1e-6 else "< 1e-6"
+    found = number.points_to
+    return {
+        "name": number.name,
+        "number": written(number.value, number.std),
+        "unit": number.unit,
+        "same": sentence_case(_how(number)),
+        "p_value": "" if number.pattern is Pattern.UNKNOWN else p_value,
+        "cause": "" if found is None else f"{sentence_case(found.cause)}. Next: {found.experiment}",
+    }

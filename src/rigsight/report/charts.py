@@ -14,7 +14,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report.drawing.figures import PageFigure
+from rigsight.report.figures import PageFigure
 from rigsight.report.wording import stage_names
 
 _DIGITS = 5
