@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, get_args
 
-from rigsight.api.choice import check_unused, named
-from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.tables import data_frame
+from rigsight.api.base import CampaignEstimator, Result, campaign_of
 from rigsight.campaign import Campaign
 from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.location.trace import STAGES
@@ -134,8 +132,8 @@ class Diagnoser(CampaignEstimator):
 
 
 @dataclass(frozen=True)
-class DiagnosisResult(Diagnosis):
-    """The result of a diagnosis, as it is in ``diagnosis.json``, with plots, tables and files.
+class DiagnosisResult(Result, Diagnosis):
+    """The result of a diagnosis, as it is in ``diagnosis.json``; saved with ``model.json`` and ``report.html``.
 
     Attributes
     ----------
@@ -199,15 +197,15 @@ class DiagnosisResult(Diagnosis):
             If there is no such picture, record or output, or no parameter was estimated by record.
         """
         check_option("The picture", picture, get_args(Picture))
-        check_unused("record", picture, record=record, output=output)
+        self._check_unused("record", picture, record=record, output=output)
         if picture == "gap":
             return budget_drawing(self)
         if picture == "candidates":
             return ranking_drawing(self)
         if picture == "trust":
             return trust_drawing(self)
-        trace = named("record", record, {trace.record: trace for trace in self.traces})
-        name = named("output", output, {name: name for name in trace.measured})
+        trace = self._chosen("record", record, {trace.record: trace for trace in self.traces})
+        name = self._chosen("output", output, {name: name for name in trace.measured})
         return record_drawing(self, trace, name)
 
     def to_dataframe(self, table: Table = "candidates") -> pd.DataFrame:
@@ -229,7 +227,7 @@ class DiagnosisResult(Diagnosis):
         check_option("The table", table, get_args(Table))
         if table == "gap":
             columns = (*STAGES, "noise_floor", "closed")
-            return data_frame(
+            return self._frame(
                 (
                     {"output": output, **{column: getattr(gap, column) for column in columns}}
                     for output, gap in self.gap.items()
@@ -237,17 +235,17 @@ class DiagnosisResult(Diagnosis):
                 ("output", *columns),
             )
         if table == "trust":
-            return data_frame(trust_rows(self), tuple(TRUST_COLUMNS))
+            return self._frame(trust_rows(self), tuple(TRUST_COLUMNS))
         if table == "parameters":
             best = named_candidate(self)
-            return data_frame(
+            return self._frame(
                 (
                     {"parameter": name, "value": number.value, "std": number.std, "unit": number.unit}
                     for name, number in (best.parameters if best is not None else {}).items()
                 ),
                 ("parameter", "value", "std", "unit"),
             )
-        return data_frame(
+        return self._frame(
             (
                 {
                     "effects": ", ".join(candidate.effects),
@@ -261,21 +259,5 @@ class DiagnosisResult(Diagnosis):
             ("effects", "probability", "error_over_noise"),
         )
 
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``diagnosis.json``, ``model.json`` and ``report.html`` into a folder, all or none.
-
-        Parameters
-        ----------
-        folder
-            Made if it does not exist; files of these names are replaced.
-
-        Returns
-        -------
-        The files written.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        return write_diagnosis(self, Path(folder), self.made_by, self.seed, self.own_effects)
+    def _write(self, folder: Path) -> tuple[Path, ...]:
+        return write_diagnosis(self, folder, self.made_by, self.seed, self.own_effects)

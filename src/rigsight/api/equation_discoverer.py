@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
-from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.tables import data_frame
+from rigsight.api.base import CampaignEstimator, Result, campaign_of
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery
 from rigsight.errors import check_option
@@ -129,19 +128,8 @@ class EquationDiscoverer(CampaignEstimator):
         return self
 
 
-class DiscoveryResult(Discovery):
-    """The result of a discovery, as it is in ``discovery.json``, with plots, tables and files."""
-
-    @classmethod
-    def of(cls, found: Discovery) -> Self:
-        """Return a discovery of any origin, for instance of `run_discover`, with plots, tables and files.
-
-        Parameters
-        ----------
-        found
-            The discovery.
-        """
-        return cls(**vars(found))
+class DiscoveryResult(Result, Discovery):
+    """The result of a discovery, as it is in ``discovery.json``; saved with ``model.json`` and ``discovery.svg``."""
 
     def __repr__(self) -> str:
         return f"DiscoveryResult({self.title!r}, equations={self.equations!r})"
@@ -175,7 +163,7 @@ class DiscoveryResult(Discovery):
         """
         check_option("The table", table, get_args(Table))
         if table == "terms":
-            return data_frame(
+            return self._frame(
                 (
                     {"term": t.name, "kept": t.kept, "inclusion": t.inclusion, "doubt": t.doubt}
                     for t in self.terms
@@ -184,7 +172,7 @@ class DiscoveryResult(Discovery):
             )
         if table == "alternatives":
             columns = ("n_parameters", "held_out", "aic", "bic")
-            return data_frame(
+            return self._frame(
                 (
                     {
                         "terms": ", ".join(other.terms),
@@ -194,7 +182,7 @@ class DiscoveryResult(Discovery):
                 ),
                 ("terms", *columns),
             )
-        return data_frame(self._coefficient_rows(), ("coefficient", "value", "std", "unit"))
+        return self._frame(self._coefficient_rows(), ("coefficient", "value", "std", "unit"))
 
     def _coefficient_rows(self) -> Iterator[dict[str, Any]]:
         found = dict(self.rig_parameters)
@@ -203,21 +191,5 @@ class DiscoveryResult(Discovery):
         for name, number in found.items():
             yield {"coefficient": name, "value": number.value, "std": number.std, "unit": number.unit}
 
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``discovery.json``, ``model.json`` and ``discovery.svg`` into a folder, all or none.
-
-        Parameters
-        ----------
-        folder
-            Made if it does not exist; files of these names are replaced.
-
-        Returns
-        -------
-        The files written.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        return write_discovery(self, Path(folder))
+    def _write(self, folder: Path) -> tuple[Path, ...]:
+        return write_discovery(self, folder)

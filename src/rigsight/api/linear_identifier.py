@@ -6,9 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
-from rigsight.api.choice import check_unused, named
-from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.tables import data_frame
+from rigsight.api.base import CampaignEstimator, Result, campaign_of
 from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, check_option
@@ -126,19 +124,8 @@ class LinearIdentifier(CampaignEstimator):
         return self
 
 
-class IdentificationResult(Identification):
-    """The result of an identification, as it is in ``identification.json``, with plots, tables and files."""
-
-    @classmethod
-    def of(cls, found: Identification) -> Self:
-        """Return an identification of any origin, for instance of `run_identify`, with plots, tables and files.
-
-        Parameters
-        ----------
-        found
-            The identification.
-        """
-        return cls(**vars(found))
+class IdentificationResult(Result, Identification):
+    """The result of an identification, as it is in ``identification.json``; saved with ``model.json`` and the figures."""
 
     def __repr__(self) -> str:
         return (
@@ -169,13 +156,15 @@ class IdentificationResult(Identification):
             If there is no such picture or record, or the records do not show what is to be drawn.
         """
         check_option("The picture", picture, get_args(Picture))
-        check_unused("bode", picture, record=record)
+        self._check_unused("bode", picture, record=record)
         if picture == "amplitudes":
             drawing = amplitudes_figure(self)
         elif picture == "responses":
             drawing = responses_figure(self)
         else:
-            drawing = bode_figure(named("record", record, {r.record.name: r for r in self.records}), self)
+            drawing = bode_figure(
+                self._chosen("record", record, {r.record.name: r for r in self.records}), self
+            )
         if drawing is None:
             raise InputError(
                 f"The picture '{picture}' would be empty: no sweep or multisine gave a response, or no fit succeeded. See the "
@@ -199,8 +188,8 @@ class IdentificationResult(Identification):
         check_option("The table", table, get_args(Table))
         columns = ("parameter", "value", "std", "unit")
         if table == "joint":
-            return data_frame(self._joint_rows(), columns)
-        return data_frame(self._record_rows(), ("record", "amplitude", *columns))
+            return self._frame(self._joint_rows(), columns)
+        return self._frame(self._record_rows(), ("record", "amplitude", *columns))
 
     def _record_rows(self) -> Iterator[dict[str, Any]]:
         for record in self.records:
@@ -219,21 +208,5 @@ class IdentificationResult(Identification):
         for name, (value, std) in found.items():
             yield {"parameter": name, "value": value, "std": std, "unit": self.units.get(name, "")}
 
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``identification.json``, ``model.json`` and the figures into a folder, all or none.
-
-        Parameters
-        ----------
-        folder
-            Made if it does not exist; files of these names are replaced.
-
-        Returns
-        -------
-        The files written.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        return write_identification(self, Path(folder))
+    def _write(self, folder: Path) -> tuple[Path, ...]:
+        return write_identification(self, folder)

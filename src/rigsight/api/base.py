@@ -1,16 +1,16 @@
-"""Base of all estimators: settings in the constructor, `fit` on a campaign, a model that predicts."""
+"""Base of all estimators, which predict with a fitted model, and of all results, which are drawn, tabulated and saved."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
 from sklearn.utils.validation import check_is_fitted
 
 from rigsight.campaign import Campaign
 from rigsight.effects import Effect
-from rigsight.errors import InputError
+from rigsight.errors import InputError, check_option
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig, rotational
 from rigsight.simulate.model import Model
@@ -19,6 +19,7 @@ from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.simulate import simulate_model
 
 if TYPE_CHECKING:
+    import pandas as pd
 
     class BaseEstimator:
         """The used part of scikit-learn's base class, which is untyped: with it, misspelled attributes would go unnoticed."""
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 else:
     from sklearn.base import BaseEstimator
+
+T = TypeVar("T")
 
 
 class CampaignEstimator(BaseEstimator):
@@ -73,30 +76,72 @@ class CampaignEstimator(BaseEstimator):
         check_is_fitted(self)
         return simulate_model(self.model_, record, initial_state)
 
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the settings by name, as scikit-learn does.
+
+class Result:
+    """Base of results, which a command leaves as files: they are drawn, tabulated and saved."""
+
+    @classmethod
+    def of(cls, found: Any) -> Self:
+        """Return a result of any origin, for instance of `run_identify`, with plots, tables and files.
 
         Parameters
         ----------
-        deep
-            Ignored: no setting is an estimator.
+        found
+            The result.
         """
-        return super().get_params(deep)
+        return cls(**vars(found))
 
-    def set_params(self, **params: Any) -> Self:
-        """Change settings and return the estimator; it must be fitted again.
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write the files of the command of this result into a folder, all or none.
 
         Parameters
         ----------
-        **params
-            Settings by name.
+        folder
+            Made if it does not exist; files of these names are replaced.
+
+        Returns
+        -------
+        The files written.
 
         Raises
         ------
-        ValueError
-            If there is no such setting.
+        InputError
+            If they cannot be written.
         """
-        return super().set_params(**params)
+        return self._write(Path(folder))
+
+    def _write(self, folder: Path) -> tuple[Path, ...]:
+        raise NotImplementedError
+
+    @staticmethod
+    def _chosen(what: str, name: str | None, known: Mapping[str, T]) -> T:
+        """Return the item of a kind with this name, the first one for None."""
+        if not known:
+            raise InputError(f"The result contains no {what} to show.")
+        return next(iter(known.values())) if name is None else known[check_option(f"The {what}", name, known)]
+
+    @staticmethod
+    def _check_unused(needed: str, picture: str, **given: str | None) -> None:
+        """Refuse choices, None where not made, that only the picture `needed` shows."""
+        chosen = [name for name, value in given.items() if value is not None]
+        if chosen and picture != needed:
+            raise InputError(
+                f"{' and '.join(chosen)} can be chosen only for the picture '{needed}', not for '{picture}'. Leave it out."
+            )
+
+    @staticmethod
+    def _frame(rows: Iterable[Mapping[str, Any]], columns: Iterable[str]) -> pd.DataFrame:
+        """Return rows as a table with these columns first; columns that only some rows have follow."""
+        # Pandas is optional, and only loaded where a table is asked for.
+        try:
+            import pandas as pd
+        except ImportError:
+            raise InputError(
+                'Tables need pandas, which is not installed: pip install "rigsight[notebook]"'
+            ) from None
+        found = [dict(row) for row in rows]
+        names = dict.fromkeys([*columns, *(name for row in found for name in row)])
+        return pd.DataFrame(found, columns=list(names))
 
 
 def campaign_of(
