@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.compare.comparison import Competitor, Failure, RecordComparison
-from rigsight.compare.floor import Floor
 from rigsight.compare.response_error import (
     ResponseError,
     SignalPath,
@@ -21,7 +20,7 @@ from rigsight.compare.response_error import (
     simulated_response,
     without_shares,
 )
-from rigsight.compare.score import Column, Score
+from rigsight.compare.score import Column, Floor, Score
 from rigsight.compare.step_error import DEFAULT_SECONDS, StepWindow, step_window, stepping_input
 from rigsight.errors import InputError, SimulationError
 from rigsight.frequency import FrequencyResponse
@@ -167,18 +166,14 @@ def _trial(
     for floor in yardstick.floors:
         if floor.output not in record:
             continue
-        spread = float(np.std(record[floor.output]))
-        column = Column("free_run_nrmse", floor.output, "1")
-        own = floor.std / spread if spread > 0.0 else None
-        trial.add(column, run.nrmse[floor.output], own, record.n_samples)
+        output, spread = floor.output, float(np.std(record[floor.output]))
+        least_nrmse = floor.std / spread if spread > 0.0 else None
+        trial.add(Column("free_run_nrmse", output, "1"), run.nrmse[output], least_nrmse, record.n_samples)
         if step is not None:
-            simulated = run.simulated[floor.output]
-            trial.moved[floor.output] = step.moved(simulated)
-            remainder = step.error(record[floor.output], simulated)
-            n_inside = step.inside.stop - step.inside.start
-            trial.add(
-                Column("step_rmse", floor.output, floor.unit), remainder, step.floor(floor.std), n_inside
-            )
+            simulated = run.simulated[output]
+            trial.moved[output] = step.moved(simulated)
+            error, n_inside = step.error(record[output], simulated), step.inside.stop - step.inside.start
+            trial.add(Column("step_rmse", output, floor.unit), error, step.floor(floor.std), n_inside)
     return trial
 
 

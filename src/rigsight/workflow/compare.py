@@ -12,7 +12,7 @@ from joblib import Parallel, delayed
 
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_on_record
-from rigsight.compare.comparison_files import comparison_csv, comparison_json
+from rigsight.compare.comparison import comparison_csv, comparison_json
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
