@@ -16,8 +16,7 @@ from pathlib import Path
 import pytest
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.workflow.run.progress import Stage
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import Stage, listening
 from rigsight.workflow.run.results import write_together
 
 RIGSIGHT = Path(sys.executable).with_name("rigsight")

@@ -15,7 +15,7 @@ from rigsight.report.notebook import comparison_html
 from rigsight.simulate.model import Model
 from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig, write_comparison
 from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -24,7 +24,7 @@ from rigsight.workflow.campaign.in_memory import effects_of
 from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.diagnose import diagnose_campaign, write_diagnosis
 from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     import pandas as pd

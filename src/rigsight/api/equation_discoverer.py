@@ -17,7 +17,7 @@ from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.discover import discover_campaign, write_discovery
 from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     import pandas as pd

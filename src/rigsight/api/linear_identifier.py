@@ -19,7 +19,7 @@ from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.identification.figures import amplitudes_figure, bode_figure, responses_figure
 from rigsight.workflow.identify import checked_options, identify_campaign, write_identification
 from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,7 +10,7 @@ import typer
 from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Campaign, Debug, Jobs, Json, OwnRigs, Quiet, ResultsFolder, Seed, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 
 def discover(

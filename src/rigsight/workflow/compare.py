@@ -27,10 +27,9 @@ from rigsight.simulate.drift import can_drift
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.run.json_file import versions
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent
-from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 
 COMPARISON_FILE, TABLE_FILE, PAGE_FILE = "comparison.json", "comparison.csv", "comparison.html"
 COMPARING = "Comparing"

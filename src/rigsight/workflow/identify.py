@@ -43,10 +43,9 @@ from rigsight.workflow.identification.warnings import (
     out_of_band,
 )
 from rigsight.workflow.own.effect_names import effects_on
-from rigsight.workflow.run.json_file import versions
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent, tell
-from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 
 IDENTIFICATION_FILE = "identification.json"
 PAGE_FILE = "identification.html"

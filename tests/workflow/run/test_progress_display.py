@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.workflow.run.progress import Step, tell
-from rigsight.workflow.run.progress_display import log_lines
+from rigsight.workflow.run.progress import Step, log_lines, tell
 
 
 def test_a_remark_is_no_work(capsys: pytest.CaptureFixture[str]) -> None:
