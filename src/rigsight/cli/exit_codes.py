@@ -35,7 +35,7 @@ GOES_ON = f"{_NOTHING}; the same command continues from there"
 
 
 @contextlib.contextmanager
-def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
+def report_errors(debug: bool, outcome: str = _NOTHING) -> Iterator[None]:
     """Map errors of a command to one message on stderr and an exit code."""
     if debug:
         yield
@@ -49,15 +49,15 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
         except RigsightError as error:
             leave(str(error), BAD_INPUT, isinstance(error, MachineError))
         except KeyboardInterrupt as error:
-            if written and left.startswith(_NOTHING):
-                left = f"the results in {_named(written)} are complete"
-            leave(f"interrupted; {left}.", exit_code(error))
+            if written and outcome.startswith(_NOTHING):
+                outcome = f"the results in {_named(written)} are complete"
+            leave(f"interrupted; {outcome}.", exit_code(error))
         except BrokenPipeError:
             raise
         except OSError as error:
             if error.errno in _OF_THE_SESSION:
                 leave(
-                    f"a resource limit of this session was reached: {error.strerror}. Raise it (ulimit -a lists them); {left}.",
+                    f"a resource limit of this session was reached: {error.strerror}. Raise it (ulimit -a lists them); {outcome}.",
                     BAD_INPUT,
                     is_of_the_machine=True,
                 )
@@ -70,13 +70,13 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
             # Result files have messages of their own; here remain input files and temporary files.
             if error.errno in (errno.EACCES, errno.EPERM) and error.filename:
                 leave(
-                    f"no permission to read or write {error.filename}. Change its permissions; {left}.",
+                    f"no permission to read or write {error.filename}. Change its permissions; {outcome}.",
                     BAD_INPUT,
                 )
             place = f" ({error.filename})" if error.filename else ""
             leave(
                 f"a temporary file or the output cannot be written{place}: {error.strerror}. Free disk space, or set TMPDIR to a "
-                f"writable folder; {left}.",
+                f"writable folder; {outcome}.",
                 BAD_INPUT,
                 is_of_the_machine=True,
             )

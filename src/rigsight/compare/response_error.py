@@ -37,7 +37,7 @@ _PER_NEPER = 20.0 / math.log(10.0)
 
 @dataclass(frozen=True)
 class SignalPath:
-    """A source and the signal that answers it."""
+    """A source and the signal that responds to it."""
 
     # Names of the signals.
     source: str

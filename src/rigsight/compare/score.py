@@ -41,7 +41,7 @@ class Score:
     record: str
     column: Column  # what was compared
     value: float  # the error in the column's unit
-    # What noise alone makes of it, in the same unit; None where the record does not tell.
+    # What noise alone makes of it, in the same unit; None where the record does not show it.
     noise_floor: float | None
     n_values: int  # lines or samples that the error is of
 
@@ -70,7 +70,7 @@ class Floor:
         power = np.zeros_like(frequency)
         for samples, step in pieces:
             known, density = welch(samples, 1.0 / step, nperseg=min(_SEGMENT, samples.size))
-            # Welch's method takes the mean away with the first lines; what is slower is as strong as the slowest it tells.
+            # Welch's method takes the mean away with the first lines; what is slower is as strong as the slowest it gives.
             power += samples.size * np.interp(frequency, known[1:], density[1:])
         colored = np.fft.irfft(np.sqrt(power) * np.fft.rfft(white), n_samples)
         return np.asarray(self.std * colored / np.std(colored))

@@ -38,7 +38,7 @@ SPARE = 6
 _CHUNK = 4096
 _RANK = 1e-11
 """Relative singular value below which two terms of a local model are the same."""
-_ANSWERS = 10.0
+_RESPONDS = 10.0
 """Power over variance (10 dB) required of the source's response to an instrument, at lines with half of the instrument's power;
 by chance one line in 500 reaches it."""
 
@@ -239,9 +239,9 @@ def _local_response(
         parts = [_solve(U, Y, chunk, model) for chunk in chunks]
     else:
         ratios = [_solve_ratio(R, U, Y, chunk, model) for chunk in chunks]
-        answers = np.concatenate([clearness for *_, clearness in ratios]) >= _ANSWERS
+        responds = np.concatenate([clearness for *_, clearness in ratios]) >= _RESPONDS
         power = np.abs(R[lines]) ** 2
-        if power @ answers < 0.5 * np.sum(power):
+        if power @ responds < 0.5 * np.sum(power):
             raise InputError(
                 f"{what}: the source '{source}' is not correlated with the instrument '{instrument}'."
             )

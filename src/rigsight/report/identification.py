@@ -97,7 +97,7 @@ def _amplitude_tables(found: Identification, text: Writer, width: int) -> Iterat
 
 
 def amplitude_row(found: Identification, records: Sequence[RecordIdentification]) -> list[str]:
-    """Return the head and the cells of the amplitudes of records; the unit stands once, or in each cell where sources differ."""
+    """Return head and cells of the amplitudes of records; the unit is in the head, or in each cell where sources differ."""
     units = [found.units.get(record.source, "") for record in records]
     if len({found.units.get(record.source, "") for record in found.records}) == 1:
         return [with_unit("amplitude", units[0]), *(f"{record.amplitude:.4g}" for record in records)]

@@ -170,7 +170,7 @@ def known_effects(own: Iterable[Effect] = ()) -> dict[str, Effect]:
 def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[EquationGroup]:
     """Return the equations of the rig, then those of each effect of the diagnosed simulation, in the order of the signal path."""
     rig = rig_of(diagnosis)
-    # What the given simulation had already stands in the model beside what was added.
+    # What the given simulation had already is in the model beside what was added.
     names = dict.fromkeys([*diagnosis.model.get("effects", ()), *diagnosis.effects])
     effects = [effect_of(name, known) for name in names]
     named = [effect for effect in effects if effect is not None]

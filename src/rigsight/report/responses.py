@@ -117,7 +117,9 @@ def response_chart(record: str, response: PathResponse, names: Mapping[str, str]
     path = response.path.replace("->", "\u2192")
     stages = [stage for stage in STAGES if stage in names and stage in response.simulated]
     errors = [f"{names[stage]} {response.decibel[stage]:.2g} dB" for stage in stages]
-    said = f" RMS distance of the magnitudes from the measured ones: {', '.join(errors)}." if errors else ""
+    distances = (
+        f" RMS distance of the magnitudes from the measured ones: {', '.join(errors)}." if errors else ""
+    )
     measured = thinned(response.measured)
     phase = np.degrees(np.unwrap(np.angle(measured.values)))
     magnitudes = [Curve("measured", names["measured"], measured.magnitude_db)]
@@ -139,7 +141,7 @@ def response_chart(record: str, response: PathResponse, names: Mapping[str, str]
     return Chart(
         key,
         chart_data(title, "angular frequency [rad/s]", measured.omega, panels, log=True),
-        f"Frequency response {path}, measured and simulated by the same estimator.{said}",
+        f"Frequency response {path}, measured and simulated by the same estimator.{distances}",
     )
 
 

@@ -94,8 +94,8 @@ def summary(diagnosis: Diagnosis) -> Summary:
         yield text(verdict_sentence(diagnosis))
         for sentence in fault_sentences(diagnosis)[:_FAULTS]:
             yield text(sentence, "bold yellow")
-        for said in (remainder_sentence, missing_force_sentence, trust_line, ambiguity_sentence):
-            if sentence := said(diagnosis):
+        for sentence_of in (remainder_sentence, missing_force_sentence, trust_line, ambiguity_sentence):
+            if sentence := sentence_of(diagnosis):
                 yield text(sentence)
         for sentence in advice_sentences(diagnosis)[:_ADVICES]:
             yield text(sentence)

@@ -28,7 +28,7 @@ from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.effect_names import effects_on
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
-from rigsight.workflow.run.progress import Listener, Stage, Step, silent, tell
+from rigsight.workflow.run.progress import Listener, Stage, Step, report_notes, silent
 from rigsight.workflow.run.results import (
     DIAGNOSIS_FILE,
     REPORT_FILE,
@@ -82,7 +82,7 @@ def diagnose_campaign(
     keep: Callable[[Diagnosis], None] | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between the simulation that a campaign gives and its records."""
-    tell(campaign.notes, listener)
+    report_notes(campaign.notes, listener)
     # An effect without a place is skipped if it does not apply; a place that was named must exist.
     named = [effect for effect in effects if effect.at is None] + [
         *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
@@ -94,7 +94,7 @@ def diagnose_campaign(
     journal = (
         contextlib.nullcontext()
         if campaign.path is None
-        else FitJournal(campaign.path, lambda count: _tell_going_on(count, listener))
+        else FitJournal(campaign.path, lambda count: _report_continuation(count, listener))
     )
     # Candidates are fitted in parallel; multithreaded matrix products would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"), journal as memory:
@@ -112,7 +112,7 @@ def diagnose_campaign(
         return diagnosis
 
 
-def _tell_going_on(count: int, listener: Listener) -> None:
+def _report_continuation(count: int, listener: Listener) -> None:
     """Report that an interrupted diagnosis is continued; its results are the same and do not mention it."""
     stage = f"Continuing: {count} fit{'' if count == 1 else 's'} done before the interruption"
     listener(Step(stage, "", 0, count))

@@ -1,4 +1,4 @@
-"""The allowed contents of a `campaign.toml`, where its keys stand, and the messages for what is not allowed."""
+"""The allowed contents of a `campaign.toml`, where its keys are, and the messages for what is not allowed."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def locate(campaign: Path) -> Path:
 
 
 def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
-    """Return the checked contents of a campaign file, and where its keys stand."""
+    """Return the checked contents of a campaign file, and where its keys are."""
     try:
         if file_size(path, "the campaign.toml") > LARGEST_FILE:
             raise InputError(
@@ -155,14 +155,14 @@ def _messages(
     """Return one line per error; if one alternative fails in detail, the errors of the other alternatives are left out."""
     keys = [_without_union_members(problem["loc"], data) for problem in problems]
     reported = [
-        _tell(where, data, table, problem)
+        _message(where, data, table, problem)
         for problem, key in zip(problems, keys, strict=True)
         if not any(len(other) > len(key) and other[: len(key)] == key for other in keys)
     ]
     return list(dict.fromkeys(reported))
 
 
-def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
+def _message(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
     location = _without_union_members(problem["loc"], data)
     if not location:
         # Only a key with an unpaired surrogate has no location.

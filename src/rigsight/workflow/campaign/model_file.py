@@ -118,12 +118,12 @@ def _checked_table(path: Path, data: dict[str, Any]) -> ModelTable:
     try:
         return ModelTable.model_validate(data)
     except ValidationError as error:
-        reported = [_tell(path, problem) for problem in map(dict, error.errors(include_url=False))]
+        reported = [_message(path, problem) for problem in map(dict, error.errors(include_url=False))]
         more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
         raise InputError("\n".join(reported[:5]) + more) from None
 
 
-def _tell(path: Path, problem: dict[str, Any]) -> str:
+def _message(path: Path, problem: dict[str, Any]) -> str:
     key = ".".join(map(str, problem["loc"]))
     start, kind, got = f"{path.name}: {key}: ", problem["type"], problem["input"]
     if kind == "extra_forbidden":

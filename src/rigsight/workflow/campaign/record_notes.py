@@ -140,9 +140,9 @@ def _gain(record: Record, source: str, response: str) -> _Gain | None:
         return None
     length = max(record.n_samples // _SEGMENTS, min(record.n_samples, 64))
     f, driving = welch(record[source], 1.0 / record.dt, nperseg=length)
-    _, answer = welch(record[response], 1.0 / record.dt, nperseg=length)
-    driven = (driving > _DRIVEN * np.max(driving[1:], initial=0.0)) & (f > 0.0) & (answer > 0.0)
-    return (f[driven], np.sqrt(answer[driven] / driving[driven])) if driven.any() else None
+    _, responding = welch(record[response], 1.0 / record.dt, nperseg=length)
+    driven = (driving > _DRIVEN * np.max(driving[1:], initial=0.0)) & (f > 0.0) & (responding > 0.0)
+    return (f[driven], np.sqrt(responding[driven] / driving[driven])) if driven.any() else None
 
 
 def _ratio(one: _Gain, other: _Gain) -> float:

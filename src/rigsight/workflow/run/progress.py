@@ -33,7 +33,7 @@ def silent(step: Step) -> None:
     """Ignore a step."""
 
 
-def tell(remarks: Iterable[str], listener: Listener) -> None:
+def report_notes(remarks: Iterable[str], listener: Listener) -> None:
     """Pass a note to a listener early, while the user can still stop."""
     for remark in remarks:
         listener(Step(remark, "", 0, 0))
