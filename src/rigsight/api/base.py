@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 from sklearn.utils.validation import check_is_fitted
 
 from rigsight.campaign import Campaign
-from rigsight.effects import Effect
+from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, check_option
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig, rotational
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.in_memory import make_campaign, rig_of
+from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress import Listener, listening
 from rigsight.workflow.simulate import simulate_model
 
 if TYPE_CHECKING:
@@ -46,6 +49,52 @@ class CampaignEstimator(BaseEstimator):
     """
 
     model_: Model
+    n_jobs: int | None
+    verbose: bool
+    rig: str | Rig | None
+
+    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
+        """Fit the model to the estimation records of a campaign; its validation records are only scored.
+
+        Parameters
+        ----------
+        campaign
+            A campaign, the toml file or the folder that contains one, or records of `rig`.
+
+        Returns
+        -------
+        The estimator itself.
+
+        Raises
+        ------
+        InputError
+            If the campaign or a setting cannot be used, an effect is unknown, or the records do not show what is to be found.
+        SimulationError
+            If the given simulation, or the rig's own equations, cannot be simulated near the records.
+        """
+        self._check_settings()
+        jobs = checked_jobs(self.n_jobs)
+        own = self._own_effects()
+        read = campaign_of(campaign, own, rig=self.rig)
+        with listening(quiet=not self.verbose) as listener:
+            found = self._fit(read, jobs, listener)
+        self.model_ = model_of(found.model, (*own, *read.modelled))
+        return self
+
+    def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> Any:
+        """Keep the result as an attribute, and return it."""
+        raise NotImplementedError
+
+    def _check_settings(self) -> None:
+        """Refuse settings that no campaign can be fitted with."""
+
+    def _effects(self) -> Sequence[Effect]:
+        """Return the effects that a fit takes."""
+        return ()
+
+    def _own_effects(self) -> list[Effect]:
+        """Return those of them that are not of the catalogue."""
+        return [effect for effect in self._effects() if effect not in CATALOGUE]
 
     def predict(
         self, record: Record, initial_state: Mapping[str, float] | Literal["estimated"] | None = None

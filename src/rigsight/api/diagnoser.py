@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, get_args
 
-from rigsight.api.base import CampaignEstimator, Result, campaign_of
+from rigsight.api.base import CampaignEstimator, Result
 from rigsight.campaign import Campaign
 from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.location.trace import STAGES
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import check_option
-from rigsight.records import Record
 from rigsight.report.notebook import diagnosis_html
 from rigsight.report.record_views import record_drawing
 from rigsight.report.sections import budget_drawing, ranking_drawing
@@ -21,10 +20,8 @@ from rigsight.report.trust import TRUST_COLUMNS, trust_drawing, trust_rows
 from rigsight.report.wording import named_candidate
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
-from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.diagnose import diagnose_campaign, write_diagnosis
-from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress import listening
+from rigsight.workflow.run.progress import Listener
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,37 +95,18 @@ class Diagnoser(CampaignEstimator):
         self.verbose = verbose
         self.rig = rig
 
-    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
-        """Diagnose the gap between the simulation that a campaign gives and its records.
+    def _effects(self) -> Sequence[Effect]:
+        return CATALOGUE if self.effects is None else effects_of(self.effects)
 
-        Parameters
-        ----------
-        campaign
-            A campaign, the toml file or the folder that contains one, or records of `rig`.
-
-        Returns
-        -------
-        The estimator itself.
-
-        Raises
-        ------
-        InputError
-            If the campaign cannot be used or a candidate is unknown.
-        SimulationError
-            If the given simulation cannot be run.
-        """
-        effects = CATALOGUE if self.effects is None else effects_of(self.effects)
-        own = [effect for effect in effects if effect not in CATALOGUE]
-        jobs = checked_jobs(self.n_jobs)
-        read = campaign_of(campaign, own, rig=self.rig)
-        known = (*own, *read.modelled)
-        with listening(quiet=not self.verbose) as listener:
-            found = diagnose_campaign(read, effects, self.seed, jobs, listener)
+    def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> DiagnosisResult:
+        effects = self._effects()
+        found = diagnose_campaign(campaign, effects, self.seed, n_jobs, listener)
         tried = None if self.effects is None else [effect.name for effect in effects]
         made_by = f"rigsight.Diagnoser(effects={tried}, seed={self.seed}).fit(...)"
-        self.diagnosis_ = DiagnosisResult.of(found, made_by, self.seed, known)
-        self.model_ = model_of(found.model, known)
-        return self
+        self.diagnosis_ = DiagnosisResult.of(
+            found, made_by, self.seed, (*self._own_effects(), *campaign.modelled)
+        )
+        return self.diagnosis_
 
 
 @dataclass(frozen=True)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from rigsight.api.base import CampaignEstimator, Result, campaign_of
+from rigsight.api.base import CampaignEstimator, Result
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery
 from rigsight.errors import check_option
 from rigsight.plot.discovery import discovery_figure
-from rigsight.records import Record
 from rigsight.report.notebook import discovery_html
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.discover import discover_campaign, write_discovery
-from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress import listening
+from rigsight.workflow.run.progress import Listener
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,40 +89,18 @@ class EquationDiscoverer(CampaignEstimator):
         self.verbose = verbose
         self.rig = rig
 
-    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
-        """Discover the equations behind the records of a campaign.
-
-        Parameters
-        ----------
-        campaign
-            A campaign, the toml file or the folder that contains one, or records of `rig`.
-
-        Returns
-        -------
-        The estimator itself.
-
-        Raises
-        ------
-        InputError
-            If the campaign cannot be used or the method is unknown.
-        SimulationError
-            If the rig's own equations cannot be simulated near the records.
-        """
-        jobs = checked_jobs(self.n_jobs)
-        read = campaign_of(campaign, rig=self.rig)
-        with listening(quiet=not self.verbose) as listener:
-            found = discover_campaign(
-                read,
-                self.method,
-                pointwise=self.pointwise,
-                one_by_one=self.one_by_one,
-                seed=self.seed,
-                n_jobs=jobs,
-                listener=listener,
-            )
+    def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> DiscoveryResult:
+        found = discover_campaign(
+            campaign,
+            self.method,
+            pointwise=self.pointwise,
+            one_by_one=self.one_by_one,
+            seed=self.seed,
+            n_jobs=n_jobs,
+            listener=listener,
+        )
         self.discovery_ = DiscoveryResult.of(found)
-        self.model_ = model_of(found.model)
-        return self
+        return self.discovery_
 
 
 class DiscoveryResult(Result, Discovery):

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from rigsight.api.base import CampaignEstimator, Result, campaign_of
+from rigsight.api.base import CampaignEstimator, Result
 from rigsight.campaign import Campaign
-from rigsight.effects import CATALOGUE, Effect
+from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
-from rigsight.records import Record
 from rigsight.report.notebook import identification_html
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
-from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.identification.figures import amplitudes_figure, bode_figure, responses_figure
 from rigsight.workflow.identify import checked_options, identify_campaign, write_identification
-from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress import listening
+from rigsight.workflow.run.progress import Listener
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,34 +91,18 @@ class LinearIdentifier(CampaignEstimator):
         self.effects = effects
         self.seed = seed
 
-    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
-        """Identify the estimation records of a campaign; its validation records are only scored.
+    def _check_settings(self) -> None:
+        checked_options(self.method, self.resolution)
 
-        Parameters
-        ----------
-        campaign
-            A campaign, the toml file or the folder that contains one, or records of `rig`.
+    def _effects(self) -> Sequence[Effect]:
+        return effects_of(self.effects)
 
-        Returns
-        -------
-        The estimator itself.
-
-        Raises
-        ------
-        InputError
-            If the campaign cannot be used, the method is unknown, a record is too short for the requested resolution, no record
-            shows the motion, or an effect is unknown or cannot be calibrated on the rig.
-        """
+    def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> IdentificationResult:
         options = checked_options(self.method, self.resolution)
-        jobs = checked_jobs(self.n_jobs)
-        effects = effects_of(self.effects)
-        own = [effect for effect in effects if effect not in CATALOGUE]
-        read = campaign_of(campaign, own, rig=self.rig)
-        with listening(quiet=not self.verbose) as listener:
-            found = identify_campaign(read, options, jobs, listener, effects=effects, seed=self.seed)
+        effects = self._effects()
+        found = identify_campaign(campaign, options, n_jobs, listener, effects=effects, seed=self.seed)
         self.identification_ = IdentificationResult.of(found)
-        self.model_ = model_of(found.model, (*own, *read.modelled))
-        return self
+        return self.identification_
 
 
 class IdentificationResult(Result, Identification):

@@ -57,7 +57,8 @@ def report_errors(debug: bool, outcome: str = _NOTHING) -> Iterator[None]:
         except OSError as error:
             if error.errno in _OF_THE_SESSION:
                 leave(
-                    f"a resource limit of this session was reached: {error.strerror}. Raise it (ulimit -a lists them); {outcome}.",
+                    f"a resource limit of this session was reached: {error.strerror}. Raise it (ulimit -a lists them); "
+                    f"{outcome}.",
                     BAD_INPUT,
                     is_of_the_machine=True,
                 )

@@ -104,18 +104,7 @@ def local_polynomial_response(
     well, ``transient=False`` is better still; without rest it is biased, and its variance does not show the bias.
     """
     return _local_response(
-        record,
-        source,
-        response,
-        order=order,
-        poles=0,
-        bandwidth=bandwidth,
-        transient=transient,
-        hold=hold,
-        band=band,
-        wanted=wanted,
-        instrument=instrument,
-        method="local polynomial",
+        record, source, response, order, 0, bandwidth, transient, hold, band, wanted, instrument
     )
 
 
@@ -161,18 +150,7 @@ def local_rational_response(
     distinguished, the variance may be several times too small.
     """
     return _local_response(
-        record,
-        source,
-        response,
-        order=order,
-        poles=order,
-        bandwidth=bandwidth,
-        transient=transient,
-        hold=hold,
-        band=band,
-        wanted=wanted,
-        instrument=instrument,
-        method="local rational",
+        record, source, response, order, order, bandwidth, transient, hold, band, wanted, instrument
     )
 
 
@@ -194,7 +172,6 @@ def _local_response(
     record: Record,
     source: str,
     response: str,
-    *,
     order: int,
     poles: int,
     bandwidth: float | None,
@@ -203,8 +180,8 @@ def _local_response(
     band: tuple[float, float] | None,
     wanted: NDArray[np.float64] | None,
     instrument: str | None,
-    method: str,
 ) -> FrequencyResponse:
+    method = "local rational" if poles else "local polynomial"
     if order < 0:
         raise InputError(f"The order of a local model must be 0 or more, got {order}.")
     what = f"Record '{record.name}'"

@@ -14,28 +14,9 @@ from rich.text import Text
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate
 from rigsight.discover import Discovery, JointForce
 from rigsight.discover.result import Term
+from rigsight.report import wording
 from rigsight.report.quantities import estimate_text, gap_percent
 from rigsight.report.trust import trust_line
-from rigsight.report.wording import (
-    TIMES,
-    advice_sentences,
-    ambiguity_sentence,
-    basis_sentence,
-    effects_label,
-    family_label,
-    fault_sentences,
-    forms_label,
-    given_text,
-    missing_force_sentence,
-    named_candidate,
-    percent,
-    remainder_sentence,
-    share_label,
-    stages_reported,
-    verdict_name,
-    verdict_sentence,
-    what_is_probable,
-)
 
 _RANKED = 3
 _ADVICES = 1
@@ -64,7 +45,7 @@ class Summary:
 def plain_text(words: str, encoding: str, style: str = "") -> Text:
     """Return words as a terminal with this encoding can show them, each control character as a question mark."""
     # An escape sequence in somebody's title must not reach the terminal.
-    plain = "".join(c if c.isprintable() else "?" for c in words.replace(TIMES, "x"))
+    plain = "".join(c if c.isprintable() else "?" for c in words.replace(wording.TIMES, "x"))
     return Text(plain.encode(encoding, "replace").decode(encoding), style)
 
 
@@ -90,17 +71,22 @@ def summary(diagnosis: Diagnosis) -> Summary:
     """Return the verdict, the gap, the ranking and the parameters of a diagnosis, in about ten lines."""
 
     def lines(text: Writer, _: int) -> Iterator[RenderableType]:
-        yield text(f"{verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
-        yield text(verdict_sentence(diagnosis))
-        for sentence in fault_sentences(diagnosis)[:_FAULTS]:
+        yield text(f"{wording.verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
+        yield text(wording.verdict_sentence(diagnosis))
+        for sentence in wording.fault_sentences(diagnosis)[:_FAULTS]:
             yield text(sentence, "bold yellow")
-        for sentence_of in (remainder_sentence, missing_force_sentence, trust_line, ambiguity_sentence):
+        for sentence_of in (
+            wording.remainder_sentence,
+            wording.missing_force_sentence,
+            trust_line,
+            wording.ambiguity_sentence,
+        ):
             if sentence := sentence_of(diagnosis):
                 yield text(sentence)
-        for sentence in advice_sentences(diagnosis)[:_ADVICES]:
+        for sentence in wording.advice_sentences(diagnosis)[:_ADVICES]:
             yield text(sentence)
         yield pairs(diagnosis_rows(diagnosis), text)
-        yield text(basis_sentence(diagnosis), "dim")
+        yield text(wording.basis_sentence(diagnosis), "dim")
 
     return Summary(lines)
 
@@ -110,16 +96,22 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     for output, gap in diagnosis.gap.items():
         yield (
             f"gap in {output}",
-            f"{stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
+            f"{wording.stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
         )
     for cause in diagnosis.families[:_RANKED]:
-        of_gap = f", {share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
-        yield family_label(cause), f"probability {percent(cause.probability)}{of_gap}: {forms_label(cause)}"
+        of_gap = f", {wording.share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
+        yield (
+            wording.family_label(cause),
+            f"probability {wording.percent(cause.probability)}{of_gap}: {wording.forms_label(cause)}",
+        )
     if diagnosis.candidates:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
         if not diagnosis.effects:
-            yield "probability", f"{percent(diagnosis.probability)} for {what_is_probable(diagnosis)}"
-    named = named_candidate(diagnosis)
+            yield (
+                "probability",
+                f"{wording.percent(diagnosis.probability)} for {wording.what_is_probable(diagnosis)}",
+            )
+    named = wording.named_candidate(diagnosis)
     if named is not None and named.parameters:
         own = diagnosis.model.get("effect_parameters", {}) if diagnosis.effects else named.parameters
         for subject, is_of_effect in (("parameters", True), ("of the rig", False)):
@@ -133,7 +125,7 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
 
 
 def _given(diagnosis: Diagnosis, name: str) -> str:
-    given = given_text(diagnosis, name)
+    given = wording.given_text(diagnosis, name)
     return f" (given {given})" if given else ""
 
 
@@ -144,7 +136,7 @@ def _candidate(candidate: Candidate) -> str:
         else "not scored"
     )
     unfinished = "" if candidate.success else ", not converged"
-    return f"{effects_label(candidate.effects)} {percent(candidate.probability)} ({error}{unfinished})"
+    return f"{wording.effects_label(candidate.effects)} {wording.percent(candidate.probability)} ({error}{unfinished})"
 
 
 def discovery_summary(discovery: Discovery) -> Summary:

@@ -168,24 +168,14 @@ def _message(where: Where, data: dict[str, Any], table: type[FileTable], problem
         # Only a key with an unpaired surrogate has no location.
         return f"{where.name}: a key is not valid text: {shown(problem['input'])}. Use plain letters."
     key = where.at(*location)
-    kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
+    kind, got = problem["type"], problem["input"]
+    if kind == "missing":
+        return f"{key}: is missing.{_how_to_write(location)}"
     if kind == "extra_forbidden":
         allowed = _allowed_keys(location, table)
         return f"{key}: unknown key.{nearest(str(location[-1]), allowed)} Allowed here: {', '.join(allowed)}."
-    if kind == "missing":
-        return f"{key}: is missing.{_how_to_write(location)}"
-    if kind == "literal_error":
-        allowed = context["expected"].replace(" or ", ", ")
-        hint = (
-            nearest(got, [option.strip("' ") for option in allowed.split(",")])
-            if isinstance(got, str)
-            else ""
-        )
-        return f"{key}: is {shown(got)}.{hint} Allowed: {allowed}."
-    if kind == "finite_number":
-        return f"{key}: must be a finite number, got {shown(got)}."
-    if kind == "float_type":
-        return f"{key}: must be a number, got {shown(got)}. Write numbers without quotes and units."
+    if (message := value_message(problem)) is not None:
+        return f"{key}: {message}"
     if location == ("records",) and kind in ("too_short", "too_long"):
         count = len(got)
         return f"{key}: {count} given, 1 to {MOST_RECORDS} are allowed.{_how_to_write(location)}"
@@ -207,6 +197,20 @@ def _message(where: Where, data: dict[str, Any], table: type[FileTable], problem
     return (
         f"{key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {shown(got)}.{_how_to_write(location)}"
     )
+
+
+def value_message(problem: dict[str, Any]) -> str | None:
+    """Return what is wrong with a value that is none of several words, or no number; None for other errors."""
+    kind, got = problem["type"], problem["input"]
+    if kind == "literal_error":
+        allowed = str(problem["ctx"]["expected"]).replace(" or ", ", ")
+        words = [option.strip("' ") for option in allowed.split(",")]
+        return f"is {shown(got)}.{nearest(got, words) if isinstance(got, str) else ''} Allowed: {allowed}."
+    if kind == "finite_number":
+        return f"must be a finite number, got {shown(got)}."
+    if kind == "float_type":
+        return f"must be a number, got {shown(got)}. Write numbers without quotes and units."
+    return None
 
 
 def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]) -> tuple[str | int, ...]:

@@ -18,6 +18,7 @@ from rigsight.rigs import Rig, declared_rig
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
+from rigsight.workflow.campaign.campaign_file import value_message
 from rigsight.workflow.own.effect_names import effect_on
 from rigsight.workflow.own.own_rigs import known_rigs
 
@@ -133,13 +134,8 @@ def _message(path: Path, problem: dict[str, Any]) -> str:
         return f"{start}is missing."
     if key == "schema_version":
         return f"{start}is {shown(got)}, this version reads {SCHEMA_VERSION}. Use the version of rigsight that wrote the model."
-    if kind == "literal_error":
-        options = str(problem["ctx"]["expected"]).replace(" or ", ", ")
-        return f"{start}is {shown(got)}. Allowed: {options}."
-    if kind == "float_type":
-        return f"{start}must be a number, got {shown(got)}."
-    if kind == "finite_number":
-        return f"{start}must be a finite number, got {shown(got)}."
+    if (reason := value_message(problem)) is not None:
+        return f"{start}{reason}"
     message = str(problem["msg"])
     return f"{start}{message[0].lower()}{message[1:]}, got {shown(got)}."
 
