@@ -110,7 +110,13 @@ class Comparison:
         return tuple(failure for record in self.records for failure in record.failures)
 
     def columns(self, record: str | None = None) -> tuple[Column, ...]:
-        """Return what was compared, path by path and output by output."""
+        """Return what was compared, path by path and output by output.
+
+        Parameters
+        ----------
+        record
+            Name of a record; None for all of them.
+        """
         found = dict.fromkeys(s.column for s in self.scores if record is None or s.record == record)
         kinds = list(QUANTITIES)
         signals = list(dict.fromkeys(column.signal for column in found))
@@ -122,7 +128,13 @@ class Comparison:
         )
 
     def table(self, record: str) -> dict[str, dict[Column, float]]:
-        """Return model -> column -> error on one record; what could not be found is left out."""
+        """Return model -> column -> error on one record; what could not be found is left out.
+
+        Parameters
+        ----------
+        record
+            Name of the record.
+        """
         rows: dict[str, dict[Column, float]] = {c.name: {} for c in self.competitors}
         for score in self.scores:
             if score.record == record:
@@ -146,7 +158,15 @@ class Comparison:
         return rows
 
     def floor(self, column: Column, record: str | None = None) -> float | None:
-        """Return the noise floor of a column, in its unit; None if unknown."""
+        """Return the noise floor of a column, in its unit; None if unknown.
+
+        Parameters
+        ----------
+        column
+            What was compared.
+        record
+            Name of a record; None for the root mean square over all that show the column.
+        """
         known = {
             s.record: s.noise_floor
             for s in self.scores
