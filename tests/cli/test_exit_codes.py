@@ -253,7 +253,10 @@ def test_a_bench_that_is_interrupted_goes_on_and_its_settings_are_no_results(
         write_together(tmp_path / "bench" / "keys", {"settings.json": "{}"})
         raise KeyboardInterrupt
 
-    with pytest.raises(SystemExit), report_errors(debug=False, outcome="the same command continues from here"):
+    with (
+        pytest.raises(SystemExit),
+        report_errors(debug=False, outcome="the same command continues from here"),
+    ):
         interrupted()
     assert capsys.readouterr().err == "rigsight: interrupted; the same command continues from here.\n"
 

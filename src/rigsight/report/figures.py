@@ -1,12 +1,15 @@
-"""Figures in the page: how one gets there, as SVG or PNG; the rig with its suspected places; loops of force over motion."""
+"""Figures of the page: pictures as SVG or PNG and charts as data; the rig with suspected places, loops of force over motion."""
 
 from __future__ import annotations
 
 import base64
+import json
+import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -36,17 +39,22 @@ _PATH = re.compile(r'(?<=\bd=")[^"]+')
 _PLACE = re.compile(r'(?<= [xy]=")[^"]+')
 _BEFORE_LETTER = re.compile(r" ?([A-Za-z]) ?")
 _BETWEEN_TAGS = re.compile(r">\s+<")
-_DIGITS = re.compile(r"(\.\d\d)\d+")
+_FURTHER_DIGITS = re.compile(r"(\.\d\d)\d+")
+_HEIGHT = re.compile(r'(<svg\b[^>]*?) height="[^"]*"')
 _LEAST = 0.05
 """Probability from which another candidate's place is colored; below it, it is no rival (95 % are accounted for)."""
 _UNEXPLAINED = "unexplained"
 _PERIODS = 4
 """Of the motion in a picture: enough to see whether the loop repeats."""
-_MOST_POINTS = 900
-"""Of a curve; a loop of a few periods needs no more."""
+_MOST_OF_LOOP = 900
+"""Points of a curve; a loop of a few periods needs no more."""
 _MOST_WITHOUT_AMPLITUDE = 4
 """Records shown where none states its amplitude."""
-_HEIGHT = re.compile(r'(<svg\b[^>]*?) height="[^"]*"')
+_DIGITS = 5
+"""Of a curve's range: more than a screen shows."""
+_PAGE_NUMBERS = 170_000
+"""Of all curves over time in a page: about 1.2 MB as text."""
+_MOST_POINTS, _FEWEST_POINTS = 6_000, 600
 
 
 @dataclass(frozen=True)
@@ -75,7 +83,7 @@ def _svg(figure: Figure, key: str, alt: str) -> Markup:
     text = _REFERENCE.sub(rf"\g<1>{key}-\2", text).replace("xlink:href", "href")
     text = _HEIGHT.sub(r"\1", _SIZE.sub(r"\1\2", text, count=1), count=1)
     # A hundredth of a point is finer than any screen or printer; matplotlib writes a millionth.
-    text = _PLACE.sub(lambda place: _DIGITS.sub(r"\1", place[0]), _PATH.sub(_short_path, text))
+    text = _PLACE.sub(lambda place: _FURTHER_DIGITS.sub(r"\1", place[0]), _PATH.sub(_short_path, text))
     text = _BETWEEN_TAGS.sub("><", text)
     # The page's own sans serif face, where DejaVu is missing.
     text = text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")
@@ -84,7 +92,7 @@ def _svg(figure: Figure, key: str, alt: str) -> Markup:
 
 
 def _short_path(path: re.Match[str]) -> str:
-    return _BEFORE_LETTER.sub(r"\1", _DIGITS.sub(r"\1", " ".join(path[0].split())))
+    return _BEFORE_LETTER.sub(r"\1", _FURTHER_DIGITS.sub(r"\1", " ".join(path[0].split())))
 
 
 def _png(figure: Figure, alt: str) -> Markup:
@@ -204,7 +212,7 @@ def _loop_figure(diagnosis: Diagnosis, trace: Trace, motion: str, force: str, ke
     displacement, velocity = smooth_motion(whole, trace.dt)
     window = _loops(displacement, trace.residual(next(iter(stages)), force))
     shown = np.arange(window.start, window.stop)
-    shown = shown[:: -(-shown.size // _MOST_POINTS)]
+    shown = shown[:: -(-shown.size // _MOST_OF_LOOP)]
     measured = trace.measured[force]
     loop = plot.ForceLoop(
         motion,
@@ -234,3 +242,96 @@ def _loop_figure(diagnosis: Diagnosis, trace: Trace, motion: str, force: str, ke
         f"Loops of {what}, measured and simulated. NRMSE there: {errors}.",
         f"{sentence_case(what)}: {place}. NRMSE there: {errors}.",
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One line of a panel, or the area between two."""
+
+    of: str  # what it shows, which decides its color: ``"measured"``, a stage of the diagnosis, or ``"floor"``
+    name: str  # in the legend
+    y: NDArray[np.float64] | None = None  # None for an area
+    # Limits of an area, one for all points or one per point; None for a line.
+    low: NDArray[np.float64] | float | None = None
+    high: NDArray[np.float64] | float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ChartPanel:
+    """One of the panels over each other that share an axis."""
+
+    label: str  # quantity and unit
+    share: int  # height relative to the other panels
+    curves: Sequence[Curve]  # what is drawn; areas first, since they lie below
+    cap: tuple[float, float]  # values beyond which nothing needs to be seen
+    degrees: bool = False  # true if the values are angles in degrees
+
+
+@dataclass(frozen=True)
+class Detail:
+    """A part worth looking at: its limits on the shared axis, what the button that shows it is called, and what it does."""
+
+    low: float
+    high: float
+    label: str
+    title: str
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A figure that reacts, and what stands in for it where no script runs."""
+
+    key: str  # its id, unique in the page
+    data: Markup  # the curves as JSON that is safe inside a script element
+    caption: str  # what it shows, for everyone
+    still: PageFigure | None = None  # None where the numbers of the page must do
+
+
+def curve_names(diagnosis: Diagnosis) -> dict[str, str]:
+    """Return what is drawn of each record, with its name for people: measured, and the stages that differ."""
+    return {"measured": "measured", **{str(stage): name for stage, name in stage_names(diagnosis).items()}}
+
+
+def points_per_curve(n_curves: int) -> int:
+    """Return how many points each of this many curves may have, so that the page stays light."""
+    return int(np.clip(_PAGE_NUMBERS // max(1, n_curves), _FEWEST_POINTS, _MOST_POINTS))
+
+
+def chart_data(
+    title: str,
+    label: str,
+    x: NDArray[np.float64],
+    panels: Sequence[ChartPanel],
+    *,
+    log: bool = False,
+    detail: Detail | None = None,
+) -> Markup:
+    """Return curves over an axis as JSON for the page's script."""
+    content = {
+        "title": title,
+        "label": label,
+        "log": log,
+        "x": [float(f"{place:.9g}") for place in x],
+        "detail": detail and asdict(detail),
+        "panels": [{**vars(panel), "curves": [_curve(curve) for curve in panel.curves]} for panel in panels],
+    }
+    # Inside a script element only "<" could end it.
+    return Markup(json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"))
+
+
+def _curve(curve: Curve) -> dict[str, Any]:
+    return {
+        name: _numbers(value) if isinstance(value, np.ndarray) else value
+        for name, value in vars(curve).items()
+        if value is not None
+    }
+
+
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+    """Return numbers with the digits that are seen; None for what is not finite, for which JSON has no word."""
+    known = values[np.isfinite(values)]
+    reach = float(np.ptp(known)) or abs(float(known[0])) if known.size else 0.0
+    places = _DIGITS - math.ceil(math.log10(reach)) if reach else 0
+    # Numpy multiplies by a power of ten before it rounds, which overflows for the smallest floats.
+    shown = np.round(values, places) if places < sys.float_info.max_10_exp else values
+    return [value if math.isfinite(value) else None for value in shown.tolist()]

@@ -21,8 +21,8 @@ from rigsight.report.identification import (
     joint_rows,
 )
 from rigsight.report.render import environment
+from rigsight.report.sections import trust_line
 from rigsight.report.terminal import diagnosis_rows, discovery_rows
-from rigsight.report.trust import trust_line
 
 _Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Heads, which may be none, and rows of texts; the first cell of a row is its label."""

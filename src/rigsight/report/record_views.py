@@ -15,16 +15,16 @@ from rigsight.diagnose.location.trace import STAGES, Stage, Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.metrics import nrmse
 from rigsight.records.stamps import time_label, time_origin
-from rigsight.report.charts import (
+from rigsight.report.figures import (
     Chart,
     ChartPanel,
     Curve,
     Detail,
     chart_data,
     curve_names,
+    page_figure,
     points_per_curve,
 )
-from rigsight.report.figures import page_figure
 from rigsight.report.quantities import gap_percent
 from rigsight.report.responses import PathResponse, response_chart
 from rigsight.report.sections import output_label

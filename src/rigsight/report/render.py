@@ -22,7 +22,6 @@ from rigsight.report.figures import loop_figures, rig_figure
 from rigsight.report.quantities import Written, effect_of, gap_percent, rig_of
 from rigsight.report.record_views import record_views
 from rigsight.report.responses import amplitude_figures, record_responses
-from rigsight.report.trust import trust_view
 from rigsight.report.wording import (
     TIMES,
     advice_sentences,
@@ -71,7 +70,7 @@ def render_report(
         ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
         parameters=sections.parameter_rows(diagnosis, known),
         errors_reported=sections.errors_reported(diagnosis),
-        trust=trust_view(diagnosis),
+        trust=sections.trust_view(diagnosis),
         equations=equation_groups(diagnosis, known),
         amplitude_figures=amplitude_figures(diagnosis, responses),
         loops=loop_figures(diagnosis),

@@ -27,8 +27,7 @@ from rigsight.plot.drawing import TWO_SIDED
 from rigsight.plot.frequency_responses import decibel, thinned
 from rigsight.records import Record
 from rigsight.records.record import Hold, Kind
-from rigsight.report.charts import Chart, ChartPanel, Curve, chart_data, curve_names
-from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.figures import Chart, ChartPanel, Curve, PageFigure, chart_data, curve_names, page_figure
 from rigsight.report.quantities import rig_of
 from rigsight.report.wording import sentence_case, stage_names, unit_text
 

@@ -16,7 +16,7 @@ from rigsight.discover import Discovery, JointForce
 from rigsight.discover.result import Term
 from rigsight.report import wording
 from rigsight.report.quantities import estimate_text, gap_percent
-from rigsight.report.trust import trust_line
+from rigsight.report.sections import trust_line
 
 _RANKED = 3
 _ADVICES = 1
