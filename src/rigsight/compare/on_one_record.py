@@ -172,8 +172,8 @@ def _trial(
         if step is not None:
             simulated = run.simulated[output]
             trial.moved[output] = step.moved(simulated)
-            error, n_inside = step.error(record[output], simulated), step.inside.stop - step.inside.start
-            trial.add(Column("step_rmse", output, floor.unit), error, step.floor(floor.std), n_inside)
+            deviation, n_inside = step.error(record[output], simulated), step.inside.stop - step.inside.start
+            trial.add(Column("step_rmse", output, floor.unit), deviation, step.floor(floor.std), n_inside)
     return trial
 
 
