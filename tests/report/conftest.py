@@ -24,7 +24,8 @@ from rigsight.diagnose.location.gap_parts import (
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, OutputGap
-from rigsight.discover.missing_force import MissingForce, ShapeTerm
+from rigsight.effects import Family, effect_named
+from rigsight.inverse import MissingForce, Proposal, ProposedCause
 from rigsight.report import render_report
 
 NOISE = {"psi": 4e-4, "y": 3e-5, "force": 12.0}
@@ -50,6 +51,27 @@ def trace(
     return Trace(
         record, role, "sweep", amplitude, t, {source: np.sin(phase)}, measured, before, reidentified, after
     )
+
+
+def of_motion(share: float) -> Proposal:
+    """Return quadratic damping as the missing force along a motion."""
+    rng, time = np.random.default_rng(0), 0.01 * np.arange(400)
+    x, v = 0.01 * np.sin(6.0 * time), 0.06 * np.cos(6.0 * time)
+    force = MissingForce(
+        "yaw_dynamics",
+        "rad",
+        "N m",
+        1.0,
+        0.3,
+        ("sweep",) * 400,
+        time,
+        x,
+        v,
+        90.0 * v * np.abs(v) + 0.02 * rng.standard_normal(400),
+    )
+    damping = effect_named("quadratic_damping")
+    cause = ProposedCause(damping, Family.DAMPING_LAW, "yaw_dynamics", share, {"c_2": 90.0})
+    return Proposal((cause,), (cause,), frozenset({damping.name}), share, 0.01, (force,))
 
 
 def candidate(
@@ -238,7 +260,7 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
             **nothing,
             "verdict": "unknown",
             "where": ("yaw_dynamics",),
-            "missing_force": MissingForce((ShapeTerm("v^3", 14.3, "N m s^3/rad^3", 1.0),), 0.98),
+            "missing_force": of_motion(0.98),
         },
         "not finite": {**one, "gap": {"psi": OutputGap(float("nan"), float("inf"), 0.01, 0.009)}},
         "no validation": {

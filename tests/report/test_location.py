@@ -11,9 +11,8 @@ import pytest
 
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.result import Diagnosis
-from rigsight.discover import JointForce, JointLaw
 from rigsight.report import render_report
-from rigsight.report.location import joint_maps, output_maps, path_rows
+from rigsight.report.location import force_maps, joint_maps, law_rows, output_maps, path_rows
 from rigsight.report.sections import interval_text
 from rigsight.report.wording import missing_force_sentence
 
@@ -96,21 +95,20 @@ def test_a_result_without_places_has_no_such_section(diagnosis: Diagnosis) -> No
     assert 'href="#where"' not in html
 
 
-def joint_force(joint: str, left: float) -> JointForce:
-    return JointForce(joint, "rad", "N m", (), 0.9, left, 1e-3, JointLaw((), 0.0, {}), {}, 1.0)
-
-
-@pytest.mark.slow
-def test_the_missing_force_is_told_joint_by_joint(variant: Callable[[str], Diagnosis]) -> None:
-    forces = (joint_force("load", 0.95), joint_force("motor", 1.2), joint_force("shaft", 145.0))
-    unknown = replace(variant("unknown"), missing_force=None, joint_forces=forces)
-    assert missing_force_sentence(unknown).startswith(
-        "A missing force at load or motor alone, of any shape over time, would leave an error of 0.95 × the noise floor over "
-        "all sensors (at shaft 145). No function of the motion of load"
-    )
-    page = words(render(unknown))
-    assert "motor 1.2 × not a function of the motion shaft 145 × ruled out by the sensors" in page
-    assert "ruled out by the sensors" not in words(render(variant("effect")))
+def test_the_missing_force_is_shown_joint_by_joint(variant: Callable[[str], Diagnosis]) -> None:
+    """What it says of each joint and family stands in the page for every verdict, in a sentence only where no effect does."""
+    unknown = variant("unknown")
+    assert unknown.missing_force is not None
+    (force,) = unknown.missing_force.forces
+    second = replace(unknown.missing_force, forces=(force, replace(force, where="shaft", share=0.2)))
+    (maps,) = force_maps(replace(unknown, missing_force=second))
+    assert [figure.key for figure in maps.figures] == ["missing-force-1", "missing-force-2"]
+    assert law_rows(unknown) == [("Damping law in the yaw dynamics", "quadratic damping", "98 %")]
+    assert "quadratic damping in the yaw dynamics 98 %" in missing_force_sentence(unknown)
+    named = replace(variant("effect"), missing_force=unknown.missing_force)
+    assert missing_force_sentence(named) == ""
+    assert "missing-force-1" in render(named)
+    assert force_maps(variant("effect")) == []
 
 
 @pytest.mark.slow

@@ -96,4 +96,4 @@ def test_where_nothing_was_given_there_is_no_given_simulation(variant: Callable[
 def test_an_unknown_gap_is_described_by_the_force_that_is_lacking(
     variant: Callable[[str], Diagnosis],
 ) -> None:
-    assert "14.3 v^3 (N m s^3/rad^3)" in " ".join(printed(variant("unknown")))
+    assert "a force of 0.3 N m RMS is missing in the yaw dynamics" in " ".join(printed(variant("unknown")))

@@ -36,7 +36,7 @@ from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.uncertainty.bootstrap import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
 from rigsight.diagnose.verdict.families import families_at_places, shares_of_gap
-from rigsight.diagnose.verdict.main_cause import force_of_one_motion, forces_at_joints, traced_to
+from rigsight.diagnose.verdict.main_cause import traced_to
 from rigsight.diagnose.verdict.ranking import Grounds, noise_vector
 from rigsight.diagnose.verdict.remainder import remainder_of
 from rigsight.diagnose.verdict.verdict_notes import Basis, verdict_notes
@@ -109,21 +109,7 @@ def diagnose(
         diagnosis, trust=trust(found.context, named, campaign.records, campaign.constants, std)
     )
     say("trust in the numbers")
-    if found.judgement.verdict != "unknown":
-        return diagnosis
-    forces = forces_at_joints(found.context, found.reidentified)
-    if forces:
-        say("missing force at each joint")
-    # A push that explains most of the gap is stronger evidence than a force of any shape.
-    pushed = max((place.share for place in found.places), default=0.0) >= VERDICT.larger_part
-    return replace(
-        diagnosis,
-        where=diagnosis.where if pushed else traced_to(campaign.rig, forces) or diagnosis.where,
-        missing_force=force_of_one_motion(
-            found.context, found.reidentified, campaign.absent_spring is None, rng
-        ),
-        joint_forces=forces,
-    )
+    return diagnosis
 
 
 def _least_left(found: Examination) -> float:
@@ -229,6 +215,7 @@ def _assembled(
         adequate=None if found.adequacy is None else found.adequacy.adequate,
         remainder=remainder,
         families=families,
+        missing_force=found.proposal,
         shares=None
         if found.adequacy is None
         else shares_of_gap(families, reidentified, judgement.model, found.adequacy.adequate),
@@ -310,9 +297,14 @@ def _up_to(floor: NoiseFloor, residual: NDArray[np.float64]) -> NoiseFloor:
 def _evidence(found: Examination) -> tuple[str, ...]:
     """Return the places to which the evidence points if the cause is unknown.
 
-    The place of the push that explains most; on a rig with one motion the place whose signals correlate with the residual, else
-    the place of the best effect.
+    The place of the push that explains most, or the joint at which the missing force along the motion must act; on a rig with
+    one motion the place whose signals correlate with the residual, else the place of the best effect.
     """
+    # A push that explains most of the gap is stronger evidence than a force of any shape.
+    pushed = max((place.share for place in found.places), default=0.0) >= VERDICT.larger_part
+    traced = () if found.proposal is None else traced_to(found.context.rig, found.proposal.forces)
+    if traced and not pushed:
+        return traced
     if found.places:
         return tuple(place.name for place in found.places if place.examined and place.share > 0.0)
     rig = found.context.rig

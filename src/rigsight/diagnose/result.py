@@ -20,8 +20,8 @@ from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
 from rigsight.diagnose.verdict.judgement import Verdict
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import Remainder
-from rigsight.discover import JointForce, MissingForce
 from rigsight.effects import kind_of
+from rigsight.inverse import Proposal
 
 StdMethod = Literal["bootstrap", "formula"]
 
@@ -160,9 +160,8 @@ class Diagnosis:
         Share of the squared gap of the re-identified equations that the best push at each joint, drive and sensor explains, the
         largest first; empty on a rig with one motion.
     missing_force
-        The missing force on a rig with one motion, from sparse regression, if no effect explains the gap.
-    joint_forces
-        On any other rig, the force that would have to be missing at each joint then, the most likely first.
+        What the equations leave along the measured motion at each joint, and the families that explain it there; None where the
+        sensors do not show the motion.
     adequate
         Whether the residual of the diagnosed simulation is noise and disturbance; None where that could not be tested.
     remainder
@@ -203,8 +202,7 @@ class Diagnosis:
     localization: Localization = field(default_factory=Localization)
     effect_shares: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     places: tuple[SuspectedPlace, ...] = ()
-    missing_force: MissingForce | None = None
-    joint_forces: tuple[JointForce, ...] = ()
+    missing_force: Proposal | None = None
     adequate: bool | None = None
     remainder: Remainder | None = None
     families: tuple[FamilyAtPlace, ...] = ()
@@ -282,7 +280,6 @@ class Diagnosis:
                 for effect, shares in self.effect_shares.items()
             },
             "missing_force": None if self.missing_force is None else self.missing_force.to_json(),
-            "missing_force_by_joint": [force.to_json() for force in self.joint_forces],
             "window": self.windows,
             "window_cycles": self.window_cycles,
             "observer_bandwidth": self.bandwidth,

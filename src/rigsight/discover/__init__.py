@@ -10,8 +10,6 @@ from rigsight.discover.joints.joint_force import not_contradicted as not_contrad
 from rigsight.discover.joints.joint_law import LawTerm as LawTerm
 from rigsight.discover.joints.joint_motion import JointMotion as JointMotion
 from rigsight.discover.joints.joint_motion import joint_motions as joint_motions
-from rigsight.discover.missing_force import MissingForce as MissingForce
-from rigsight.discover.missing_force import missing_force as missing_force
 from rigsight.discover.regression import RegressionData as RegressionData
 from rigsight.discover.result import Discovery as Discovery
 from rigsight.discover.terms.monomials import MONOMIALS as MONOMIALS

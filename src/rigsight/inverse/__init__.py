@@ -13,6 +13,7 @@ from rigsight.inverse.joint_force import effect_force as effect_force
 from rigsight.inverse.joint_force import joint_motion as joint_motion
 from rigsight.inverse.measured_motion import RecordMotion as RecordMotion
 from rigsight.inverse.measured_motion import record_motion as record_motion
+from rigsight.inverse.missing_force import MissingForce as MissingForce
 from rigsight.inverse.proposal import Proposal as Proposal
 from rigsight.inverse.proposal import ProposedCause as ProposedCause
 from rigsight.inverse.proposal import propose as propose

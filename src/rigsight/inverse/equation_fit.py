@@ -226,15 +226,20 @@ def generalized(
     moved
         Motion of the joint.
     """
+    joint = joint_of(motion.equations.rig, effect)
+    return per_force(motion, joint, values) * effect_force(effect, own, moved)
+
+
+def per_force(motion: RecordMotion, joint: Joint, values: Mapping[str, float]) -> Floats:
+    """Return what a unit of force that resists the motion of a joint adds to `RecordMotion.residual`, of the same shape."""
     equations = motion.equations
-    joint: Joint = joint_of(equations.rig, effect)
-    force = effect_force(effect, own, moved)
     if equations.n_coordinates:
         p = equations.parameters(values, motion.record)
-        return np.asarray(equations.slopes_along(motion.z, motion.u, p)[joint.name] * force)
+        return np.asarray(equations.slopes_along(motion.z, motion.u, p)[joint.name])
     reading = [s.name for s in equations.rig.mechanism.sensors if f"force({joint.name})" in str(s.reads)]
     names = [equations.sensor_names[i] for i in motion.sensors]
-    return np.array([force if name in reading else np.zeros_like(force) for name in names])
+    one = np.ones(motion.record.n_samples)
+    return np.array([one if name in reading else np.zeros_like(one) for name in names])
 
 
 def _joined(rows: Sequence[Floats]) -> Floats:

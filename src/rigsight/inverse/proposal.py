@@ -14,14 +14,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
-from rigsight.effects import Effect, Family
+from rigsight.effects import Effect, Family, kind_of
 from rigsight.errors import SimulationError
 from rigsight.identify import characteristic_scales
 from rigsight.inverse.effect_terms import EffectTerms, Term, is_joint_force
@@ -34,6 +35,7 @@ from rigsight.inverse.equation_fit import (
     with_all_inputs,
 )
 from rigsight.inverse.measured_motion import WIDER
+from rigsight.inverse.missing_force import MissingForce, missing_forces
 from rigsight.rigs import Rig
 
 Floats = NDArray[np.float64]
@@ -62,6 +64,16 @@ class ProposedCause:
     share: float
     values: Mapping[str, float]  # parameters of the effect, as far as the regression gives them
 
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {
+            "family": str(self.family),
+            "where": self.where,
+            "effect": kind_of(self.effect.name),
+            "share": self.share,
+            "parameters": dict(self.values),
+        }
+
 
 @dataclass(frozen=True)
 class Proposal:
@@ -75,9 +87,26 @@ class Proposal:
     # Share that the best of so many terms exceeds in one of a hundred cases if none has to do with the
     # residual.
     by_chance: float
+    # At each joint, of any shape, the one that explains most first.
+    forces: tuple[MissingForce, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return ``missing_force`` of ``diagnosis.json``."""
+        return {
+            "joints": [force.to_json() for force in self.forces],
+            "families": [cause.to_json() for cause in self.alone if cause.share > self.by_chance],
+            "taken": [cause.to_json() for cause in self.taken],
+            "explained": self.explained,
+            "by_chance": self.by_chance,
+        }
 
 
-def propose(campaign: Campaign, known: Mapping[str, float], effects: Sequence[Effect]) -> Proposal | None:
+def propose(
+    campaign: Campaign,
+    known: Mapping[str, float],
+    effects: Sequence[Effect],
+    noise: Mapping[str, float] | None = None,
+) -> Proposal | None:
     """Return the families that explain what the equations of a campaign leave of its estimation records.
 
     None where the sensors do not show the motion, another program simulates the bodies, or the given simulation has an effect
@@ -91,6 +120,8 @@ def propose(campaign: Campaign, known: Mapping[str, float], effects: Sequence[Ef
         Constants and parameters of the rig and of the modelled effects; those of the drives set the scale of all forces.
     effects
         Candidates at their places.
+    noise
+        Standard deviation of the noise of each sensor; it weighs the joints of a rig against each other.
     """
     rig = campaign.rig
     if rig.mechanism.bodies is not None or not all(map(is_joint_force, campaign.modelled)):
@@ -104,9 +135,10 @@ def propose(campaign: Campaign, known: Mapping[str, float], effects: Sequence[Ef
     scales = characteristic_scales(rig, records, own)
     terms_of = EffectTerms(fit, values, scales)
     terms = [term for effect in effects for term in terms_of.of(effect)]
+    forces = missing_forces(fit, values, noise or {})
     if not terms:
-        return None
-    return _Selection(fit, values, terms).proposal(rig)
+        return Proposal((), (), frozenset(), 0.0, 1.0, forces)
+    return replace(_Selection(fit, values, terms).proposal(rig), forces=forces)
 
 
 def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit, dict[str, float]]:

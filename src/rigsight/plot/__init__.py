@@ -32,6 +32,7 @@ from rigsight.plot.gap_maps import gap_bands as gap_bands
 from rigsight.plot.gap_maps import gap_records as gap_records
 from rigsight.plot.gap_maps import gap_states as gap_states
 from rigsight.plot.gap_maps import gap_times as gap_times
+from rigsight.plot.gap_maps import missing_force as missing_force
 from rigsight.plot.model_comparison import ErrorPanel as ErrorPanel
 from rigsight.plot.model_comparison import ResponsesPanel as ResponsesPanel
 from rigsight.plot.model_comparison import StepPanel as StepPanel

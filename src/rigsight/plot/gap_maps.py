@@ -1,4 +1,4 @@
-"""Figures of the gap over frequency, amplitude, records, time and the plane of states."""
+"""Figures of the gap over frequency, amplitude, records, time and the plane of states, and of the force that is missing."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from rigsight.diagnose.location.gap_parts import (
     TimePart,
 )
 from rigsight.diagnose.location.trace import Stage
+from rigsight.inverse import MissingForce
 from rigsight.plot.drawing import (
     FLOOR,
     MEASURED,
     PAGE_WIDTH,
     STAGE_STYLES,
+    WITH_EFFECT,
     in_style,
     new_figure,
     set_margins,
@@ -41,6 +43,10 @@ _FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewi
 _PERCENT = 100.0
 _SHADES = 15
 """Few enough to be drawn as areas; a smooth scale would become an image of its own. Odd, so that zero has a shade."""
+_BAND = 2.0
+_MOST_POINTS = 1500
+_USUAL, _ROOM = (1.0, 99.0), 0.3
+"""Percentiles of the force that are shown, with this part of their distance beyond: ends of records spoil single samples."""
 _FLOOR_LABEL = "noise floor"
 
 
@@ -215,3 +221,34 @@ def _plane(
     bar.set_label(label)
     bar.outline.set_visible(False)
     bar.ax.tick_params(color=MEASURED)
+
+
+@in_style
+def missing_force(force: MissingForce) -> Figure:
+    """Draw a missing force over velocity and displacement, each with its mean and two standard errors, and over time."""
+    figure = new_figure(8.4, 2.5, layout=None)
+    over_v, over_x, over_t = figure.subplots(1, 3, sharey=True)
+    set_margins(figure, 0.75, 0.12, 0.5, 0.12, between=(0.18, 0.0))
+    factor, unit = shown_in(force.unit, force.force)
+    every = max(1, force.force.size // _MOST_POINTS)
+    for ax, signal, name, signal_unit in (
+        (over_v, force.velocity, "velocity", f"{force.motion_unit}/s"),
+        (over_x, force.displacement, "displacement", force.motion_unit),
+    ):
+        x_factor, x_unit = shown_in(signal_unit, signal)
+        points = {"color": MEASURED, "markersize": 2.0, "alpha": 0.35}
+        ax.plot(x_factor * signal[::every], factor * force.force[::every], ".", **points)
+        mean = force.over(signal)
+        at, line, band = (np.array(own) for own in (mean.signal, mean.force, mean.std))
+        low, high = factor * (line - _BAND * band), factor * (line + _BAND * band)
+        ax.fill_between(x_factor * at, low, high, color=WITH_EFFECT, alpha=0.3, linewidth=0.0)
+        ax.plot(x_factor * at, factor * line, color=WITH_EFFECT, linewidth=1.4)
+        ax.set_xlabel(f"{name} [{x_unit}]")
+    low, high = factor * np.percentile(force.force, _USUAL)
+    if high > low:
+        over_v.set_ylim(low - _ROOM * (high - low), high + _ROOM * (high - low))
+    first = np.array(force.records) == force.records[0]
+    over_t.plot(force.time[first], factor * force.force[first], color=MEASURED, linewidth=0.8)
+    over_t.set_xlabel(f"time in {force.records[0]} [s]")
+    over_v.set_ylabel(f"missing force [{unit}]")
+    return figure

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from rigsight import plot
 from rigsight.diagnose.location.gap_parts import AmplitudePart, GapPart, StatePart
 from rigsight.diagnose.result import Diagnosis
-from rigsight.discover import not_contradicted
+from rigsight.effects import kind_of
 from rigsight.records.stamps import written_span
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent, rig_of
 from rigsight.report.sections import output_label
 from rigsight.report.wording import (
     TIMES,
+    effect_label,
+    family_label,
     listed,
     percent,
     sentence_case,
@@ -23,6 +25,9 @@ from rigsight.report.wording import (
     stages_reported,
     unit_text,
 )
+
+_JOINTS_SHOWN = 3
+_LAWS_SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -89,18 +94,37 @@ def joint_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
     return [OutputMaps("where-joints", "Joint by joint", figures)]
 
 
-def force_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return each joint of a rig that has several, what a force missing there alone would leave, and its law."""
-    agreeing = not_contradicted(diagnosis.joint_forces)
+def force_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
+    """Return the figures of the missing force along the measured motion, the joint that explains most first."""
+    if diagnosis.missing_force is None:
+        return []
+    figures = [
+        page_figure(
+            plot.missing_force(force),
+            f"missing-force-{number}",
+            f"Missing force at {force.where} over velocity, displacement and time",
+            f"{sentence_case(force.where)}: the force that the equations leave along the measured motion if it is missing here "
+            f"alone, positive where it resists, with its mean and two standard errors (RMS {force.rms:.3g} {force.unit}; "
+            f"{percent(force.share)} of the squared residual of all equations).",
+        )
+        for number, force in enumerate(diagnosis.missing_force.forces[:_JOINTS_SHOWN], start=1)
+    ]
+    return [OutputMaps("where-missing-force", "Missing force, before any law", figures)]
+
+
+def law_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return what each family explains of the missing force alone, beyond chance, the largest share first."""
+    if diagnosis.missing_force is None:
+        return []
+    found = diagnosis.missing_force
     return [
         (
-            force.joint,
-            f"{force.error_over_noise:.3g} {TIMES}",
-            (listed(term.text for term in force.law.terms) or "not a function of the motion")
-            if force in agreeing
-            else "ruled out by the sensors",
+            sentence_case(family_label(cause)),
+            effect_label(kind_of(cause.effect.name)),
+            percent(cause.share),
         )
-        for force in diagnosis.joint_forces
+        for cause in found.alone[:_LAWS_SHOWN]
+        if cause.share > found.by_chance
     ]
 
 

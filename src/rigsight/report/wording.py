@@ -13,8 +13,8 @@ from rigsight.diagnose.location.trace import Stage
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap
 from rigsight.diagnose.verdict.families import FamilyAtPlace
-from rigsight.discover import not_contradicted
-from rigsight.effects import AT
+from rigsight.effects import AT, kind_of
+from rigsight.inverse import ProposedCause
 from rigsight.report.quantities import gap_percent
 
 TIMES = "\u00d7"
@@ -48,6 +48,7 @@ _STATED = {
 
 _FORMS = 4
 """Number of forms of a family that are shown."""
+_LAWS_NAMED = 3
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:
@@ -252,22 +253,22 @@ def fault_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def missing_force_sentence(diagnosis: Diagnosis) -> str:
-    """Return a sentence on the missing force if no effect explains the gap; empty where nothing is known."""
-    if diagnosis.missing_force is not None:
-        return diagnosis.missing_force.sentence
-    forces = diagnosis.joint_forces
-    if not forces:
+    """Return a sentence on the missing force if no effect explains the gap; empty where the motion does not show it."""
+    found = diagnosis.missing_force
+    if found is None or diagnosis.verdict != "unknown" or not found.forces:
         return ""
-    agreeing = not_contradicted(forces)
-    nearest = min(force.error_over_noise for force in agreeing)
-    names = listed((force.joint for force in agreeing), "or")
-    others = [f"at {force.joint} {force.error_over_noise:.3g}" for force in forces if force not in agreeing]
-    beside = f" ({listed(others)})" if others else ""
-    return (
-        f"A missing force at {names} alone, of any shape over time, would leave an error of {times_floor(nearest)} over all "
-        f"sensors{beside}. "
-        f"{forces[0].sentence}"
-    )
+    force = found.forces[0]
+    size = f"Along the measured motion a force of {force.rms:.3g} {force.unit} RMS is missing {place_label(force.where)}"
+    if len(found.forces) > 1:
+        size += f", which alone would explain {percent(force.share)} of what the equations leave"
+    laws = [
+        f"{effect_label(kind_of(cause.effect.name))} {place_label(cause.where)} {percent(cause.share)}"
+        for cause in found.alone[:_LAWS_NAMED]
+        if cause.share > found.by_chance
+    ]
+    if not laws:
+        return f"{size}; no law of the catalogue explains it."
+    return f"{size}. Of its square, each alone: {listed(laws)}."
 
 
 def ambiguity_sentence(diagnosis: Diagnosis) -> str:
@@ -333,7 +334,7 @@ def what_is_probable(diagnosis: Diagnosis) -> str:
     )
 
 
-def family_label(own: FamilyAtPlace) -> str:
+def family_label(own: FamilyAtPlace | ProposedCause) -> str:
     """Return a family with its place: ``"dry friction at gearbox"``."""
     return f"{own.family.replace('_', ' ')} {place_label(own.where)}"
 

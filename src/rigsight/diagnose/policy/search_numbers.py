@@ -291,14 +291,6 @@ class SearchNumbers:
         "convention",
         "First line of a spectrum over time that is used: lower lines are drift, which initial states absorb.",
     )
-    traced_samples: int = number(
-        3000,
-        "budget",
-        (
-            "Number of samples in which missing forces at joints are estimated: about ten seconds of processor time per thousand "
-            "on a drive train."
-        ),
-    )
     offset_evaluations: int = number(
         40,
         "budget",

@@ -133,8 +133,8 @@ class VerdictNumbers:
         (
             "Factor of the best error within which a model is a contender, because no model is exact. Contenders are fitted to "
             "full precision, tested for sensitivity of the motion, tried in each other's place, and preferred if the best has "
-            "impossible parameters. A missing force at a joint that leaves at most this many noise floors explains the readings "
-            "of the sensors."
+            "impossible parameters. A joint at which a missing force leaves at most this factor more of the equations than the "
+            "best is as likely a place."
         ),
     )
     release_gain: float = number(

@@ -76,7 +76,7 @@ def single_models(
             f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
     say("re-identified")
-    proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects)
+    proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, noise)
     say("missing force")
     effects = worth_fitting(campaign.rig, proposal, effects)
     while True:

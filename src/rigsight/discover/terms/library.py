@@ -88,11 +88,6 @@ def offered_effects(rig: Rig, has_stiffness: bool) -> list[Effect]:
     ]
 
 
-def plain_terms(rig: Rig, has_stiffness: bool) -> list[Effect]:
-    """Return those of the offered effects that are a torque with one coefficient and no other parameter."""
-    return [effect for effect in offered_effects(rig, has_stiffness) if _is_plain(effect)]
-
-
 def _is_static(effect: Effect) -> bool:
     """Return True for a known function of displacement, velocity and input, without states or other torques."""
     known = (effect.torque, effect.deflection, effect.drive, effect.delay)

@@ -1,0 +1,185 @@
+"""The force that the equations leave along the measured motion, joint by joint and before any law.
+
+A force of any shape at one joint pushes the equations of motion in one direction at a time. The share of their residual in that
+direction says how well this joint alone explains it; what noise of the sensors does to it counts in no direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import SimulationError
+from rigsight.inverse.equation_fit import EquationFit, per_force, record_motions
+from rigsight.inverse.joint_force import joint_motion
+from rigsight.inverse.measured_motion import WIDER, RecordMotion
+from rigsight.records import Record
+
+Floats = NDArray[np.float64]
+
+_CLASSES, _CLASS_ROWS = 24, 8
+"""Classes of equal size, by displacement or velocity, over which a force is averaged: at most so many, of at least so many rows."""
+_SHORT = 10
+_SEED = 0
+"""The noise of a weight is the same for equal records: a diagnosis depends on its records alone."""
+
+
+@dataclass(frozen=True)
+class MeanForce:
+    """Mean of a force over a signal, in classes with equally many rows, with its standard error."""
+
+    signal: tuple[float, ...]
+    force: tuple[float, ...]
+    std: tuple[float, ...]
+
+    def to_json(self) -> dict[str, list[float]]:
+        """Return plain data."""
+        return {"signal": list(self.signal), "force": list(self.force), "std": list(self.std)}
+
+
+@dataclass(frozen=True, eq=False)
+class MissingForce:
+    """Force that must be missing at a joint if it is missing at this joint alone.
+
+    Attributes
+    ----------
+    where
+        The joint.
+    motion_unit, unit
+        Of its displacement and of the force.
+    share
+        Of the squared residual of the equations above the noise of the sensors that a force of any shape there explains.
+    rms
+        Of the force.
+    records, time, displacement, velocity, force
+        Nearly independent samples, shape (n_rows,): name of the record, time, displacement from rest and velocity of the joint,
+        and the force, positive where it resists the motion.
+    """
+
+    where: str
+    motion_unit: str
+    unit: str
+    share: float
+    rms: float
+    records: tuple[str, ...]
+    time: Floats
+    displacement: Floats
+    velocity: Floats
+    force: Floats
+
+    def over(self, signal: Floats) -> MeanForce:
+        """Return the mean force in classes of a signal, shape (n_rows,)."""
+        n_classes = min(_CLASSES, max(1, signal.size // _CLASS_ROWS))
+        parts = [part for part in np.array_split(np.argsort(signal, kind="stable"), n_classes) if part.size]
+        # Forces hold overtones of the motion, and what laws leave moves with it: rows in its band are independent.
+        stds = [float(np.std(self.force[part]) * np.sqrt(WIDER / part.size)) for part in parts]
+        return MeanForce(
+            tuple(float(np.mean(signal[part])) for part in parts),
+            tuple(float(np.mean(self.force[part])) for part in parts),
+            tuple(stds),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return an entry of ``missing_force.joints`` in ``diagnosis.json``."""
+        return {
+            "where": self.where,
+            "share": self.share,
+            "rms": {"value": self.rms, "unit": self.unit},
+            "over_displacement": self.over(self.displacement).to_json(),
+            "over_velocity": self.over(self.velocity).to_json(),
+            "units": {"displacement": self.motion_unit, "velocity": f"{self.motion_unit}/s"},
+        }
+
+
+def missing_forces(
+    fit: EquationFit, values: Mapping[str, float], noise: Mapping[str, float]
+) -> tuple[MissingForce, ...]:
+    """Return the missing force at each joint, the one that explains most first.
+
+    Parameters
+    ----------
+    fit
+        Equations and motions.
+    values
+        Constants and parameters of the equations.
+    noise
+        Standard deviation of the noise of each sensor; where there is none, every equation counts in units of its own residual.
+    """
+    rows = [_inner(motion, fit.residual(motion, values)) for motion in fit.motions]
+    weight = _weight(fit, values, rows, noise)
+    n_equations, n_rows = weight.shape[0], sum(own.shape[1] for own in rows)
+    whole = sum(float(np.einsum("it,ij,jt->", own, weight, own)) for own in rows) - n_equations * n_rows
+    found = []
+    for joint in fit.rig.mechanism.joints:
+        forces, explained = [], -float(n_rows)
+        for motion, own in zip(fit.motions, rows, strict=True):
+            along = _inner(motion, per_force(motion, joint, values))
+            size = np.einsum("it,ij,jt->t", along, weight, along)
+            pushed = np.einsum("it,ij,jt->t", along, weight, own)
+            explained += float(np.sum(pushed**2 / np.maximum(size, np.finfo(np.float64).tiny)))
+            forces.append(-pushed / np.maximum(size, np.finfo(np.float64).tiny))
+        moved = [joint_motion(motion, joint, values) for motion in fit.motions]
+        units = fit.rig.units_at(joint.name)
+        force = np.concatenate(forces)
+        found.append(
+            MissingForce(
+                joint.name,
+                units["x"],
+                units["force"],
+                float(np.clip(explained / whole, 0.0, 1.0)) if whole > 0.0 else 0.0,
+                float(np.sqrt(np.mean(force**2))),
+                tuple(
+                    m.record.name
+                    for m, own in zip(fit.motions, rows, strict=True)
+                    for _ in range(own.shape[1])
+                ),
+                np.concatenate(
+                    [
+                        _inner(m, np.arange(m.record.n_samples, dtype=np.float64) * m.record.dt)
+                        for m in fit.motions
+                    ]
+                ),
+                np.concatenate([_inner(m, own.x) for m, own in zip(fit.motions, moved, strict=True)]),
+                np.concatenate([_inner(m, own.v) for m, own in zip(fit.motions, moved, strict=True)]),
+                force,
+            )
+        )
+    return tuple(sorted(found, key=lambda own: -own.share))
+
+
+def _inner(motion: RecordMotion, rows: Floats) -> Floats:
+    """Return nearly independent rows without the first and the last, where derivatives have neighbors on one side only."""
+    thinned = motion.thinned(rows)
+    return thinned[..., 1:-1] if thinned.shape[-1] > _SHORT else thinned
+
+
+def _weight(
+    fit: EquationFit, values: Mapping[str, float], rows: Sequence[Floats], noise: Mapping[str, float]
+) -> Floats:
+    """Return the inverse covariance of the equations' rows under noise of the sensors, shape (n_equations, n_equations)."""
+    plain = np.diag([1.0 / max(float(np.mean(own**2)), 1e-300) for own in np.concatenate(rows, axis=1)])
+    read = [s.name for s in fit.rig.outputs if all(s.name in motion.record for motion in fit.motions)]
+    if not read or not all(noise.get(name, 0.0) > 0.0 for name in read):
+        return plain
+    rng = np.random.default_rng(_SEED)
+    noisy = [_with_noise(motion, {name: noise[name] for name in read}, rng) for motion in fit.motions]
+    try:
+        moved = record_motions(fit.rig, noisy, values)
+    except SimulationError:
+        return plain
+    changes = [
+        _inner(motion, fit.residual(other, values) - fit.residual(motion, values))
+        for motion, other in zip(fit.motions, moved, strict=True)
+    ]
+    covariance = np.atleast_2d(np.cov(np.concatenate(changes, axis=1)))
+    return np.asarray(np.linalg.pinv(covariance, hermitian=True))
+
+
+def _with_noise(motion: RecordMotion, noise: Mapping[str, float], rng: np.random.Generator) -> Record:
+    record = motion.record
+    drawn = {name: record[name] + rng.normal(0.0, std, record.n_samples) for name, std in noise.items()}
+    return record.with_signals(**drawn)
