@@ -12,6 +12,7 @@ PACKAGES = (
     "parameters",
     "units",
     "errors",
+    "json_data",
     "excitation",
     "metrics",
     "effects",

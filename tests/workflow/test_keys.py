@@ -55,13 +55,12 @@ def test_every_key_of_a_campaign_is_in_the_table() -> None:
 
 @pytest.fixture(scope="module", autouse=True)
 def _quick() -> Any:
-    """Few draws, one offered term, no regression of an unknown force: whether a key is used does not depend on them."""
+    """Few draws, one offered term: whether a key is used does not depend on them."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("rigsight.discover.regression.N_ENSEMBLE", 2)
         patch.setattr(
             "rigsight.discover.discovery.offered_effects", lambda *_: [effect_named("cubic_stiffness")]
         )
-        patch.setattr("rigsight.diagnose.diagnosis.force_of_one_motion", lambda *_: None)
         yield
 
 

@@ -43,14 +43,12 @@ def list_effects(
 
 
 def _listed(effects: Iterable[Effect]) -> list[dict[str, object]]:
-    from rigsight.workflow.own.effect_declaration import equations
-
     return [
         {
             "name": effect.name,
             "where": effect.place.value,
             "summary": effect.summary,
-            "equations": {name: str(expression) for name, expression in equations(effect).items()},
+            "equations": {name: str(expression) for name, expression in effect.equations.items()},
             "states": [
                 {
                     "name": str(s.symbol),

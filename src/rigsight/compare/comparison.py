@@ -16,6 +16,7 @@ from rigsight.compare.score import QUANTITIES, Column, Floor, Score
 from rigsight.compare.step_error import StepWindow
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method
+from rigsight.json_data import json_data
 from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.simulate.model import Model
@@ -190,14 +191,14 @@ def best(rows: Mapping[str, Mapping[Column, float]], column: Column) -> frozense
 def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[str, Any]:
     """Return the content of ``comparison.json``."""
     overall = comparison.overall()
-    return {
+    content = {
         "schema_version": SCHEMA_VERSION,
         "title": comparison.title,
         "rig": comparison.rig,
         "method": comparison.method,
         "step_seconds": comparison.step_seconds,
         "window_length": comparison.window_length,
-        "quantities": dict(QUANTITIES),
+        "quantities": QUANTITIES,
         "models": [
             {"name": c.name, "source": c.source, "model": c.model.to_json()} for c in comparison.competitors
         ],
@@ -207,7 +208,7 @@ def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[
                 "role": r.record.role,
                 "kind": r.record.kind,
                 "amplitude": r.record.amplitude,
-                "notes": list(r.notes),
+                "notes": r.notes,
             }
             for r in comparison.records
         ],
@@ -231,9 +232,10 @@ def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[
             {"model": f.model, "record": f.record, **_column(f.column), "reason": f.reason}
             for f in comparison.failures
         ],
-        "notes": list(comparison.notes),
-        "figures": dict(figures),
+        "notes": comparison.notes,
+        "figures": figures,
     }
+    return json_data(content)
 
 
 def comparison_csv(comparison: Comparison) -> str:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
-
-import numpy as np
 
 from rigsight.diagnose.advise import Advice
 from rigsight.diagnose.data_quality.finding import DataQuality
@@ -22,6 +20,7 @@ from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.effects import kind_of
 from rigsight.inverse import Proposal
+from rigsight.json_data import json_data
 
 StdMethod = Literal["bootstrap", "formula"]
 
@@ -227,88 +226,79 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
-        return {
+        content = {
             "schema_version": SCHEMA_VERSION,
             "title": self.title,
             "rig": self.rig,
             "verdict": self.verdict,
-            "probability": _number(self.probability),
+            "probability": self.probability,
             "effects": list(map(kind_of, self.effects)),
-            "where": list(self.where),
+            "where": self.where,
             "families": [family.to_json() for family in self.families],
-            "shares": None if self.shares is None else asdict(self.shares),
+            "shares": self.shares,
             "adequate": self.adequate,
-            "remainder": None if self.remainder is None else self.remainder.to_json(),
-            "trust": None if self.trust is None else self.trust.to_json(),
-            "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
-            "given": {name: _number(value) for name, value in self.given.items()},
-            "likely_causes": {
-                "effects": [list(effects) for effects in self.likely.sets],
-                "outside": self.likely.outside,
-            },
-            "error_of_choice": None if self.error_of_choice is None else _number(self.error_of_choice),
+            "remainder": self.remainder and self.remainder.to_json(),
+            "trust": self.trust and self.trust.to_json(),
+            "ambiguous_with": self.ambiguous_with,
+            "given": self.given,
+            "likely_causes": {"effects": self.likely.sets, "outside": self.likely.outside},
+            "error_of_choice": self.error_of_choice,
             "candidates": [_candidate(candidate) for candidate in self.candidates],
             "gap": {
                 output: {
-                    "before": _number(gap.before),
-                    "reidentified": _number(gap.reidentified),
-                    "after": _number(gap.after),
-                    "noise_floor": _number(gap.noise_floor),
-                    "closed": _number(gap.closed),
-                    "interval": {k: [_number(limit) for limit in v] for k, v in gap.intervals.items()},
+                    "before": gap.before,
+                    "reidentified": gap.reidentified,
+                    "after": gap.after,
+                    "noise_floor": gap.noise_floor,
+                    "closed": gap.closed,
+                    "interval": gap.intervals,
                 }
                 for output, gap in self.gap.items()
             },
             "noise_floor": {
                 floor.output: {
-                    "std": _number(floor.std),
+                    "std": floor.std,
                     "unit": floor.unit,
                     "method": floor.method,
                     "lower_bound": floor.lower_bound,
-                    "interval": [_number(limit) for limit in floor.interval],
-                    "disturbance": None if floor.disturbance is None else asdict(floor.disturbance),
+                    "interval": floor.interval,
+                    "disturbance": floor.disturbance,
                 }
                 for floor in self.noise_floors
             },
             **self.localization.to_json(),
             "gap_by_place": [
-                {"place": place.name, "share": _number(place.share), "looked_at": place.examined}
+                {"place": place.name, "share": place.share, "looked_at": place.examined}
                 for place in self.places
             ],
-            "effect_shares": {
-                effect: {output: _number(share) for output, share in shares.items()}
-                for effect, shares in self.effect_shares.items()
-            },
-            "missing_force": None if self.missing_force is None else self.missing_force.to_json(),
+            "effect_shares": self.effect_shares,
+            "missing_force": self.missing_force and self.missing_force.to_json(),
             "window": self.windows,
             "window_cycles": self.window_cycles,
             "observer_bandwidth": self.bandwidth,
             "scored_on": self.scored_on,
             "data_quality": [] if self.data_quality is None else self.data_quality.to_json(),
             "advice": [_advice(advice) for advice in self.advice],
-            "notes": list(self.notes),
+            "notes": self.notes,
         }
+        return json_data(content)
 
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:
+    grounds = candidate.grounds
     return {
         "effects": list(map(kind_of, candidate.effects)),
-        "where": list(candidate.where),
-        "probability": _number(candidate.probability),
-        "validation_nrmse": {k: _number(v) for k, v in candidate.validation_nrmse.items()},
-        "estimation_nrmse": {k: _number(v) for k, v in candidate.estimation_nrmse.items()},
-        "error_over_noise": _number(candidate.error_over_noise),
-        "parameters": {
-            name: {"value": _number(e.value), "std": _number(e.std), "unit": e.unit}
-            for name, e in candidate.parameters.items()
-        },
+        "where": candidate.where,
+        "probability": candidate.probability,
+        "validation_nrmse": candidate.validation_nrmse,
+        "estimation_nrmse": candidate.estimation_nrmse,
+        "error_over_noise": candidate.error_over_noise,
+        "parameters": candidate.parameters,
         "std_method": candidate.std_method,
         "n_fitted": len(candidate.parameters),
-        "ranking_share": None if candidate.grounds is None else _number(candidate.grounds.share),
-        "held_out_share": None if candidate.grounds is None else _number(candidate.grounds.held_out),
-        "log_evidence": None
-        if candidate.grounds is None or candidate.grounds.evidence is None
-        else _number(candidate.grounds.evidence),
+        "ranking_share": grounds and grounds.share,
+        "held_out_share": grounds and grounds.held_out,
+        "log_evidence": grounds and grounds.evidence,
         "success": candidate.success,
         "message": candidate.message,
     }
@@ -316,15 +306,11 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
 
 def _advice(advice: Advice) -> dict[str, Any]:
     return {
-        "rival": list(advice.rival),
+        "rival": advice.rival,
         "waveform": advice.waveform,
         "input": advice.source,
-        "amplitude": _number(advice.amplitude),
-        "band": None if advice.band is None else [_number(omega) for omega in advice.band],
+        "amplitude": advice.amplitude,
+        "band": advice.band,
         "output": advice.output,
-        "separation": _number(advice.separation),
+        "separation": advice.separation,
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.discover.joints.joint_force import JointForce
+from rigsight.json_data import json_data
 from rigsight.records import Record
 
 SCHEMA_VERSION = 1
@@ -25,15 +26,10 @@ class Coefficient:
     unit: str
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data with a 95 % interval; None if the value is not determined."""
-        known = math.isfinite(self.std)
-        interval = [self.value - 1.96 * self.std, self.value + 1.96 * self.std] if known else None
-        return {
-            "value": self.value,
-            "std": self.std if known else None,
-            "interval_95": interval,
-            "unit": self.unit,
-        }
+        """Return the entry of ``discovery.json``; it has no interval if the value is not determined."""
+        width = 1.96 * self.std
+        interval = (self.value - width, self.value + width) if math.isfinite(width) else None
+        return {"value": self.value, "std": self.std, "interval_95": interval, "unit": self.unit}
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,7 @@ class Term:
     where: str = ""  # joint at which it acts; empty for a rig with one joint
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
+        """Return the entry of ``discovery.json``."""
         return {
             "name": self.name,
             "summary": self.summary,
@@ -71,15 +67,6 @@ class Alternative:
     # Information criteria of that error with the number of independent samples.
     aic: float
     bic: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data; the figures of a support that could not be simulated are None."""
-        numbers = {"held_out": self.held_out, "aic": self.aic, "bic": self.bic}
-        return {
-            "terms": list(self.terms),
-            "n_parameters": self.n_parameters,
-            **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,29 +160,29 @@ class Discovery:
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``discovery.json``."""
-        return {
+        content = {
             "schema_version": SCHEMA_VERSION,
             "title": self.title,
             "rig": self.rig,
             "method": self.method,
             "form": self.form,
-            "equations": list(self.equations),
-            "latex": list(self.latex),
+            "equations": self.equations,
+            "latex": self.latex,
             "rig_parameters": {
                 name: {**c.to_json(), "given": self.given.get(name)}
                 for name, c in self.rig_parameters.items()
             },
             "terms": [term.to_json() for term in self.terms],
-            "alternatives": [alternative.to_json() for alternative in self.alternatives],
-            "force_equation": dict(self.force_equation),
+            "alternatives": self.alternatives,
+            "force_equation": self.force_equation,
             "held_out": {
-                "records": list(self.held_out),
-                "error_in_noise_floors": self.held_out_error if math.isfinite(self.held_out_error) else None,
-                "nrmse": self.held_out_nrmse if math.isfinite(self.held_out_nrmse) else None,
-                "noise_floor": self.noise_floor if math.isfinite(self.noise_floor) else None,
+                "records": self.held_out,
+                "error_in_noise_floors": self.held_out_error,
+                "nrmse": self.held_out_nrmse,
+                "noise_floor": self.noise_floor,
                 "independent_samples": self.independent,
             },
-            "warnings": list(self.warnings),
+            "warnings": self.warnings,
             "records": [
                 {"record": r.name, "role": r.role, "kind": r.kind, "amplitude": r.amplitude}
                 for r in self.records
@@ -206,3 +193,4 @@ class Discovery:
                 for name, found in self.by_record
             },
         }
+        return json_data(content)

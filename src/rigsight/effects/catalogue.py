@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rigsight.effects.actuator_lag import ACTUATOR_LAG
 from rigsight.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS
 from rigsight.effects.backlash import BACKLASH
@@ -10,6 +12,7 @@ from rigsight.effects.conicity_variation import CONICITY_VARIATION
 from rigsight.effects.coulomb_friction import COULOMB_FRICTION
 from rigsight.effects.creep_saturation import CREEP_SATURATION
 from rigsight.effects.cubic_stiffness import CUBIC_STIFFNESS
+from rigsight.effects.directional_damping import DIRECTIONAL_DAMPING
 from rigsight.effects.directional_friction import DIRECTIONAL_FRICTION
 from rigsight.effects.effect import Effect, Family
 from rigsight.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
@@ -30,6 +33,7 @@ from rigsight.effects.position_dependent_damping import POSITION_DEPENDENT_DAMPI
 from rigsight.effects.power_law_stiffness import POWER_LAW_STIFFNESS
 from rigsight.effects.presliding_friction import PRESLIDING_FRICTION
 from rigsight.effects.quadratic_damping import QUADRATIC_DAMPING
+from rigsight.effects.rectified_sensor import RECTIFIED_SENSOR
 from rigsight.effects.sensor_delay import SENSOR_DELAY
 from rigsight.effects.sensor_lag import SENSOR_LAG
 from rigsight.effects.speed_limit import SPEED_LIMIT
@@ -48,6 +52,7 @@ CATALOGUE: tuple[Effect, ...] = (
     LOAD_DEPENDENT_FRICTION,
     PRESLIDING_FRICTION,
     QUADRATIC_DAMPING,
+    DIRECTIONAL_DAMPING,
     POSITION_DEPENDENT_DAMPING,
     CUBIC_STIFFNESS,
     POWER_LAW_STIFFNESS,
@@ -71,18 +76,19 @@ CATALOGUE: tuple[Effect, ...] = (
     SENSOR_LAG,
     TIME_SHIFT,
     ENCODER_ECCENTRICITY,
+    RECTIFIED_SENSOR,
 )
 
 
-def effect_named(name: str) -> Effect:
-    """Return the effect of the catalogue with this name, at its place where it names one: ``"coulomb_friction@shaft"``.
+def effect_named(name: str, known: Iterable[Effect] = CATALOGUE) -> Effect:
+    """Return the known effect with this name, at its place where it names one: ``"coulomb_friction@shaft"``.
 
     Raises
     ------
     InputError
         Naming the nearest and all known effects.
     """
-    effects = {effect.name: effect for effect in CATALOGUE}
+    effects = {effect.name: effect for effect in known}
     kind, at, place = name.partition(AT)
     effect = effects[check_option("Effect", kind, effects)]
     return placed(effect, place) if at else effect

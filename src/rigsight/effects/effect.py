@@ -21,6 +21,37 @@ class Place(StrEnum):
     SENSOR = "sensor"
 
 
+@dataclass(frozen=True)
+class Part:
+    """A part of a rig that an effect can replace: a field of `Effect`."""
+
+    places: tuple[Place, ...]  # at which the part is
+    text: str  # an equation of the part in words, with ``{}`` for its new expression
+    reads: tuple[str, ...] = ()  # signals that the expression may hold, names of `rigsight.effects.symbols`
+    # The same for the rates of the effect's states; None if it can have none.
+    states_read: tuple[str, ...] | None = None
+
+
+_MOTION = ("x", "v", "t", "k", "m", "position", "acceleration")
+_LOADED = (*_MOTION, "load")
+_SPRING = (*_MOTION, "spring_torque", "deflection", "deflection_rate")
+_DRIVE = ("u", "v", "t")
+_CONTACT = ("creepage", "creep_gain", "lateral_displacement", "lateral_feedback")
+_READING = ("reading", "t")
+
+PARTS = {
+    "torque": Part((Place.DYNAMICS, Place.DISTURBANCE), "resisting torque = {}", _LOADED, _LOADED),
+    "spring": Part((Place.DYNAMICS,), "spring torque = {}", _SPRING, _SPRING),
+    "deflection": Part((Place.DYNAMICS,), "deflection of the spring = {}", ("x",), ("x", "v")),
+    "drive": Part((Place.ACTUATOR,), "drive = {}", _DRIVE, _DRIVE),
+    "delay": Part((Place.ACTUATOR,), "drive = u(t - {})"),
+    "lateral": Part((Place.LATERAL_DYNAMICS,), "lateral rate = {}", _CONTACT),
+    "measured": Part((Place.SENSOR,), "measured = {}", _READING, _READING),
+    "reading_delay": Part((Place.SENSOR,), "measured = reading(t - {})"),
+}
+"""What an effect can do at which place, by the name of the field that declares it."""
+
+
 class Family(StrEnum):
     """What kind of cause an effect is: records that show the family often leave open which of its forms it is."""
 
@@ -227,6 +258,12 @@ class Effect:
     at: str | None = None
 
     @property
+    def equations(self) -> dict[str, sp.Expr]:
+        """Its new expressions by the part of the rig that they replace; a valid effect has one."""
+        found = {part: getattr(self, part) for part in PARTS}
+        return {part: expression for part, expression in found.items() if expression is not None}
+
+    @property
     def parents(self) -> tuple[str, ...]:
         """Effects that this one contains as a special or limiting case."""
         others = (start.parent for start in self.starts if start.parent != self.name)
@@ -256,11 +293,8 @@ class Effect:
         signal
             One of `rigsight.effects.symbols`.
         """
-        equations = (
-            self.torque, self.spring, self.deflection, self.drive, self.delay, self.lateral, self.measured, self.reading_delay,
-            *(part for state in self.states for part in (state.rate, state.limit)),
-        )  # fmt: skip
-        return any(part is not None and signal in part.free_symbols for part in equations)
+        of_states = (part for state in self.states for part in (state.rate, state.limit) if part is not None)
+        return any(signal in part.free_symbols for part in (*self.equations.values(), *of_states))
 
     def null_values(self) -> dict[str, float]:
         """Return the parameter values at which the effect vanishes."""

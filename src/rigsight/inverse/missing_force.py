@@ -6,7 +6,7 @@ direction says how well this joint alone explains it; what noise of the sensors 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,7 @@ from rigsight.records import Record
 Floats = NDArray[np.float64]
 
 _CLASSES, _CLASS_ROWS = 24, 8
-"""Classes of equal size, by displacement or velocity, over which a force is averaged: at most so many, of at least so many rows."""
+"""Number of classes, by displacement or velocity, over which a force is averaged at most, and of rows in each at least."""
 _SHORT = 10
 _SEED = 0
 """The noise of a weight is the same for equal records: a diagnosis depends on its records alone."""
@@ -96,7 +96,7 @@ class MissingForce:
 
 
 def missing_forces(
-    fit: EquationFit, values: Mapping[str, float], noise: Mapping[str, float]
+    fit: EquationFit, values: Mapping[str, float], covariance: Floats | None
 ) -> tuple[MissingForce, ...]:
     """Return the missing force at each joint, the one that explains most first.
 
@@ -106,11 +106,14 @@ def missing_forces(
         Equations and motions.
     values
         Constants and parameters of the equations.
-    noise
-        Standard deviation of the noise of each sensor; where there is none, every equation counts in units of its own residual.
+    covariance
+        Of the rows by noise of the sensors, see `noise_of_rows`; None: every equation counts in units of its own residual.
     """
     rows = [_inner(motion, fit.residual(motion, values)) for motion in fit.motions]
-    weight = _weight(fit, values, rows, noise)
+    if covariance is None:
+        weight = np.diag([1.0 / max(float(np.mean(own**2)), 1e-300) for own in np.concatenate(rows, axis=1)])
+    else:
+        weight = np.linalg.pinv(covariance, hermitian=True)
     n_equations, n_rows = weight.shape[0], sum(own.shape[1] for own in rows)
     whole = sum(float(np.einsum("it,ij,jt->", own, weight, own)) for own in rows) - n_equations * n_rows
     found = []
@@ -157,26 +160,25 @@ def _inner(motion: RecordMotion, rows: Floats) -> Floats:
     return thinned[..., 1:-1] if thinned.shape[-1] > _SHORT else thinned
 
 
-def _weight(
-    fit: EquationFit, values: Mapping[str, float], rows: Sequence[Floats], noise: Mapping[str, float]
-) -> Floats:
-    """Return the inverse covariance of the equations' rows under noise of the sensors, shape (n_equations, n_equations)."""
-    plain = np.diag([1.0 / max(float(np.mean(own**2)), 1e-300) for own in np.concatenate(rows, axis=1)])
+def noise_of_rows(fit: EquationFit, values: Mapping[str, float], noise: Mapping[str, float]) -> Floats | None:
+    """Return the covariance of the rows of all equations that noise of the sensors causes, shape (n_equations, n_equations).
+
+    None where the noise of a sensor is not known.
+    """
     read = [s.name for s in fit.rig.outputs if all(s.name in motion.record for motion in fit.motions)]
     if not read or not all(noise.get(name, 0.0) > 0.0 for name in read):
-        return plain
+        return None
     rng = np.random.default_rng(_SEED)
     noisy = [_with_noise(motion, {name: noise[name] for name in read}, rng) for motion in fit.motions]
     try:
         moved = record_motions(fit.rig, noisy, values)
     except SimulationError:
-        return plain
+        return None
     changes = [
         _inner(motion, fit.residual(other, values) - fit.residual(motion, values))
         for motion, other in zip(fit.motions, moved, strict=True)
     ]
-    covariance = np.atleast_2d(np.cov(np.concatenate(changes, axis=1)))
-    return np.asarray(np.linalg.pinv(covariance, hermitian=True))
+    return np.atleast_2d(np.cov(np.concatenate(changes, axis=1)))
 
 
 def _with_noise(motion: RecordMotion, noise: Mapping[str, float], rng: np.random.Generator) -> Record:

@@ -35,7 +35,7 @@ from rigsight.inverse.equation_fit import (
     with_all_inputs,
 )
 from rigsight.inverse.measured_motion import WIDER
-from rigsight.inverse.missing_force import MissingForce, missing_forces
+from rigsight.inverse.missing_force import MissingForce, missing_forces, noise_of_rows
 from rigsight.rigs import Rig
 
 Floats = NDArray[np.float64]
@@ -87,6 +87,8 @@ class Proposal:
     # Share that the best of so many terms exceeds in one of a hundred cases if none has to do with the
     # residual.
     by_chance: float
+    # Share of the squared residual that noise of the sensors causes; None where their noise is not known.
+    noise: float | None = None
     # At each joint, of any shape, the one that explains most first.
     forces: tuple[MissingForce, ...] = ()
 
@@ -98,6 +100,7 @@ class Proposal:
             "taken": [cause.to_json() for cause in self.taken],
             "explained": self.explained,
             "by_chance": self.by_chance,
+            "noise": self.noise,
         }
 
 
@@ -135,10 +138,16 @@ def propose(
     scales = characteristic_scales(rig, records, own)
     terms_of = EffectTerms(fit, values, scales)
     terms = [term for effect in effects for term in terms_of.of(effect)]
-    forces = missing_forces(fit, values, noise or {})
-    if not terms:
-        return Proposal((), (), frozenset(), 0.0, 1.0, forces)
-    return replace(_Selection(fit, values, terms).proposal(rig), forces=forces)
+    covariance = noise_of_rows(fit, values, noise or {})
+    by_noise = None
+    if covariance is not None:
+        by_noise = min(1.0, float(np.mean(np.diag(covariance) / fit.rms(values) ** 2)))
+    found = (
+        _Selection(fit, values, terms).proposal(rig)
+        if terms
+        else Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
+    )
+    return replace(found, noise=by_noise, forces=missing_forces(fit, values, covariance))
 
 
 def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit, dict[str, float]]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
+from rigsight.json_data import json_data
 from rigsight.records.channel_names import closeness
 from rigsight.records.channel_summary import ChannelSummary, summarize, time_summary
 from rigsight.records.formats.channel import Channel, ChannelFile, Refused
@@ -38,15 +39,16 @@ class Inspection:
 
     def to_json(self) -> dict[str, Any]:
         """Return the contents for JSON."""
-        return {
+        content = {
             "schema_version": SCHEMA_VERSION,
             "file": self.file,
             "format": self.format,
-            "channels": [asdict(channel) for channel in self.channels],
+            "channels": self.channels,
             "times": {name: {"step": step, "n_gaps": gaps} for name, (step, gaps) in self.times.items()},
-            "refused": [asdict(refused) for refused in self.refused],
+            "refused": self.refused,
             "proposal": {"model": self.model, "toml": self.proposal, "n_blanks": self.n_blanks},
         }
+        return json_data(content)
 
 
 def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:

@@ -15,6 +15,7 @@ from rigsight.errors import InputError, SimulationError, check_in_range, check_o
 from rigsight.frequency import FrequencyResponse
 from rigsight.frequency.signal_pair import pair_unit
 from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_break_frequency, peak
+from rigsight.json_data import json_data
 from rigsight.parameters import Parameter
 from rigsight.plot import png_bytes, svg_text
 from rigsight.plot.frequency_responses import Curve, varied_responses
@@ -340,7 +341,7 @@ def _write(
         "schema_version": SCHEMA_VERSION,
         "model": name,
         "rig": rig.name,
-        "effects": list(model.structure.effect_names),
+        "effects": model.structure.effect_names,
         "source": source.name,
         "response": response.name,
         "unit": _unit(source.unit, response.unit),
@@ -351,7 +352,7 @@ def _write(
             "omega_start": MARGIN[0] * float(ratio.omega[0]),
             "omega_stop": MARGIN[1] * float(ratio.omega[-1]),
         },
-        "omega": [float(omega) for omega in ratio.omega],
+        "omega": ratio.omega,
         "parameters": [
             {
                 "name": variation.parameter.name,
@@ -363,23 +364,14 @@ def _write(
             for variation in variations
         ],
     }
-    write_together(folder, {**contents, VARY_FILE: json_text(content)})
+    write_together(folder, {**contents, VARY_FILE: json_text(json_data(content))})
 
 
 def _row(variant: Variant) -> dict[str, Any]:
-    curve: Mapping[str, list[float]] = {}
-    if variant.response is not None:
-        curve = {
-            "magnitude": [float(value) for value in variant.response.magnitude],
-            "phase": [float(value) for value in variant.response.phase],
-        }
-    return {
-        "value": variant.value,
-        "error": variant.error,
-        **variant.features,
-        "note": variant.note,
-        **curve,
-    }
+    found = {"value": variant.value, "error": variant.error, **variant.features, "note": variant.note}
+    if variant.response is None:
+        return found
+    return {**found, "magnitude": variant.response.magnitude, "phase": variant.response.phase}
 
 
 def _curves(variation: Variation) -> list[Curve]:

@@ -48,6 +48,16 @@ class AmplitudeDependence:
     records: tuple[str, ...] = ()  # the two records that were compared
     path: str = ""  # input and sensor, as in ``"u -> x"``; empty where there is none
 
+    def to_json(self) -> dict[str, Any]:
+        """Return the answer as it stands in ``diagnosis.json``."""
+        return {
+            "kind": "amplitude_dependence",
+            "path": self.path,
+            "answer": self.response,
+            "sentence": self.sentence,
+            "records": self.records,
+        }
+
 
 @dataclass(frozen=True)
 class DataQuality:
@@ -65,14 +75,4 @@ class DataQuality:
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return the list ``data_quality`` of ``diagnosis.json``; the last entries are the answers about the amplitude."""
-        responses = [
-            {
-                "kind": "amplitude_dependence",
-                "path": own.path,
-                "answer": own.response,
-                "sentence": own.sentence,
-                "records": list(own.records),
-            }
-            for own in self.amplitudes
-        ]
-        return [*(finding.to_json() for finding in self.findings), *responses]
+        return [*(one.to_json() for one in self.findings), *(one.to_json() for one in self.amplitudes)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,10 +23,6 @@ class GapPart:
     noise_share: float
     # Unit of each key by which the gap is split, where it has one.
     units: Mapping[str, str] = field(default_factory=dict)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return a plain object; numbers that are not finite become None."""
-        return {key: _plain(value) for key, value in dataclasses.asdict(self).items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,25 +131,13 @@ class Localization:
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields of ``diagnosis.json`` that begin with ``gap_by_``, and the sentence."""
-        parts = {
+        return {
             "gap_by_record": self.by_record,
             "gap_by_band": self.by_band,
             "gap_by_amplitude": self.by_amplitude,
             "gap_by_state": self.by_state,
             "gap_by_time": self.by_time,
             "gap_by_path": self.by_path,
+            "path_evidence": self.sentence,
+            "noise_floor_shape": self.noise_shape,
         }
-        lists: dict[str, Any] = {
-            name: [part.to_json() for part in entries] for name, entries in parts.items()
-        }
-        return {**lists, "path_evidence": self.sentence, "noise_floor_shape": dict(self.noise_shape)}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
-    return value

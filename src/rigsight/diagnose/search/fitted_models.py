@@ -21,7 +21,7 @@ from rigsight.diagnose.search.several.pairs import refit_singles
 from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
 from rigsight.diagnose.search.several.several_effects import several_effects
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
-from rigsight.diagnose.search.worth_fitting import worth_fitting
+from rigsight.diagnose.search.worth_fitting import worth_combining, worth_fitting
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
@@ -152,8 +152,9 @@ def with_several_effects(
         if _explained(cut, cut.singles, at_floor):
             return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms)
     checks = Checks(context, rng, VERDICT.at_floor, most_remainder)
+    together = worth_combining(models.proposal, models.effects)
     found = several_effects(
-        context, models.reidentified, models.singles, models.effects, forms, checks, lower_bound, prepare
+        context, models.reidentified, models.singles, together, forms, checks, lower_bound, prepare
     )
     models = replace(models, singles=refit_singles(context, models.singles, found))
     if whole and not is_predictable(context, models.reidentified, found, allowed, rng):

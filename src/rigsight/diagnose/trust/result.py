@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -83,10 +82,7 @@ class Trust:
             "statement": self.statement,
             "stable": self.stable,
             "parameters": [_parameter(parameter) for parameter in self.parameters],
-            "entangled": [
-                {"names": list(pair.names), "correlation": _number(pair.correlation), "text": pair.text}
-                for pair in self.entangled
-            ],
+            "entangled": self.entangled,
         }
 
 
@@ -95,24 +91,15 @@ def _parameter(parameter: ParameterTrust) -> dict[str, Any]:
     return {
         "name": parameter.name,
         "unit": parameter.unit,
-        "value": _number(parameter.value),
-        "std": _number(parameter.std),
+        "value": parameter.value,
+        "std": parameter.std,
         "of_effect": parameter.of_effect,
-        "by_group": {
-            kind: [
-                {"group": one.group, "value": _number(one.value), "std": _number(one.std)} for one in groups
-            ]
-            for kind, groups in parameter.groups.items()
-        },
-        "p_value": _number(parameter.p_value),
-        "largest_difference": _number(parameter.largest),
-        "pattern": str(parameter.pattern),
+        "by_group": parameter.groups,
+        "p_value": parameter.p_value,
+        "largest_difference": parameter.largest,
+        "pattern": parameter.pattern,
         "direction": parameter.moves if parameter.direction else None,
-        "goes_with": list(parameter.goes_with),
+        "goes_with": parameter.goes_with,
         "points_to": None if reported is None else reported.cause,
         "next_experiment": None if reported is None else reported.experiment,
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -132,7 +132,7 @@ class JointForce:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data without the traces."""
+        """Return the entry of a file, without the traces."""
         return {
             "where": self.joint,
             "share": self.share,

@@ -6,7 +6,6 @@ by its likelihood, which is comparable between joints and so also shows at which
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -79,13 +78,12 @@ class LawTerm:
         return f"{shape} ({kind}: {numbers})"
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; nonlinear and undetermined parameters have no standard error."""
-        known = {name: std for name, std in self.std.items() if math.isfinite(std)}
+        """Return the entry of a file; nonlinear and undetermined parameters have no standard error there."""
         return {
             "name": kind_of(self.effect.name),
             "where": self.effect.at,
             "coefficients": {
-                name: {"value": value, "std": known.get(name), "unit": self.units[name]}
+                name: {"value": value, "std": self.std.get(name), "unit": self.units[name]}
                 for name, value in self.values.items()
             },
         }

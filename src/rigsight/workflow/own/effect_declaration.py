@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import keyword
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from functools import cache
 from typing import Annotated, Any, get_type_hints
@@ -29,13 +29,14 @@ from rigsight.effects import (
     SumAndDifference,
 )
 from rigsight.effects import symbols as canonical
+from rigsight.effects.effect import PARTS
 from rigsight.errors import nearest, shown
 from rigsight.parameters import Parameter
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import compose
 from rigsight.units import parse_dimension
 
-_PARTS = (Parameter, Signature, Start, State, SumAndDifference)
+_COMPONENTS = (Parameter, Signature, Start, State, SumAndDifference)
 _BEHIND = "(a single one needs a comma after it)"
 _WANTED = {
     "str": "a text",
@@ -49,7 +50,10 @@ _WANTED = {
     "tuple[float, ...]": f"numbers in a tuple {_BEHIND}",
     "tuple[tuple[str, str], ...]": 'a tuple of pairs of parameter names, such as (("T_s", "T_c"),)',
     "Signature": "a Signature, for instance Signature(GainTrend.FALLS)",
-    **{f"tuple[{part.__name__}, ...]": f"a tuple of {part.__name__} objects {_BEHIND}" for part in _PARTS},
+    **{
+        f"tuple[{part.__name__}, ...]": f"a tuple of {part.__name__} objects {_BEHIND}"
+        for part in _COMPONENTS
+    },
     **{
         kind.__name__: f"one of {', '.join(f'{kind.__name__}.{one.name}' for one in kind)}"
         for kind in (Energy, Family, GainTrend, Place)
@@ -58,31 +62,6 @@ _WANTED = {
 """Annotation of a field -> what to give."""
 
 
-_MOTION = ("x", "v", "t", "k", "m", "position", "acceleration")
-_MAY_READ: Mapping[str, tuple[str, ...]] = {
-    "torque": (*_MOTION, "load"),
-    "spring": (*_MOTION, "spring_torque", "deflection", "deflection_rate"),
-    "deflection": ("x",),
-    "drive": ("u", "v", "t"),
-    "delay": (),
-    "lateral": ("creepage", "creep_gain", "lateral_displacement", "lateral_feedback"),
-    "measured": ("reading", "t"),
-    "reading_delay": (),
-}
-_STATES_MAY_READ: Mapping[str, tuple[str, ...]] = {
-    **_MAY_READ,
-    "deflection": ("x", "v"),
-    "delay": (),
-    "lateral": (),
-}
-_PLACES: Mapping[Place, tuple[str, ...]] = {
-    Place.ACTUATOR: ("drive", "delay"),
-    Place.DYNAMICS: ("torque", "spring", "deflection"),
-    Place.DISTURBANCE: ("torque",),
-    Place.LATERAL_DYNAMICS: ("lateral",),
-    Place.SENSOR: ("measured", "reading_delay"),
-}
-_WITH_STATES = ("torque", "spring", "deflection", "drive", "measured")
 _KINKS = (sp.Abs, sp.sign, canonical.positive_part)
 _SMOOTH = (
     sp.exp, sp.log, sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.sinh, sp.cosh, sp.tanh, sp.asinh,
@@ -101,12 +80,6 @@ def declaration_faults(effect: Effect) -> tuple[str, ...]:
     return found or tuple(_composition_faults(effect))
 
 
-def equations(effect: Effect) -> dict[str, sp.Expr]:
-    """Return the parts of the rig that an effect changes, by field, with their new expressions."""
-    found = {field: getattr(effect, field) for field in _MAY_READ}
-    return {field: expression for field, expression in found.items() if expression is not None}
-
-
 def _name_faults(effect: Effect) -> Iterator[str]:
     if not effect.name.isidentifier() or not effect.name.isascii() or effect.name != effect.name.lower():
         yield f"the name '{effect.name}' must consist of lower-case letters, digits and underscores."
@@ -118,11 +91,11 @@ def _name_faults(effect: Effect) -> Iterator[str]:
 
 
 def _parameter_faults(effect: Effect) -> Iterator[str]:
-    expressions = [*equations(effect).values(), *(s.rate for s in effect.states)]
+    expressions = [*effect.equations.values(), *(s.rate for s in effect.states)]
     expressions += [state.limit for state in effect.states if state.limit is not None]
     used = {symbol.name for expression in expressions for symbol in expression.free_symbols}
     names = [p.name for p in effect.parameters]
-    signals = {name for names in _STATES_MAY_READ.values() for name in names}
+    signals = {name for part in PARTS.values() for name in part.states_read or ()}
     if not effect.null_values():
         yield "no parameter has a null value; give null=..., the value at which the effect vanishes, for at least one."
     for p in effect.parameters:
@@ -190,8 +163,8 @@ def _dimension_faults(p: Parameter) -> Iterator[str]:
 
 
 def _equation_faults(effect: Effect) -> Iterator[str]:
-    changed = equations(effect)
-    fitting = _PLACES[effect.place]
+    changed = effect.equations
+    fitting = [name for name, part in PARTS.items() if effect.place in part.places]
     if len(changed) != 1:
         got = ", ".join(changed) or "none"
         yield f"it must define exactly one expression, got {got}; allowed at {effect.place.value}: {', '.join(fitting)}."
@@ -199,12 +172,14 @@ def _equation_faults(effect: Effect) -> Iterator[str]:
     ((field, expression),) = changed.items()
     if field not in fitting:
         yield f"{field} is not allowed at the place {effect.place.value}; allowed: {', '.join(fitting)}."
-    if effect.states and field not in _WITH_STATES:
-        yield f"{field} cannot have states; only {', '.join(_WITH_STATES)} can."
-    yield from _expression_faults(effect, field, expression, _MAY_READ[field])
+    part = PARTS[field]
+    if effect.states and part.states_read is None:
+        others = [name for name, other in PARTS.items() if other.states_read is not None]
+        yield f"{field} cannot have states; only {', '.join(others)} can."
+    yield from _expression_faults(effect, field, expression, part.reads)
     for state in effect.states:
         yield from _expression_faults(
-            effect, f"the rate of {state.symbol}", state.rate, _STATES_MAY_READ[field]
+            effect, f"the rate of {state.symbol}", state.rate, part.states_read or ()
         )
         if state.limit is not None:
             yield from _expression_faults(effect, f"the limit of {state.symbol}", state.limit, ())
@@ -266,11 +241,11 @@ def _models() -> dict[type, type[BaseModel]]:
     """Return a model for an effect and for each of its parts, whose fields accept only values of the annotated type."""
     instance: Any = InstanceOf
     # A part is checked field by field on its own, so that a sentence names its field.
-    own = {part.__name__: instance[part] for part in _PARTS}
+    own = {part.__name__: instance[part] for part in _COMPONENTS}
     own["float"] = Annotated[float, PlainValidator(_number)]
     config = ConfigDict(strict=True, arbitrary_types_allowed=True)
     found: dict[type, type[BaseModel]] = {}
-    for declared in (Effect, *_PARTS):
+    for declared in (Effect, *_COMPONENTS):
         hints = get_type_hints(declared, localns=own, include_extras=True)
         types: dict[str, Any] = {name: (hint, ...) for name, hint in hints.items()}
         found[declared] = create_model(declared.__name__, __config__=config, **types)
@@ -296,7 +271,7 @@ def _faults(where: str, declared: type, holder: object) -> Iterator[str]:
             got = wrong[field.name]
             yield f"{where}{field.name} {'is' if got is value else 'contains'} {shown(got)}; give {_wanted(str(field.type))}."
         for part in value if isinstance(value, tuple) else (value,):
-            for kind in _PARTS:
+            for kind in _COMPONENTS:
                 if isinstance(part, kind):
                     yield from _faults(f"{field.name}: ", kind, part)
 

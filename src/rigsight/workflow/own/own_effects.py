@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigsight.discover.terms.monomials import known_terms
-from rigsight.effects import AT, CATALOGUE, Effect, placed
-from rigsight.errors import InputError, check_option
+from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.effects.effect import PARTS
+from rigsight.errors import InputError
 from rigsight.simulate.printing.text import text
 from rigsight.workflow.own.effect_checks import failed_checks
-from rigsight.workflow.own.effect_declaration import declaration_faults, equations
+from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.python_file import run_python_file
 from rigsight.workflow.run.progress import Listener, Stage, silent
 
@@ -89,28 +90,13 @@ def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
 
     A name may say where the effect acts, ``coulomb_friction@shaft``; whether the rig has this place is checked later.
     """
-    known = {effect.name: effect for effect in (*CATALOGUE, *own)}
-    found = []
-    for name in dict.fromkeys(names):
-        kind, at, place = name.partition(AT)
-        effect = known[check_option("Effect", kind, known)]
-        found.append(placed(effect, place) if at else effect)
-    return tuple(found) or tuple(known.values())
+    known = (*CATALOGUE, *own)
+    return tuple(effect_named(name, known) for name in dict.fromkeys(names)) or known
 
 
 def equation_text(effect: Effect) -> str:
     """Return the equation of an effect in one line of plain text, shortened if it is long."""
-    reported = {
-        "torque": "resisting torque = {}",
-        "spring": "spring torque = {}",
-        "deflection": "deflection of the spring = {}",
-        "drive": "drive = {}",
-        "delay": "drive = u(t - {})",
-        "lateral": "lateral rate = {}",
-        "measured": "measured = {}",
-        "reading_delay": "measured = reading(t - {})",
-    }
-    lines = [reported[field].format(text(expression, {})) for field, expression in equations(effect).items()]
+    lines = [PARTS[part].text.format(text(expression, {})) for part, expression in effect.equations.items()]
     for state in effect.states:
         limit = "" if state.limit is None else f" within +-{text(state.limit, {})}"
         lines.append(f"{state.symbol}' = {text(state.rate, {})}{limit}")
