@@ -18,13 +18,13 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
-from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.errors import RigsightError
 from rigsight.identify import IdleThreads
+from rigsight.identify.fit.windows import Windowing
 from rigsight_bench.trials import draw_trial
 
 HERE = Path(__file__).parent

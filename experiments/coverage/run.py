@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from plants import Drawn, drawn
 
+from rigsight.diagnose import candidates_on
 from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.uncertainty.bootstrap import uncertainty_of
 from rigsight.effects import CATALOGUE, Effect

@@ -13,12 +13,12 @@ from pathlib import Path
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
-from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import CATALOGUE
 from rigsight.identify import IdleThreads
+from rigsight.identify.fit.windows import Windowing
 from rigsight_bench.trials import draw_trial
 from rigsight_bench.trials.standard.subjects import standard_subject_of
 

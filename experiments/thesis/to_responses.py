@@ -13,14 +13,18 @@ from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.fit.coordinates import STEP, Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.fit.fit_result import FitResult
-from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calibration, Minimum, better
-from rigsight.identify.hysteresis.derived import derived_quantities
-from rigsight.identify.hysteresis.parameters import (
+from rigsight.identify.fit.fit_data import FitResult
+from rigsight.identify.hysteresis.calibration import (
+    BEYOND,
+    RELEASE_GAIN,
+    Calibration,
+    Minimum,
+    better,
     checked_free,
     special_structure,
     start_values,
 )
+from rigsight.identify.hysteresis.derived import derived_quantities
 from rigsight.identify.hysteresis.search import SearchBox, search
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.simulate import Structure
@@ -105,7 +109,7 @@ def calibrate_to_responses(
         progress=lambda generation: tell(f"generation {generation}"),
     )
     rough = []
-    for theta in ends.usable:
+    for theta in ends:
         rough.append(look.refined(theta, 1e-4))
         tell("refined an end of the search")
     rough.sort(key=lambda solution: float(solution.cost))
@@ -118,7 +122,7 @@ def calibrate_to_responses(
     amplitudes = sorted(
         {float(np.max(r.measured.magnitude)) * r.amplitude for r in responses if _of_motion(structure, r)}
     )
-    return Calibration(fit, derived_quantities(fit, amplitudes, scales, rng), minima, ends.n_evaluations)
+    return Calibration(fit, derived_quantities(fit, amplitudes, scales, rng), minima)
 
 
 def _of_motion(structure: Structure, response: SweptResponse) -> bool:

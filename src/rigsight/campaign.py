@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from rigsight.effects import Effect
-from rigsight.identify import OpenFactor, open_factor
+from rigsight.identify import OpenFactor, open_factor, weighed_spring
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.drift import can_drift
@@ -105,3 +105,21 @@ class Campaign:
         if self.rig.has_one_motion:
             return self.given_without_spring is not None
         return can_drift(self.rig, {**self.constants, **self.given})
+
+
+def with_weighed_spring(campaign: Campaign) -> Campaign:
+    """Return a campaign whose fits estimate an absent spring if its records show one, with a note on what was found.
+
+    The given simulation keeps a stiffness of zero.
+    """
+    name, factor = campaign.absent_spring, campaign.open_factor
+    if name is None:
+        return campaign
+    held = {} if factor is None else {factor.held: factor.value}
+    weighed = weighed_spring(
+        campaign.rig, campaign.estimation, campaign.constants, campaign.given, campaign.modelled, name, held
+    )
+    if weighed is None:
+        return campaign
+    found, note = weighed
+    return replace(campaign, spring_released=found, notes=(*campaign.notes, note))

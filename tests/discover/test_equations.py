@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rigsight.discover.terms.equations import equations, held_numbers
+from rigsight.discover.assembly import equations, held_numbers
 from rigsight.effects import effect_named
 from rigsight.effects.iwan_hysteresis import N_ELEMENTS
 from rigsight.identify import FitResult

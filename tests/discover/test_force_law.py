@@ -9,12 +9,10 @@ import pytest
 import sympy as sp
 
 from rigsight.discover.bench import Bench
-from rigsight.discover.ensembles import regressed_force
-from rigsight.discover.motion import Motion
-from rigsight.discover.regression import Projected
-from rigsight.discover.terms.force_law import ForceLaw, force_equation
+from rigsight.discover.ensembles import ForceLaw, force_equation, regressed_force
+from rigsight.discover.motion import Motion, Rows
+from rigsight.discover.regression import Projected, Regressed
 from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.weak_form import Rows
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.effects.symbols import deflection_rate
 from rigsight.identify import FitResult
@@ -90,5 +88,6 @@ def test_springs_act_about_the_rest_that_was_fitted(monkeypatch: pytest.MonkeyPa
         projected = Projected(np.ones((4, 1)), np.ones(4), 4.0)
         bench = Bench(AXIS, (), (), {**values, "x_off": rest}, {}, {}, frozenset(), {}, projected)
         motion = Motion(Record("run", 1e-3, {"u": u}, {}), x - rest, v, acceleration, u, x - rest)
-        regressed_force(bench, fit, [motion], Rows.weak(0.1), np.random.default_rng(0))
+        regressed = Regressed([motion], Rows.weak(0.1), projected, {}, driven=True)
+        regressed_force(bench, fit, regressed, np.random.default_rng(0))
     np.testing.assert_allclose(seen[0], seen[1], rtol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 
 from rigsight.discover import RegressionData
 from rigsight.discover.motion import motion_of
-from rigsight.discover.regression import own_regression, rows_of
+from rigsight.discover.regression import Regressed
 from rigsight.discover.terms.library import candidates
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
@@ -31,10 +31,9 @@ def test_a_column_is_the_term_along_the_motion(
     values, data = make_data("cubic", 2e-5, amplitudes=(0.6,), validation=False)
     motion = motion_of(data.rig, data.records[0], values, 2e-5)
     scales = characteristic_scales(data.rig, data.records, values)
-    rows = rows_of([motion], scales["time"])
-    projected = own_regression(data.rig, True, [motion], rows)
-    (found,) = candidates([effect_named(name)], [motion], rows, projected, scales, True)
+    regressed = Regressed.of(data.rig, True, [motion], scales)
+    (found,) = candidates([effect_named(name)], regressed)
     # A force that resists: it takes acceleration away.
     np.testing.assert_allclose(
-        found.column, -rows.of(term(motion.x, motion.v), motion.dt), rtol=1e-6, atol=1e-15
+        found.column, -regressed.rows.of(term(motion.x, motion.v), motion.dt), rtol=1e-6, atol=1e-15
     )

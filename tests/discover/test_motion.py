@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.discover import RegressionData
-from rigsight.discover.motion import motion_of
-from rigsight.discover.weak_form import Rows, windows
+from rigsight.discover.motion import Rows, motion_of, windows
 
 Make = Callable[..., tuple[dict[str, float], RegressionData]]
 

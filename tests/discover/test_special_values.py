@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.discover.assembly import doubts
 from rigsight.discover.bench import Attempt, Bench, Trial
-from rigsight.discover.doubts import doubts
 from rigsight.discover.regression import Projected
 from rigsight.discover.result import Coefficient
 from rigsight.discover.selection import select

@@ -10,8 +10,8 @@ from rigsight.errors import InputError
 from rigsight.excitation import log_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.hysteresis import Calibration, calibrate_to_records, derived_quantities, loop_area
+from rigsight.identify.hysteresis.calibration import free_parameters
 from rigsight.identify.hysteresis.derived import record_amplitudes
-from rigsight.identify.hysteresis.parameters import free_parameters
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.rigs.published import published_sets

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.first_states import first_state
-from rigsight.identify.fit.variable_projection import VariableProjection
+from rigsight.identify.fit.search import VariableProjection
+from rigsight.identify.fit.windows import Windowing
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
@@ -29,7 +29,7 @@ def windows() -> tuple[Record, ...]:
     run = Record("sweep", DT, {"u": linear_sweep(t, 0.5, 3.0, 40.0)}, {}, role="estimation", hold="zoh")
     clean = simulate(PLAY, TRUTH, run)
     record = clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size))
-    return Windowing.by_cycles({"x": NOISE}).cut([record])
+    return Windowing(cycles=4, noise={"x": NOISE}).cut([record])
 
 
 def problem_of(windows: tuple[Record, ...]) -> GreyBoxFit:

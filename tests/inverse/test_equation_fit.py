@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.fitting.placed_effects import candidates_on
+from rigsight.diagnose import candidates_on
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.inverse import EquationFit, propose, record_motions
 from rigsight.rigs import RIGS, Rig

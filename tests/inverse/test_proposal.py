@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.placed_effects import candidates_on
+from rigsight.diagnose import candidates_on
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.inverse import Proposal, propose
 from rigsight.records import Record

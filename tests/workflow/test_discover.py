@@ -13,10 +13,10 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.cli import app
-from rigsight.diagnose.fitting.windows import cut
 from rigsight.discover import MONOMIALS, RegressionData
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
+from rigsight.identify.fit.windows import cut
 from rigsight.records import Record
 from rigsight.records.record import Role
 from rigsight.rigs import AXIS

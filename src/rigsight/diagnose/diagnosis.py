@@ -9,14 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.campaign import Campaign
+from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.diagnose.advise import advise
 from rigsight.diagnose.examination import Examination, examine
-from rigsight.diagnose.fitting.absent_spring import with_weighed_spring
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.placed_effects import candidates_on
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, candidates_on
 from rigsight.diagnose.fitting.preparation import Prepare
-from rigsight.diagnose.fitting.windows import readings
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
 from rigsight.diagnose.location.trace import traces_of
@@ -43,6 +40,7 @@ from rigsight.diagnose.verdict.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.identify import FitMemory
+from rigsight.identify.fit.windows import readings
 from rigsight.metrics import nrmse
 from rigsight.records.record import Record
 from rigsight.rigs import Rig

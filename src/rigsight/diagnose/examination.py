@@ -14,7 +14,6 @@ from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
-from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.adequacy import Adequacy
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
@@ -32,6 +31,7 @@ from rigsight.diagnose.verdict.plausibility import doubts, has_size_of_zero, pla
 from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
 from rigsight.effects import Effect
 from rigsight.identify import FitMemory
+from rigsight.identify.fit.windows import Windowing
 from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
 

@@ -2,12 +2,8 @@
 
 from rigsight.discover.discovery import METHODS as METHODS
 from rigsight.discover.discovery import discover as discover
-from rigsight.discover.joints.joint_force import ForceTrace as ForceTrace
 from rigsight.discover.joints.joint_force import JointForce as JointForce
-from rigsight.discover.joints.joint_force import JointLaw as JointLaw
 from rigsight.discover.joints.joint_force import missing_forces as missing_forces
-from rigsight.discover.joints.joint_force import not_contradicted as not_contradicted
-from rigsight.discover.joints.joint_law import LawTerm as LawTerm
 from rigsight.discover.joints.joint_motion import JointMotion as JointMotion
 from rigsight.discover.joints.joint_motion import joint_motions as joint_motions
 from rigsight.discover.regression import RegressionData as RegressionData

@@ -1,23 +1,84 @@
-"""Assembly of the results of all stages."""
+"""Results of all stages put together: equations, terms with their doubts, warnings about the records, free runs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from rigsight.discover.bench import Bench, Trial
-from rigsight.discover.doubts import doubts, warnings_of
-from rigsight.discover.regression import RegressionData
+from rigsight.discover.ensembles import ForceEquation
+from rigsight.discover.regression import STRONG, RegressionData
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
-from rigsight.discover.terms.equations import equations, held_numbers
-from rigsight.discover.terms.force_law import ForceEquation
+from rigsight.effects import Effect
 from rigsight.identify import FitResult
+from rigsight.records.periods import same_signal
 from rigsight.records.record import Record
+from rigsight.simulate import Structure
 from rigsight.simulate.model import Model
+from rigsight.simulate.printing.latex import latex_equation
+from rigsight.simulate.printing.shown import ShownEquation, flat_equations
+from rigsight.simulate.printing.text import text_equation
+
+_DIGITS = 4
+"""Significant digits of numbers in an effect's equation; parameters are written as symbols."""
+
+
+def held_numbers(fit: FitResult) -> dict[str, float]:
+    """Return the held parameters whose values are written into the equations: only 0 and 1, which make them shorter."""
+    constants = {p.name for p in fit.structure.rig.constants}
+    return {
+        name: value
+        for name, value in fit.values.items()
+        if name not in fit.free and name not in constants and value in (0.0, 1.0)
+    }
+
+
+def equations(structure: Structure, numbers: Mapping[str, float]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the equations of a structure as text and as LaTeX: of motion, of states, of outputs other than single states."""
+    symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))
+    written = {
+        symbols[name]: sp.Integer(value) if float(value).is_integer() else sp.Float(value)
+        for name, value in numbers.items()
+    }
+    shown = flat_equations(structure, written)
+    rounded = [_rounded(equation) for equation in shown.equations]
+    # The text uses the same parameter names as the tables of their values.
+    plain = {symbol: name.plain.replace(" ", "_") for symbol, name in shown.names.items()}
+    plain |= {symbol: name for name, symbol in symbols.items()}
+    text = tuple(text_equation(equation, plain) for equation in rounded)
+    return text, tuple(" = ".join(latex_equation(equation, shown.names)) for equation in rounded)
+
+
+def _rounded(equation: ShownEquation) -> ShownEquation:
+    def short(expression: sp.Expr) -> sp.Expr:
+        return expression.xreplace(
+            {number: sp.Float(f"{float(number):.{_DIGITS}g}") for number in expression.atoms(sp.Float)}
+        )
+
+    limit = None if equation.limit is None else (equation.limit[0], short(equation.limit[1]))
+    inertia = tuple((short(mass), acceleration) for mass, acceleration in equation.inertia)
+    terms = tuple(map(short, equation.terms))
+    return replace(equation, left=short(equation.left), terms=terms, limit=limit, inertia=inertia)
+
+
+_SURE = 0.9
+_ZERO = 3.0
+_VAGUE = 0.05
+_FLOOR = 1.5
+"""Held-out error in noise floors above which an effect is still missing."""
+_NOISY = 0.1
+"""Noise floor, relative to the motion, from which it may mask terms."""
+_MOST_NAMED = 3
+_SAME_RATE = 1e-6
+"""Relative difference up to which sample times, computed from time columns, count as equal."""
+_NEAR = 1.5
+"""Factor of the held-out error within which another equation is nearly as good."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,60 +98,197 @@ class Found:
     held: str
 
 
+def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, same: Sequence[str]) -> str:
+    """Return the reasons to doubt a kept term; empty if there are none."""
+    found = []
+    for name, coefficient in own.items():
+        # Beside another effect with such a parameter its name is qualified.
+        counts_from_zero = name.removeprefix(f"{effect.name}.") not in effect.special_cases
+        size = abs(coefficient.value)
+        if not math.isfinite(coefficient.std):
+            found.append(f"{name} is not determined by these records")
+        elif counts_from_zero and coefficient.std > size / _ZERO:
+            found.append(f"{name} is not significantly different from zero")
+        elif coefficient.std > _VAGUE * size:
+            found.append(f"{name} is known to {100.0 * coefficient.std / size:.0f} % only")
+    if inclusion < _SURE:
+        found.append(f"sparse regression selects it in {100.0 * inclusion:.0f} % of the draws")
+    if same:
+        found.append(f"{' and '.join(same)} would fit equally well on these records")
+    return "; ".join(found)
+
+
+def warnings_of(
+    data: RegressionData, stages: Found, terms: Sequence[Term], floor: float, likeliest: str
+) -> tuple[str, ...]:
+    """Return the warnings for the user, one sentence each."""
+    selection, chosen, force = stages.selection, stages.chosen, stages.force
+    found = [note for note in (stages.how, stages.held) if note]
+    source = data.rig.inputs[0].name
+    sizes = [float(np.std(record[source])) for record in stages.estimation]
+    if max(sizes) < 1.2 * min(sizes):
+        found.append(_one_amplitude(selection, chosen))
+    found += _same_input(source, stages.estimation, stages.held_out)
+    best = criterion(chosen, selection.independent)
+    rivals = [
+        trial
+        for trial in selection.trials
+        if trial.support != chosen.support
+        and criterion(trial, selection.independent) < best + STRONG
+        and trial.n_free <= chosen.n_free
+    ]
+    richer = [
+        trial
+        for trial in selection.trials
+        if trial.support > chosen.support and criterion(trial, selection.independent) < best
+    ]
+    if rivals:
+        listed = "; ".join(", ".join(sorted(trial.support)) or "no term at all" for trial in rivals[:3])
+        found.append(
+            f"The noise is too high, or the records too short, to select the terms: {listed} fits equally well. Add records at "
+            f"other amplitudes, or average repeated ones."
+        )
+    extra = sorted({name for trial in richer for name in trial.support - chosen.support})
+    if extra:
+        found.append(f"In doubt: {', '.join(extra)}. It lowers the held-out error, but not significantly.")
+    if floor > _NOISY and likeliest:
+        found.append(
+            f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change the motion by "
+            f"less: every omitted term is in doubt. Regression would select {likeliest} next, which proves nothing at this noise "
+            f"level."
+        )
+    found += still_missing(stages.judged.error_over_noise)
+    found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
+    if force is not None:
+        fitted = {p.name for p in force.law.effect.parameters if p.fitted}
+        blind = [
+            parameter
+            for term, parameter in force.law.parameters.items()
+            if parameter in fitted and force.inclusion.get(term, 0.0) < _SURE
+        ]
+        if blind:
+            found.append(
+                f"The regressed equation of the hysteretic force does not show {' and '.join(blind)} of "
+                f"{force.law.effect.name} for sure; "
+                f"{'its' if len(blind) == 1 else 'their'} value comes from the free-run fit alone."
+            )
+    return tuple(found)
+
+
+def still_missing(error_over_noise: float) -> list[str]:
+    """Return a warning about an error that the noise does not explain; empty if it does."""
+    if error_over_noise <= _FLOOR:
+        return []
+    return [
+        f"The equations leave {error_over_noise:.1f} times the noise floor in free run on the held-out records: "
+        "an effect is still missing, or disturbances are larger than the noise floor."
+    ]
+
+
+def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Record]) -> list[str]:
+    """Return a warning about held-out records that have the same input as a fitted one."""
+    twins = {
+        record.name: fitted.name
+        for record in held_out
+        for fitted in estimation
+        if math.isclose(record.dt, fitted.dt, rel_tol=_SAME_RATE)
+        and same_signal(record[source], fitted[source])
+    }
+    if not twins:
+        return []
+    listed = "; ".join(f"'{name}' as '{fitted}'" for name, fitted in list(twins.items())[:_MOST_NAMED])
+    return [
+        f"Held-out records have the input of fitted ones: {listed}. With the same input even wrong terms may fit, so the error "
+        f"says little about other motion. Add a validation record with another waveform or amplitude."
+    ]
+
+
+def _one_amplitude(selection: Selection, chosen: Trial) -> str:
+    """Return a warning that the records have a single amplitude, and the equations that they do not distinguish."""
+    others = sorted(
+        (
+            t
+            for t in selection.trials
+            if not t.support >= chosen.support and math.isfinite(t.error_over_noise)
+        ),
+        key=lambda t: t.error_over_noise,
+    )
+    near = [t for t in others if t.error_over_noise < _NEAR * chosen.error_over_noise]
+    if not others:
+        reported = (
+            "Softening, hardening, friction or hysteresis may look like other parameters of the same equation at this "
+            "amplitude"
+        )
+    elif near:
+        listed = "; ".join(", ".join(sorted(trial.support)) or "no term at all" for trial in near[:3])
+        reported = f"At this amplitude {listed} is nearly as good"
+    else:
+        ratio = others[0].error_over_noise / chosen.error_over_noise
+        reported = (
+            f"At this amplitude the terms are distinguished (the error of the next equation is {ratio:.3g} times as large), "
+            f"at others they are untested"
+        )
+    return (
+        f"The records have only one amplitude, so they do not show how a force grows with amplitude. {reported}. "
+        "Add a record at half or twice the amplitude."
+    )
+
+
 def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, found: Found) -> Discovery:
     """Return the result of a discovery: equations, terms with their doubts, alternatives, free runs, model."""
-    rig, final, selection = data.rig, found.final, found.selection
-    output = rig.outputs[0].name
-    structure = final.structure
-    text, latex = equations(structure, held_numbers(final))
-    own = {p.name for p in rig.parameters}
-    units = {p.name: p.unit for p in structure.parameters}
-    coefficients = {
-        name: Coefficient(final.values[name], final.standard_errors[name], units[name]) for name in final.free
-    }
-    terms = _terms(bench, found, coefficients)
+    selection, output, error = found.selection, data.rig.outputs[0].name, found.judged.error_over_noise
+    terms = _terms(bench, found)
     measured = np.concatenate([record[output] for record in found.held_out])
     size = float(np.std(measured)) or 1.0
-    warnings = warnings_of(
+    floor = data.noise[output] / size
+    likeliest = next(iter(next_terms(bench, found.chosen.support)), "")
+    return discovery_of(
         data,
-        found.estimation,
-        found.held_out,
-        found.how,
-        selection,
-        found.chosen,
-        found.judged.error_over_noise,
-        terms,
-        found.held,
-        found.force,
-        data.noise[output] / size,
-        next(iter(next_terms(bench, found.chosen.support)), ""),
-    )
-    return Discovery(
-        title=data.campaign.title,
-        rig=rig.name,
+        found.final,
+        (found.estimation, found.held_out),
         method=method,
         form="pointwise" if pointwise else "weak",
-        equations=text,
-        latex=latex,
-        rig_parameters={name: c for name, c in coefficients.items() if name in own},
         terms=terms,
         alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
         force_equation={} if found.force is None else dict(found.force.inclusion),
-        held_out=tuple(record.name for record in found.held_out),
-        held_out_error=found.judged.error_over_noise,
-        held_out_nrmse=found.judged.error_over_noise * data.noise[output] / size,
-        noise_floor=data.noise[output] / size,
+        held_out_error=error,
+        held_out_nrmse=error * data.noise[output] / size,
+        noise_floor=floor,
         independent=selection.independent,
         runs=_runs(bench, found, output),
-        output=output,
-        unit=rig.outputs[0].unit,
-        model=Model.of(structure, final.values, found.estimation[0].hold).to_json(),
-        warnings=warnings,
+        warnings=warnings_of(data, found, terms, floor, likeliest),
     )
 
 
-def _terms(bench: Bench, found: Found, coefficients: Mapping[str, Coefficient]) -> tuple[Term, ...]:
-    structure = found.final.structure
+def discovery_of(
+    data: RegressionData, final: FitResult, records: tuple[Sequence[Record], Sequence[Record]], **further: Any
+) -> Discovery:
+    """Return a discovery with all that its last fit and the fitted and the held-out records say, and further fields."""
+    rig, structure = data.rig, final.structure
+    text, latex = equations(structure, held_numbers(final))
+    own = {p.name for p in rig.parameters}
+    return Discovery(
+        title=data.campaign.title,
+        rig=rig.name,
+        equations=text,
+        latex=latex,
+        rig_parameters={name: c for name, c in coefficients_of(final).items() if name in own},
+        held_out=tuple(record.name for record in records[1]),
+        output=rig.outputs[0].name,
+        unit=rig.outputs[0].unit,
+        model=Model.of(structure, final.values, records[0][0].hold).to_json(),
+        **further,
+    )
+
+
+def coefficients_of(fit: FitResult) -> dict[str, Coefficient]:
+    """Return the fitted parameters with standard errors and units."""
+    units = {p.name: p.unit for p in fit.structure.parameters}
+    return {name: Coefficient(fit.values[name], fit.standard_errors[name], units[name]) for name in fit.free}
+
+
+def _terms(bench: Bench, found: Found) -> tuple[Term, ...]:
+    structure, coefficients = found.final.structure, coefficients_of(found.final)
     kept = {effect.name for effect in structure.effects}
     terms = []
     for name in bench.own_terms:

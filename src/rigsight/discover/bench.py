@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.regression import Projected
 from rigsight.discover.support_starts import SupportStarts
 from rigsight.discover.terms.library import Candidate
-from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
-from rigsight.records.record import Record
+from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, free_names
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over, compose, unique_names
 
@@ -42,7 +41,7 @@ class Trial:
     error_over_noise: float  # RMS of the first output's held-out free-run error in units of the noise floor
     # Held-out errors of the first output in units of the noise floor, all records one after the other; empty
     # if a rough score was sufficient.
-    residuals: NDArray[np.float64]
+    residuals: Floats
 
     @property
     def n_free(self) -> int:
@@ -58,24 +57,14 @@ class Attempt:
     release: Release = frozenset()  # parameters that are not held at their special values
     start: Mapping[str, float] | None = None  # start values; None for those of the regression
     left_out: Support = frozenset()  # rig parameters that are held at their start values
-    # Cost of the fit of the same terms, if they have been scored already; infinite if that equation has other
-    # parameters. A new fit whose cost is not lower, or much higher than the best, is not scored. None if they
-    # have not been scored.
+    # Cost of the fit of the same terms, if they have been scored already; infinite if that equation has other parameters. A
+    # new fit whose cost is not lower, or much higher than the best, is not scored. None if they have not been scored.
     to_beat: float | None = None
 
     @property
     def key(self) -> tuple[Support, Release, Support]:
         """Key under which the trial is stored."""
         return self.support, self.release, self.left_out
-
-
-@dataclass(frozen=True, eq=False)
-class _Screening:
-    """The result of the first evaluations of a fit; attempts with a much higher cost than the best are dropped here."""
-
-    attempt: Attempt
-    problem: GreyBoxFit
-    fit: FitResult
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +101,7 @@ class Bench:
     candidates: Mapping[str, Candidate]  # the library, by name
     projected: Projected  # the regression
     # Columns of the rig's own terms that compete (full form), by parameter.
-    own_terms: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    own_terms: Mapping[str, Floats] = field(default_factory=dict)
     # Threads that fit supports, and the records of a fit, in parallel.
     threads: IdleThreads = field(default_factory=IdleThreads)
     # The supports polished so far.
@@ -137,7 +126,7 @@ class Bench:
         ]
         return replace(self.projected, base=self.projected.base[:, kept])
 
-    def column(self, name: str) -> NDArray[np.float64]:
+    def column(self, name: str) -> Floats:
         """Return the column of a term, one of the library or of the rig's own."""
         return self.own_terms[name] if name in self.own_terms else self.candidates[name].column
 
@@ -156,14 +145,7 @@ class Bench:
 
     def free_parameters(self, structure: Structure, held: frozenset[str] = frozenset()) -> list[str]:
         """Return the parameters that a fit of a structure varies."""
-        fixed = dict(structure.fixed)
-        names = {p.name for p in self.rig.parameters} - self.held - held
-        for effect in structure.effects:
-            for parameter in effect.parameters:
-                name = structure.parameter_name(effect, parameter.name)
-                if parameter.fitted and name not in fixed:
-                    names.add(name)
-        return [name for name in structure.names if name in names]
+        return free_names(structure, {p.name for p in self.rig.parameters} - self.held - held)
 
     def trial(self, attempt: Attempt) -> Trial:
         """Polish a support and score it; an attempt that was made before is not repeated."""
@@ -211,16 +193,14 @@ class Bench:
         They are compared with all earlier trials, and with all of these attempts at the same stage, so that the result does not
         depend on the order in which the threads finish.
         """
-        screenings = self._screened(attempts)
-        costs = [trial.fit.cost for trial in self.trials.values()] + [
-            screening.fit.cost for screening in screenings
-        ]
-        hopeless = HOPELESS**2 * min(costs, default=float("inf"))
+        begun = self._begun(attempts)
+        fits = [*(trial.fit for trial in self.trials.values()), *(fit for _, _, fit in begun)]
+        hopeless = HOPELESS**2 * min((fit.cost for fit in fits), default=float("inf"))
 
-        def further(screening: _Screening) -> _RoughTrial:
-            fit = screening.fit
+        def further(one: tuple[Attempt, GreyBoxFit, FitResult]) -> _RoughTrial:
+            attempt, problem, fit = one
             if not fit.success and fit.cost < hopeless:
-                fit = screening.problem.fit(
+                fit = problem.fit(
                     fit.values,
                     fit.free,
                     fit.initial_states,
@@ -229,17 +209,15 @@ class Bench:
                     finish=False,
                     substeps=fit.substeps,
                 )
-            attempt = screening.attempt
             worth = float("inf") if attempt.to_beat is None else min(attempt.to_beat, hopeless)
             return self._roughly_scored(attempt.support, fit, worth)
 
         rough = []
-        for trial in self.threads.side_by_side(further, screenings):
+        for trial in self.threads.side_by_side(further, begun):
             progress(trial.support)
             rough.append(trial)
-        errors = [trial.error_over_noise for trial in self.trials.values()] + [
-            trial.error_over_noise for trial in rough
-        ]
+        errors = [trial.error_over_noise for trial in self.trials.values()]
+        errors += [trial.error_over_noise for trial in rough]
         far = _FAR * min(errors, default=float("inf"))
 
         def finished(trial: _RoughTrial) -> Trial:
@@ -247,8 +225,8 @@ class Bench:
 
         return list(self.threads.side_by_side(finished, rough))
 
-    def _screened(self, attempts: Sequence[Attempt]) -> list[_Screening]:
-        """Return the best fit of each attempt over its start values."""
+    def _begun(self, attempts: Sequence[Attempt]) -> list[tuple[Attempt, GreyBoxFit, FitResult]]:
+        """Return each attempt with its problem and, after the first evaluations, its best fit over its start values."""
         structures = [self.structure(attempt.support, attempt.release) for attempt in attempts]
         problems = [
             GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
@@ -277,7 +255,7 @@ class Bench:
         for (number, _), fit in zip(begun, self.threads.side_by_side(looked, begun), strict=True):
             if number not in best or fit.cost < best[number].cost:
                 best[number] = fit
-        return [_Screening(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
+        return [(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
 
     def _own_starts(self, attempt: Attempt, structure: Structure) -> list[dict[str, float]]:
         """Return the start values from the regression, and those from the best fit of a support contained in this one.

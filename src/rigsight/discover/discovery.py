@@ -12,23 +12,13 @@ import numpy as np
 from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.ensembles import inclusion, regressed_force
-from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_discovery import discover_at_joints
-from rigsight.discover.motion import Motion, motion_of
-from rigsight.discover.regression import (
-    STRONG,
-    Projected,
-    RegressionData,
-    alike,
-    own_regression,
-    own_terms,
-    rows_of,
-)
+from rigsight.discover.motion import motion_of
+from rigsight.discover.regression import STRONG, Projected, Regressed, RegressionData, alike, own_terms, split
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import Selection, criterion, select
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate, candidates, offered_effects
-from rigsight.discover.weak_form import Rows
 from rigsight.effects import Place
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import (
@@ -63,28 +53,10 @@ def discover(
 ) -> Discovery:
     """Discover the governing equations of a rig from records.
 
-    Parameters
-    ----------
-    data
-        Records and rig.
-    method
-        ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term. ``"discrepancy"``: the
-        rig's own terms are kept and their residual is regressed; the only form for a rig of several joints.
-    pointwise
-        Regress sample by sample instead of in the weak form; not for a rig of several joints.
-    seed
-        Seed of the ensembles.
-    progress
-        Called with a short text when a stage or support is done.
-    n_jobs
-        Supports that are fitted at the same time; the result is the same with any number.
-
-    Raises
-    ------
-    InputError
-        If there is no estimation record, one is too short, none moves the rig, or the form is not available for this rig.
-    SimulationError
-        If the rig's own equations cannot be simulated near the records.
+    The method ``"full"`` regresses the whole acceleration, where the rig's damper competes with every other term;
+    ``"discrepancy"`` keeps the rig's own terms and regresses their residual, the only form for a rig of several joints.
+    Point-wise rows, instead of the weak form, are not for such a rig either. The seed is that of the ensembles; the result is
+    the same with any number of jobs.
     """
     if not data.rig.mechanism.joints:
         raise InputError(
@@ -113,10 +85,9 @@ def discover(
         [record.n_samples for record in estimation],
     )
     say("motion smoothed")
-    rows = rows_of(motions, scales["time"], pointwise)
-    projected = own_regression(data.rig, data.has_stiffness, motions, rows)
-    library = _library(data, motions, rows, projected, scales, threads)
-    library, same = _distinct(library, projected)
+    regressed = Regressed.of(data.rig, data.has_stiffness, motions, scales, pointwise, threads)
+    projected = regressed.projected
+    library, same = _distinct(_library(data, regressed), projected)
     say("library")
     bench = Bench(
         rig=data.rig.motion_alone(),
@@ -142,8 +113,8 @@ def discover(
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     say("polished")
-    included = inclusion(data, bench, selection, final, motions, rows, rng)
-    force = regressed_force(bench, final, motions, rows, rng)
+    included = inclusion(data, bench, selection, final, regressed, rng)
+    force = regressed_force(bench, final, regressed, rng)
     say("ensembles")
     found = Found(estimation, held_out, how, selection, chosen, judged, final, included, force, same, held)
     return assembled(data, method, pointwise, bench, found)
@@ -195,18 +166,11 @@ def _without_downstream(rig: Rig, record: Record) -> Record:
     return replace(record, signals={name: s for name, s in record.signals.items() if name in keep})
 
 
-def _library(
-    data: RegressionData,
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    threads: IdleThreads,
-) -> list[Candidate]:
+def _library(data: RegressionData, regressed: Regressed) -> list[Candidate]:
     effects = offered_effects(data.rig, data.has_stiffness)
-    if all(is_constant(motion.u) for motion in motions):
+    if all(is_constant(motion.u) for motion in regressed.motions):
         effects = [effect for effect in effects if effect.place is not Place.ACTUATOR]
-    found = candidates(effects, motions, rows, projected, scales, data.rig.is_driven, threads)
+    found = candidates(effects, regressed)
     return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
 
 

@@ -1,22 +1,139 @@
-"""Inclusion probability of each term: regressions of resampled rows about the rest position of the refitted equation."""
+"""Inclusion probability of each term, and of each term in the equation of a hidden force with memory.
+
+Terms are regressed on resampled rows about the rest position of the refitted equation. Of a loop, the drive minus inertia,
+damping and the spring without memory is the hysteretic force F. It is the loop's state times a stiffness, so the rate that
+the effect declares for its state, ``z' = A x' - ...``, is an equation of F with other coefficients. Its terms, one for each
+parameter in which it is linear, are found by regression like any other, together with a relaxing force and one without
+memory; this shows which of them the records support. Because a noisy displacement is differentiated twice, this test fails at
+noise levels at which the loop itself is still found.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from rigsight.discover.bench import Bench
-from rigsight.discover.motion import Motion
-from rigsight.discover.regression import RegressionData, inclusion_probabilities, own_regression, own_terms
+from rigsight.discover.motion import Motion, Rows
+from rigsight.discover.regression import (
+    Projected,
+    Regressed,
+    RegressionData,
+    inclusion_probabilities,
+    own_regression,
+    own_terms,
+)
 from rigsight.discover.selection import Selection, proposals
-from rigsight.discover.terms.force_law import ForceEquation, ForceLaw, force_equation
 from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import candidates, torque_along
-from rigsight.discover.weak_form import Rows
+from rigsight.discover.terms.library import along, candidates
+from rigsight.effects import Effect
+from rigsight.effects import symbols as canonical
+from rigsight.effects.symbols import derivative
 from rigsight.identify import FitResult
+from rigsight.records.record import Floats
+from rigsight.rigs import evaluated
+from rigsight.simulate.printing.text import TermPrinter
+
+_FORCE = sp.Symbol("F", real=True)
+_RATE = sp.Symbol("x'", real=True)
+_DISPLACEMENT = sp.Symbol("x", real=True)
+_RIVALS = (-_FORCE, _DISPLACEMENT)
+"""A force that relaxes, and one without memory: terms that no loop has."""
+
+
+@dataclass(frozen=True)
+class ForceLaw:
+    """The equation that the force of a loop with one free state obeys."""
+
+    effect: Effect  # the loop
+    terms: Mapping[str, sp.Expr]  # right-hand side per unit of each coefficient, by its printed name
+    parameters: Mapping[str, str]  # the parameter of each of the effect's own terms, by the same names
+
+    @classmethod
+    def of(cls, effect: Effect) -> ForceLaw | None:
+        """Derive the equation from the rate that an effect declares; None if its force is not a single state without limit."""
+        if not is_loop(effect) or len(effect.states) != 1 or effect.states[0].limit is not None:
+            return None
+        (state,) = effect.states
+        written = {
+            state.symbol: _FORCE,
+            canonical.deflection_rate: _RATE,
+            canonical.deflection: _DISPLACEMENT,
+        }
+        terms: dict[str, sp.Expr] = {}
+        parameters: dict[str, str] = {}
+        for parameter in effect.parameters:
+            symbol = sp.Symbol(parameter.name, real=True)
+            slope = derivative(state.rate, symbol)
+            if slope != 0 and not slope.has(symbol):
+                term = slope.xreplace(written)
+                terms[_name(term)], parameters[_name(term)] = term, parameter.name
+        terms |= {_name(term): term for term in _RIVALS if _name(term) not in terms}
+        return cls(effect, terms, parameters)
+
+
+@dataclass(frozen=True)
+class ForceEquation:
+    """The regressed equation of the hysteretic force."""
+
+    law: ForceLaw  # the terms offered to the regression
+    # By term of the law [SI].
+    coefficients: Mapping[str, float]
+    inclusion: Mapping[str, float]
+    share: float  # share of the force's rate that the equation explains
+
+
+def force_equation(
+    law: ForceLaw,
+    motions: Sequence[Motion],
+    rows: Rows,
+    forces: Sequence[Floats],
+    values: Mapping[str, float],
+    rng: np.random.Generator,
+) -> ForceEquation:
+    """Regress the equation of the hysteretic force."""
+    numbers = {sp.Symbol(name, real=True): value for name, value in values.items()}
+    signals = [sp.lambdify((_DISPLACEMENT, _RATE, _FORCE), term.subs(numbers)) for term in law.terms.values()]
+    target = [rows.rate_of(force, motion.dt) for motion, force in zip(motions, forces, strict=True)]
+    matrix = np.concatenate(
+        [
+            np.column_stack([rows.of(signal(motion.x, motion.v, force), motion.dt) for signal in signals])
+            for motion, force in zip(motions, forces, strict=True)
+        ]
+    )
+    rate = np.concatenate(target)
+    # Only a constant rate is projected out, which no force can have for long.
+    independent = sum(
+        own.size * rows.independent_share(1, motion.dt) for own, motion in zip(target, motions, strict=True)
+    )
+    projected = Projected(np.ones((rate.size, 1)), rate, independent)
+    inclusion = inclusion_probabilities(projected, matrix, rng)
+    taken = inclusion >= 0.5
+    coefficients = np.zeros(len(law.terms))
+    share = 0.0
+    if np.any(taken):
+        coefficients[taken], share = projected.explained(matrix[:, taken])
+    return ForceEquation(
+        law,
+        dict(zip(law.terms, map(float, coefficients), strict=True)),
+        dict(zip(law.terms, map(float, inclusion), strict=True)),
+        share,
+    )
+
+
+def _name(term: sp.Expr) -> str:
+    """Return a term without its sign, the velocity first and the force itself last."""
+
+    def place(factor: sp.Expr) -> Any:
+        return not factor.has(_RATE), factor == _FORCE, str(factor)
+
+    factors = [f for f in sp.Mul.make_args(term) if not f.is_number]
+    return " ".join(TermPrinter().doprint(factor) for factor in sorted(factors, key=place))
+
 
 _ENSEMBLE_TERMS = 6
 _SAME_REST = 1e-5
@@ -28,8 +145,7 @@ def inclusion(
     bench: Bench,
     selection: Selection,
     final: FitResult,
-    motions: Sequence[Motion],
-    rows: Rows,
+    regressed: Regressed,
     rng: np.random.Generator,
 ) -> dict[str, float]:
     """Return the inclusion probability of the most likely terms, and of the rig's own in the full form.
@@ -52,17 +168,17 @@ def inclusion(
     shift = _rest_shift(bench, final)
     if abs(shift) < _SAME_REST * bench.scales["x"]:
         shift = 0.0
-    moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
-    projected = own_regression(data.rig, data.has_stiffness, moved, rows) if shift else bench.projected
-    own_columns = own_terms(data.rig, data.has_stiffness, projected) if bench.own_terms else {}
     library = [bench.candidates[name] for name in names]
     if shift:
+        moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in regressed.motions]
+        projected = own_regression(data.rig, data.has_stiffness, moved, regressed.rows)
         # The columns of loops do not depend on the rest position.
         loops = [candidate for candidate in library if is_loop(candidate.effect)]
         effects = [candidate.effect for candidate in library if not is_loop(candidate.effect)]
-        library = loops + candidates(
-            effects, moved, rows, projected, bench.scales, data.rig.is_driven, bench.threads
-        )
+        library = loops + candidates(effects, replace(regressed, motions=moved, projected=projected))
+    else:
+        projected = bench.projected
+    own_columns = own_terms(data.rig, data.has_stiffness, projected) if bench.own_terms else {}
     again = replace(
         bench,
         candidates={candidate.name: candidate for candidate in library},
@@ -78,7 +194,7 @@ def inclusion(
 
 
 def regressed_force(
-    bench: Bench, final: FitResult, motions: Sequence[Motion], rows: Rows, rng: np.random.Generator
+    bench: Bench, final: FitResult, regressed: Regressed, rng: np.random.Generator
 ) -> ForceEquation | None:
     """Regress the equation of the hysteretic force, the residual of the polished model's other forces along the motion."""
     rig, values = bench.rig, {**dict(final.structure.fixed), **final.values}
@@ -90,28 +206,24 @@ def regressed_force(
     if any(effect.torque is None for effect in others):
         return None
     motion = rig.motion
-
-    def number(expression: sp.Expr) -> float:
-        return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
-
+    gain, bias, inertia, damping, stiffness = (
+        evaluated(part, values)
+        for part in (motion.drive_gain, motion.bias, motion.inertia, motion.damping, motion.stiffness)
+    )
     own_values = final.structure.values_of(law.effect, values)
     assert law.effect.post_yield_stiffness_ratio is not None
-    without_memory = own_values[law.effect.post_yield_stiffness_ratio] * number(motion.stiffness)
+    without_memory = own_values[law.effect.post_yield_stiffness_ratio] * stiffness
     # Springs act about the polished rest position, not about the one about which the motion was smoothed.
     shift = _rest_shift(bench, final)
-    moved = [replace(own, x=own.x - shift) for own in motions]
+    moved = [replace(own, x=own.x - shift) for own in regressed.motions]
     forces = []
     for own in moved:
-        force = (
-            number(motion.drive_gain) * own.u
-            + number(motion.bias)
-            - number(motion.inertia) * own.acceleration
-        )
-        force -= number(motion.damping) * own.v + without_memory * own.x
+        force = gain * own.u + bias - inertia * own.acceleration
+        force -= damping * own.v + without_memory * own.x
         for effect in others:
-            force -= torque_along(effect, final.structure.values_of(effect, values), own)
+            force -= along(effect.torque, final.structure.values_of(effect, values), own)
         forces.append(force)
-    return force_equation(law, moved, rows, forces, own_values, rng)
+    return force_equation(law, moved, regressed.rows, forces, own_values, rng)
 
 
 def _ancestors(bench: Bench, name: str) -> set[str]:

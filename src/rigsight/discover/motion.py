@@ -1,26 +1,29 @@
-"""Motion of the mass and the missing force: Kalman filter and Rauch-Tung-Striebel smoother with the known input.
+"""Motion of the mass and the missing force in a record, and rows of a regression from them.
 
-The linear equations of the rig are the model; the missing force is an additional state, an integrated random walk. Its intensity
-is estimated by maximum likelihood, so that the records determine how fast the force may change.
+Motion: Kalman filter and Rauch-Tung-Striebel smoother with the known input. The linear equations of the rig are the model; the
+missing force is an additional state, an integrated random walk. Its intensity is estimated by maximum likelihood, so that the
+records determine how fast the force may change.
+
+Rows: integrals over windows with smooth test functions (the weak form), or single points. Derivatives are moved to the test
+function by integration by parts, so that measured signals are not differentiated.
 
 References
 ----------
 H. E. Rauch, F. Tung and C. T. Striebel, AIAA J. 3 (1965) 1445; C. F. Van Loan, IEEE Trans. Autom. Control 23 (1978) 395, for
-the discrete noise.
+the discrete noise; D. A. Messenger and D. M. Bortz, "Weak SINDy", Multiscale Model. Simul. 19 (2021) 1474.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-import sympy as sp
-from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
-from rigsight.records.record import Record
-from rigsight.rigs import Rig
+from rigsight.records.record import Floats, Record
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _DECADES = (-4.0, -2.0, 0.0, 2.0, 4.0, 6.0)
@@ -32,26 +35,14 @@ _SETTLING = 20
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Smoothed motion of one record about its rest position.
+    """Smoothed motion of one record about its rest position, shape (n_samples,) each."""
 
-    Attributes
-    ----------
-    record
-        The measured record.
-    x, v, acceleration
-        Displacement, velocity and acceleration, shape (n_samples,) each.
-    u
-        Input, shape (n_samples,); the displacement if the motion is prescribed.
-    measured
-        The measured quantity that is regressed, shape (n_samples,): displacement, or force if the motion is prescribed.
-    """
-
-    record: Record
-    x: NDArray[np.float64]
-    v: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    u: NDArray[np.float64]
-    measured: NDArray[np.float64]
+    record: Record  # the measured record
+    x: Floats  # displacement
+    v: Floats  # velocity
+    acceleration: Floats
+    u: Floats  # input; the displacement if the motion is prescribed
+    measured: Floats  # what is regressed: displacement, or force if the motion is prescribed
 
     @property
     def dt(self) -> float:
@@ -59,30 +50,14 @@ class Motion:
         return self.record.dt
 
 
-@dataclass(frozen=True)
-class Carrier:
+class _Carrier:
     """The linear model of the smoother: ``m x'' = g u - k (x - rest) - d x' + missing force``."""
 
-    inertia: float
-    damping: float
-    stiffness: float
-    gain: float
-    rest: float
-
-    @classmethod
-    def of(cls, rig: Rig, values: Mapping[str, float]) -> Carrier:
-        """Evaluate the coefficients of a driven rig's equation."""
-
-        def number(expression: sp.Expr) -> float:
-            return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
-
+    def __init__(self, rig: Rig, values: Mapping[str, float]) -> None:
         motion = rig.motion
-        return cls(
-            number(motion.inertia),
-            number(motion.damping),
-            number(motion.stiffness),
-            number(motion.drive_gain),
-            number(motion.rest),
+        self.inertia, self.damping, self.stiffness, self.gain, self.rest = (
+            evaluated(part, values)
+            for part in (motion.inertia, motion.damping, motion.stiffness, motion.drive_gain, motion.rest)
         )
 
 
@@ -92,7 +67,7 @@ def motion_of(rig: Rig, record: Record, values: Mapping[str, float], noise: floa
     if not rig.is_driven:
         x, v = smooth_motion(source, record.dt)
         return Motion(record, x, v, np.gradient(v, record.dt), x, response)
-    carrier = Carrier.of(rig, values)
+    carrier = _Carrier(rig, values)
     smoother = _Smoother(carrier, record.dt, record.hold == "zoh", noise**2)
     displacement = response - carrier.rest
     intensity = smoother.likeliest(displacement[:_LONGEST_TRIAL], source[:_LONGEST_TRIAL])
@@ -105,7 +80,7 @@ def motion_of(rig: Rig, record: Record, values: Mapping[str, float], noise: floa
 class _Smoother:
     """Steady-state filter and smoother of displacement, velocity, missing force and its rate."""
 
-    def __init__(self, carrier: Carrier, dt: float, held: bool, variance: float) -> None:
+    def __init__(self, carrier: _Carrier, dt: float, held: bool, variance: float) -> None:
         self._carrier, self._dt, self._variance = carrier, dt, variance
         m, d, k = carrier.inertia, carrier.damping, carrier.stiffness
         rates = np.array([[0, 1, 0, 0], [-k / m, -d / m, 1 / m, 0], [0, 0, 0, 1], [0, 0, 0, 0]], dtype=float)
@@ -122,7 +97,7 @@ class _Smoother:
         # Units in which every state changes by about one within a sample time: in SI the Riccati equation is badly scaled.
         self._units = np.array([1.0, 1.0 / dt, m / dt**2, m / dt**3])
 
-    def likeliest(self, x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
+    def likeliest(self, x: Floats, u: Floats) -> float:
         """Return the intensity of the missing force's second derivative that makes the displacement most likely."""
         carrier = self._carrier
         size = float(np.std(x)) or 1.0
@@ -138,9 +113,7 @@ class _Smoother:
         coarse = min(_DECADES, key=cost)
         return float(unit * 10.0 ** min((coarse, *(coarse + step for step in _BETWEEN)), key=cost))
 
-    def smoothed(
-        self, x: NDArray[np.float64], u: NDArray[np.float64], intensity: float
-    ) -> NDArray[np.float64]:
+    def smoothed(self, x: Floats, u: Floats, intensity: float) -> Floats:
         """Return the four states, shape (n_samples, 4)."""
         gain, _, back = self._gains(intensity)
         predicted, filtered, _ = self._filtered(x, u, gain)
@@ -149,7 +122,7 @@ class _Smoother:
             states[i] += back @ (states[i + 1] - predicted[i + 1])
         return states
 
-    def _gains(self, intensity: float) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+    def _gains(self, intensity: float) -> tuple[Floats, float, Floats]:
         units = self._units
         seen = np.array([[1.0, 0.0, 0.0, 0.0]])
         transition = self._transition * (units[None, :] / units[:, None])
@@ -160,9 +133,7 @@ class _Smoother:
         back = np.linalg.solve(spread, transition @ after).T
         return gain * units, float((spread[0, 0] + 1.0) * self._variance), back * np.outer(units, 1.0 / units)
 
-    def _filtered(
-        self, x: NDArray[np.float64], u: NDArray[np.float64], gain: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _filtered(self, x: Floats, u: Floats, gain: Floats) -> tuple[Floats, Floats, Floats]:
         n = x.size
         driven = np.outer(u[:-1], self._level) + np.outer(np.diff(u) / self._dt, self._slope)
         predicted, filtered, errors = np.zeros((n, 4)), np.zeros((n, 4)), np.zeros(n)
@@ -174,3 +145,94 @@ class _Smoother:
             if i < n - 1:
                 state = self._transition @ filtered[i] + driven[i]
         return predicted, filtered, errors
+
+
+_POWER = 5
+"""Of the test function (1 - s^2)^p; its first four derivatives vanish at the ends of the window."""
+_ROWS_PER_WINDOW = 4
+_LEAST_WIDTH = 11
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Test functions for one sample time."""
+
+    # Test function and its first two derivatives with respect to time, integration weights included, shape (3, width).
+    weights: Floats
+    step: int  # samples from row to row
+
+    def against(self, signal: Floats, order: int) -> Floats:
+        """Return the integrals of a signal with the test function or one of its derivatives, shape (n_rows,).
+
+        There are none if the signal is shorter than a window.
+        """
+        if signal.size < self.weights.shape[1]:
+            # numpy would exchange the two, and slide the signal along the test function.
+            return np.zeros(0)
+        return np.asarray(np.correlate(signal, self.weights[order], "valid")[:: self.step])
+
+
+@dataclass(frozen=True)
+class Rows:
+    """How signals of records, each with its own sample time, are turned into rows."""
+
+    width: float | None  # width of the windows [s]; None for point-wise rows
+    step: int = 1  # samples from row to row of point-wise rows
+
+    @classmethod
+    def weak(cls, width: float) -> Rows:
+        """Make windows of `width` [s]."""
+        return cls(width)
+
+    @classmethod
+    def pointwise(cls, step: int = 1) -> Rows:
+        """Make a row of every `step`-th sample."""
+        return cls(None, step)
+
+    def of(self, signal: Floats, dt: float) -> Floats:
+        """Return the rows of a signal of shape (n_samples,)."""
+        return signal[:: self.step] if self.width is None else windows(self.width, dt).against(signal, 0)
+
+    def rate_of(self, signal: Floats, dt: float) -> Floats:
+        """Return the rows of the derivative of a signal."""
+        if self.width is None:
+            return np.asarray(np.gradient(signal, dt)[:: self.step])
+        return -windows(self.width, dt).against(signal, 1)
+
+    def velocity(self, motion: Motion) -> Floats:
+        """Return the rows of the velocity."""
+        if self.width is None:
+            return motion.v[:: self.step]
+        return -windows(self.width, motion.dt).against(motion.x, 1)
+
+    def acceleration(self, motion: Motion) -> Floats:
+        """Return the rows of the acceleration."""
+        if self.width is None:
+            return motion.acceleration[:: self.step]
+        return windows(self.width, motion.dt).against(motion.measured, 2)
+
+    def independent_share(self, order: int, dt: float) -> float:
+        """Return the number of independent rows per row, less than 1 if windows overlap."""
+        if self.width is None:
+            return 1.0
+        found = windows(self.width, dt)
+        own = found.weights[order]
+        products = np.correlate(own, own, "full") / np.sum(own**2)
+        lags = products[own.size - 1 :: found.step][1:]
+        return float(1.0 / (1.0 + 2.0 * np.sum(lags**2)))
+
+
+@lru_cache(maxsize=64)
+def windows(width: float, dt: float) -> Windows:
+    """Return test functions of a width [s] at a sample time."""
+    half = max(round(width / dt), _LEAST_WIDTH) // 2
+    s = np.arange(-half, half + 1) / (half + 1)
+    rate = 1.0 / ((half + 1) * dt)
+    inside = 1.0 - s**2
+    value = inside**_POWER
+    slope = -2.0 * _POWER * s * inside ** (_POWER - 1) * rate
+    bend = 2.0 * _POWER * inside ** (_POWER - 2) * (2.0 * (_POWER - 1) * s**2 - inside) * rate**2
+    # Rows of unit integral, so that a row is the mean of a signal over its window.
+    weights = np.array([value, slope, bend]) / np.sum(value)
+    weights.setflags(write=False)
+    return Windows(weights, max(1, (2 * half + 1) // _ROWS_PER_WINDOW))

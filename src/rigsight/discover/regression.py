@@ -12,19 +12,18 @@ Proc. R. Soc. A 478 (2022) 20210904, for inclusion probabilities from ensembles.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
-from rigsight.discover.motion import Motion
-from rigsight.discover.weak_form import Rows
+from rigsight.discover.motion import Motion, Rows
 from rigsight.errors import InputError
+from rigsight.identify import IdleThreads
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 
 _WINDOW = 0.75
@@ -40,6 +39,8 @@ _CLEARLY = 1.1
 STRONG = 10.0
 """Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
 _TINY = 1e-10
+_LEAST_SAMPLES = 200
+_HELD_BACK = 0.3
 _RIDGE = 1e-12
 
 
@@ -47,25 +48,25 @@ _RIDGE = 1e-12
 class Projected:
     """A regression with some columns projected out of the target and of all other columns."""
 
-    base: NDArray[np.float64]  # columns that are always included, shape (n_rows, n_base)
-    target: NDArray[np.float64]  # shape (n_rows,)
+    base: Floats  # columns that are always included, shape (n_rows, n_base)
+    target: Floats  # shape (n_rows,)
     independent: float  # number of independent rows; less than n_rows, because windows overlap
 
     @cached_property
-    def _directions(self) -> NDArray[np.float64]:
+    def _directions(self) -> Floats:
         size = np.linalg.norm(self.base, axis=0)
         return np.linalg.qr(self.base[:, size > 0.0] / size[size > 0.0])[0]
 
     @cached_property
-    def rest(self) -> NDArray[np.float64]:
+    def rest(self) -> Floats:
         """The target without the part that the base columns explain."""
         return self.rest_of(self.target)
 
-    def rest_of(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rest_of(self, columns: Floats) -> Floats:
         """Return columns without the part that the base columns explain."""
         return np.asarray(columns - self._directions @ (self._directions.T @ columns))
 
-    def explained(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    def explained(self, columns: Floats) -> tuple[Floats, float]:
         """Return coefficients of further columns and the share that they explain of the residual of the base."""
         remainder, added = self.rest, self.rest_of(columns)
         size = np.linalg.norm(added, axis=0)
@@ -75,7 +76,7 @@ class Projected:
         rest = remainder - (added / size) @ solution
         return solution / size, float(1.0 - (rest @ rest) / (remainder @ remainder))
 
-    def solved(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    def solved(self, columns: Floats) -> tuple[Floats, float]:
         """Return coefficients of base and further columns, shape (n_base + n_columns,), and the RMS of the residual."""
         matrix = np.column_stack([self.base, columns])
         size = np.linalg.norm(matrix, axis=0) + 1e-300
@@ -84,20 +85,18 @@ class Projected:
         return solution / size, float(np.sqrt(np.mean(rest**2)))
 
 
-def sparse_path(projected: Projected, columns: NDArray[np.float64]) -> list[tuple[int, ...]]:
+def sparse_path(projected: Projected, columns: Floats) -> list[tuple[int, ...]]:
     """Return supports of every size, smallest first: those that remain when pysindy's SSR drops term after term.
 
     The supports of FROLS, which adds terms instead, are included; the two differ if columns are similar.
     """
     matrix, target = _compressed(projected.rest_of(columns), projected.rest)
-    paths = [_shrinking(matrix, target), _growing(matrix, target)]
+    paths = [_path(matrix, target, shrinking) for shrinking in (True, False)]
     supports = {support for path in paths for support in path if support}
     return sorted(supports, key=lambda s: (len(s), s))
 
 
-def inclusion_probabilities(
-    projected: Projected, columns: NDArray[np.float64], rng: np.random.Generator
-) -> NDArray[np.float64]:
+def inclusion_probabilities(projected: Projected, columns: Floats, rng: np.random.Generator) -> Floats:
     """Return the share of draws of random stretches of the rows in which each term is selected, shape (n_terms,).
 
     The support of a draw is the smallest whose residual hardly exceeds that of the support with the lowest Bayesian information
@@ -109,7 +108,7 @@ def inclusion_probabilities(
     for _ in range(N_ENSEMBLE):
         rows = np.concatenate([blocks[i] for i in rng.integers(len(blocks), size=len(blocks))])
         own_matrix, own_target = _compressed(matrix[rows], target[rows])
-        supports = [(), *_shrinking(own_matrix, own_target)]
+        supports = [(), *_path(own_matrix, own_target, shrinking=True)]
         remainder = np.array([_remainder(own_matrix, own_target, support) for support in supports])
         costs = [
             information_criterion(square / rows.size, len(support), projected.independent)
@@ -125,9 +124,7 @@ def information_criterion(mean_square: float, n_terms: int, independent: float) 
     return float(independent * np.log(mean_square + 1e-300) + n_terms * np.log(independent))
 
 
-def alike(
-    projected: Projected, columns: NDArray[np.float64], threshold: float
-) -> list[tuple[int, int, float]]:
+def alike(projected: Projected, columns: Floats, threshold: float) -> list[tuple[int, int, float]]:
     """Return pairs of terms whose columns are similar after the rig's own terms are projected out, with their correlation."""
     rest = projected.rest_of(columns)
     size = np.linalg.norm(rest, axis=0)
@@ -141,9 +138,7 @@ def alike(
     ]
 
 
-def _compressed(
-    matrix: NDArray[np.float64], target: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _compressed(matrix: Floats, target: Floats) -> tuple[Floats, Floats]:
     """Return a few rows with the same normal equations and the same sum of squares, with columns of unit length."""
     size = np.linalg.norm(matrix, axis=0)
     size[size == 0.0] = 1.0
@@ -151,14 +146,18 @@ def _compressed(
     return factor[:, :-1], factor[:, -1]
 
 
-def _shrinking(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list[tuple[int, ...]]:
+def _path(matrix: Floats, target: Floats, shrinking: bool) -> list[tuple[int, ...]]:
+    """Return the supports that remain when SSR drops term after term, or those that FROLS reaches by adding terms."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        from pysindy import SSR
+        from pysindy import FROLS, SSR
         from sklearn import config_context
 
-        optimizer = SSR(
-            alpha=_RIDGE, max_iter=max(1, matrix.shape[1]), criteria="model_residual", unbias=False
+        n = matrix.shape[1]
+        optimizer = (
+            SSR(alpha=_RIDGE, max_iter=max(1, n), criteria="model_residual", unbias=False)
+            if shrinking
+            else FROLS(alpha=_RIDGE, max_iter=min(6, n), unbias=False)
         )
         # Each of its hundreds of regressions of a few rows would be examined for longer than it takes.
         with config_context(skip_parameter_validation=True, assume_finite=True):
@@ -166,25 +165,12 @@ def _shrinking(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list
     return _supports(optimizer.history_)
 
 
-def _growing(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list[tuple[int, ...]]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from pysindy import FROLS
-        from sklearn import config_context
-
-        optimizer = FROLS(alpha=_RIDGE, max_iter=min(6, matrix.shape[1]), unbias=False)
-        # Each of its hundreds of regressions of a few rows would be examined for longer than it takes.
-        with config_context(skip_parameter_validation=True, assume_finite=True):
-            optimizer.fit(matrix, target)
-    return _supports(optimizer.history_)
-
-
-def _supports(history: Sequence[NDArray[np.float64]]) -> list[tuple[int, ...]]:
+def _supports(history: Sequence[Floats]) -> list[tuple[int, ...]]:
     supports = (tuple(int(i) for i in np.flatnonzero(np.ravel(coefficients))) for coefficients in history)
     return sorted({support for support in supports if support}, key=lambda s: (len(s), s))
 
 
-def _remainder(matrix: NDArray[np.float64], target: NDArray[np.float64], support: tuple[int, ...]) -> float:
+def _remainder(matrix: Floats, target: Floats, support: tuple[int, ...]) -> float:
     if not support:
         return float(target @ target)
     chosen = matrix[:, list(support)]
@@ -194,21 +180,11 @@ def _remainder(matrix: NDArray[np.float64], target: NDArray[np.float64], support
 
 @dataclass(frozen=True)
 class RegressionData:
-    """A campaign, the noise floors of its sensors, and the records that are regressed.
-
-    Attributes
-    ----------
-    campaign
-        The campaign.
-    noise
-        Noise floor of each output.
-    windows
-        Sections of its records to be used, for a rig that drifts; None for the whole records.
-    """
+    """A campaign, the noise floors of its sensors, and the records that are regressed."""
 
     campaign: Campaign
-    noise: Mapping[str, float]
-    windows: tuple[Record, ...] | None = None
+    noise: Mapping[str, float]  # floor of each output
+    windows: tuple[Record, ...] | None = None  # sections of the records to be used, for a rig that drifts
 
     @property
     def rig(self) -> Rig:
@@ -223,7 +199,7 @@ class RegressionData:
     @property
     def has_stiffness(self) -> bool:
         """False for an axis that is given without a spring."""
-        return has_stiffness(self.campaign)
+        return self.campaign.absent_spring is None
 
     @property
     def held(self) -> dict[str, float]:
@@ -232,9 +208,38 @@ class RegressionData:
         return {} if factor is None else {factor.held: factor.value}
 
 
-def has_stiffness(campaign: Campaign) -> bool:
-    """Return False for one motion that is given without a spring."""
-    return campaign.absent_spring is None
+def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
+    """Return the records to fit, those to score, and a sentence on the choice of the latter (empty for validation records)."""
+    estimation = tuple(r for r in data.records if r.role == "estimation")
+    validation = tuple(r for r in data.records if r.role == "validation")
+    if not estimation:
+        raise InputError('A discovery needs at least one record with role = "estimation".')
+    for record in estimation:
+        if record.n_samples < _LEAST_SAMPLES:
+            raise InputError(
+                f"Record '{record.name}' has {record.n_samples} samples; a discovery needs at least {_LEAST_SAMPLES} in each."
+            )
+    if validation:
+        return estimation, validation, ""
+    if len(estimation) > 1:
+        names = [signal.name for signal in data.rig.inputs or data.rig.outputs]
+
+        def strength(record: Record) -> float:
+            return float(np.sqrt(sum(np.var(record[name]) for name in names if name in record)))
+
+        middle = sorted(estimation, key=strength)[len(estimation) // 2]
+        rest = tuple(record for record in estimation if record is not middle)
+        return (
+            rest,
+            (middle,),
+            f"There is no validation record; '{middle.name}' was set aside to select the terms.",
+        )
+    cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
+    return (
+        (estimation[0].slice(0, cut),),
+        (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
+        "There is a single record; its last part was set aside to select the terms, so no other amplitude is tested.",
+    )
 
 
 def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> Rows:
@@ -275,7 +280,39 @@ def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], row
     return Projected(base, np.concatenate(targets), max(independent, 10.0))
 
 
-def own_terms(rig: Rig, has_stiffness: bool, projected: Projected) -> dict[str, NDArray[np.float64]]:
+@dataclass(frozen=True, eq=False)
+class Regressed:
+    """Motions of records, the form of their rows, and the regression of the rig's own terms to which candidates are added."""
+
+    motions: Sequence[Motion]
+    rows: Rows
+    projected: Projected
+    scales: Mapping[str, float]  # size of each base quantity
+    driven: bool  # whether the acceleration is regressed; else the force
+    threads: IdleThreads = field(default_factory=IdleThreads)
+
+    @classmethod
+    def of(
+        cls,
+        rig: Rig,
+        has_stiffness: bool,
+        motions: Sequence[Motion],
+        scales: Mapping[str, float],
+        pointwise: bool = False,
+        threads: IdleThreads | None = None,
+    ) -> Regressed:
+        """Regress the rig's own terms."""
+        rows = rows_of(motions, scales["time"], pointwise)
+        projected = own_regression(rig, has_stiffness, motions, rows)
+        return cls(motions, rows, projected, scales, rig.is_driven, threads or IdleThreads())
+
+    def column(self, signals: Iterable[Floats]) -> Floats:
+        """Return the rows of a resisting force along all records, shape (n_rows,), with its sign in the regression."""
+        own = [self.rows.of(signal, m.dt) for signal, m in zip(signals, self.motions, strict=True)]
+        return (-1.0 if self.driven else 1.0) * np.concatenate(own)
+
+
+def own_terms(rig: Rig, has_stiffness: bool, projected: Projected) -> dict[str, Floats]:
     """Return the columns of the rig's damper and spring, which compete in the full form."""
     motion = rig.motion
     first = 1 if rig.is_driven else 0

@@ -13,11 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
 from rigsight.discover.regression import STRONG, information_criterion, sparse_path
 from rigsight.errors import SimulationError
+from rigsight.records.record import Floats
 
 _SEEDS = 5
 _LONGEST_SEED = 3
@@ -36,7 +36,7 @@ _WHITE = 0.75
 """Share of independent samples from which residuals count as white."""
 
 
-def independent_samples(residuals: NDArray[np.float64]) -> float:
+def independent_samples(residuals: Floats) -> float:
     """Return the number of independent samples that is equivalent to colored residuals of shape (n_samples,)."""
     n = residuals.size
     centered = residuals - np.mean(residuals)
@@ -71,7 +71,6 @@ class Selection:
 
     best: Trial  # the chosen support
     trials: tuple[Trial, ...]  # all polished supports, best first
-    criteria: tuple[float, ...]  # information criterion of each
     independent: float  # number of independent samples of the held-out errors
 
 
@@ -130,7 +129,7 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
     for trial in sorted(pool, key=cost):
         by_support.setdefault(trial.support, trial)
     ordered = list(by_support.values())
-    return Selection(best, tuple(ordered), tuple(cost(trial) for trial in ordered), independent)
+    return Selection(best, tuple(ordered), independent)
 
 
 def _better(held: Trial, released: Trial | None) -> Trial:

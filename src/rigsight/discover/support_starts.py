@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.regression import Projected
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult
-from rigsight.rigs import Rig
+from rigsight.records.record import Floats
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure, carried_over
 
 _SMALL = 1e-3
@@ -94,16 +94,14 @@ def _within_bounds(structure: Structure, values: Mapping[str, float]) -> dict[st
     }
 
 
-def _rig_values(
-    rig: Rig, known: Mapping[str, float], base: NDArray[np.float64]
-) -> tuple[dict[str, float], float]:
+def _rig_values(rig: Rig, known: Mapping[str, float], base: Floats) -> tuple[dict[str, float], float]:
     """Return the rig's parameters from the coefficients of its own terms, and the force per unit of the other coefficients."""
     values = dict(known)
     motion = rig.motion
     if not rig.is_driven:
         values |= {motion.damping.name: base[0], motion.stiffness.name: base[1], motion.bias.name: base[2]}
         return values, 1.0
-    gain = float(motion.drive_gain.subs({s: known[s.name] for s in motion.drive_gain.free_symbols}))
+    gain = evaluated(motion.drive_gain, known)
     assert motion.inertia is not None
     inertia = gain / base[0] if base[0] * gain > 0.0 else known[motion.inertia.name]
     values[motion.inertia.name] = inertia

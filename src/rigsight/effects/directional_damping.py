@@ -1,19 +1,21 @@
-"""Directional damping: a damper that differs between the two directions, up to a knee.
+"""Directional damping: a damper that is stiffer in one direction than in the other, up to a knee.
 
 Equation
 --------
-``resisting torque = d_fwd min(x', v_k)`` while x' > 0, ``d_bwd max(x', -v_k)`` while x' < 0, beside the rig's damping
+``resisting torque = d_a min(|x'|, v_k)``, beside the damping of the rig
 
-=====  ==========================================================================
-d_fwd  additional damping while x' is positive [force per velocity]
-d_bwd  additional damping while x' is negative [force per velocity]; vanishes with d_fwd
-v_k    velocity of the knee, from which on the additional force stays as it is
-=====  ==========================================================================
+===  ==============================================================================================
+d_a  half the difference of the damping of the two directions [force per velocity]; vanishes at 0
+v_k  velocity of the knee, from which on the two directions differ by a constant force
+===  ==============================================================================================
 
-Applies to vehicle dampers (bump and rebound, whose blow-off valves open at the knee), throttles with a check valve, and pneumatic
-cylinders. Where no motion is faster than the knee, only the difference d_fwd - d_bwd can be told from the damping of the rig.
+The damping of the rig is the mean of both directions: below the knee it is d + d_a while x' is positive and d - d_a while it is
+negative.
 
-Signature: the resonance is damped less at large amplitude, and the mean position shifts with the motion; even harmonics.
+Applies to vehicle dampers (bump and rebound, whose valves open at the knee), throttles with a check valve, and pneumatic
+cylinders.
+
+Signature: the mean position shifts with the motion; even harmonics.
 
 References: J. C. Dixon, *The Shock Absorber Handbook* (Wiley 2007), chapter 7, for damper characteristics.
 """
@@ -24,8 +26,7 @@ from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Si
 from rigsight.effects.symbols import clamp, v
 from rigsight.parameters import Parameter
 
-d_fwd, d_bwd, v_k = sp.symbols("d_fwd d_bwd v_k", real=True)
-_below_knee = clamp(v, v_k)
+d_a, v_k = sp.symbols("d_a v_k", real=True)
 
 DIRECTIONAL_DAMPING = Effect(
     name="directional_damping",
@@ -34,24 +35,14 @@ DIRECTIONAL_DAMPING = Effect(
     summary="Damping is larger in one direction than in the other, up to a knee.",
     parameters=(
         Parameter(
-            "d_fwd",
-            "additional damping while x' is positive",
+            "d_a",
+            "half the difference of the damping of the two directions",
             "force time x^-1",
-            lower=0.0,
+            lower=-1e15,
             upper=1e15,
             null=0.0,
-            starts=(1.0, 0.2),
-            search=(0.0, 1e3),
-        ),
-        Parameter(
-            "d_bwd",
-            "additional damping while x' is negative",
-            "force time x^-1",
-            lower=0.0,
-            upper=1e15,
-            null=0.0,
-            starts=(0.2, 1.0),
-            search=(0.0, 1e3),
+            starts=(0.5, -0.5),
+            search=(-1e3, 1e3),
         ),
         Parameter(
             "v_k",
@@ -59,11 +50,11 @@ DIRECTIONAL_DAMPING = Effect(
             "x time^-1",
             lower=1e-12,
             upper=1e12,
-            starts=(0.1, 0.03),
-            search=(1e-3, 3.0),
+            starts=(0.1, 0.5),
+            search=(2e-2, 3.0),
         ),
     ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES, even_harmonics=True),
-    torque=(d_fwd + d_bwd) / 2 * _below_knee + (d_fwd - d_bwd) / 2 * sp.Abs(_below_knee),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.FALLS, even_harmonics=True),
+    torque=d_a * sp.Abs(clamp(v, v_k)),
 )

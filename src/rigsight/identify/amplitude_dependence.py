@@ -30,13 +30,6 @@ def amplitude_dependence(
 
     Only records of one kind with different amplitudes are compared, because a step and a sweep also differ in frequency content.
     Offsets are not compared; they may differ from record to record without any nonlinearity.
-
-    Parameters
-    ----------
-    records
-        Results of each record.
-    units
-        Unit by parameter and signal.
     """
     compared = _comparable(records)
     if len(compared) < 2:
@@ -126,9 +119,7 @@ def _why_not(records: Sequence[RecordIdentification]) -> str:
     return f"{reason}, so they cannot show whether the parameters change with it. {remedy}"
 
 
-def _comparable(
-    records: Sequence[RecordIdentification],
-) -> list[tuple[float, list[RecordIdentification]]]:
+def _comparable(records: Sequence[RecordIdentification]) -> list[tuple[float, list[RecordIdentification]]]:
     """Return the amplitudes in increasing order with their records, for the kind of records with the most amplitudes."""
     grouped = [_by_amplitude([r for r in alike if _has_numbers(r)]) for alike in _alike(records)]
     return max(grouped, key=len, default=[])
@@ -142,9 +133,7 @@ def _alike(records: Sequence[RecordIdentification]) -> list[list[RecordIdentific
     ]
 
 
-def _by_amplitude(
-    records: Sequence[RecordIdentification],
-) -> list[tuple[float, list[RecordIdentification]]]:
+def _by_amplitude(records: Sequence[RecordIdentification]) -> list[tuple[float, list[RecordIdentification]]]:
     """Return the amplitudes in increasing order with their records."""
     groups: list[tuple[float, list[RecordIdentification]]] = []
     for found in sorted(records, key=lambda r: r.amplitude):

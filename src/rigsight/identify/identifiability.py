@@ -17,10 +17,9 @@ from fractions import Fraction
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.information import Information, information
 from rigsight.identify.undetermined import (
@@ -35,14 +34,12 @@ from rigsight.identify.undetermined import (
     sum_text,
     undetermined,
 )
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, record_values, simulate
 
 _NOISE = 0.01
 """Assumed noise of an unrecorded sensor, relative to the RMS of its reading: that of a mediocre sensor."""
 
-
-Floats = NDArray[np.float64]
 
 _NO_INFLUENCE = 100.0
 """Standard error over the value, with all other parameters known, above which a parameter is reported to have no influence."""

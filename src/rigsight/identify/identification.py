@@ -8,9 +8,9 @@ from typing import Any
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.hysteresis.calibration import Calibration
 from rigsight.identify.identifiability import Identifiability
+from rigsight.identify.information import ReachedBound
 from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
-from rigsight.identify.reached_bounds import ReachedBound
 from rigsight.identify.transfer.conicity import ConicityEstimate
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
@@ -43,8 +43,7 @@ class RecordIdentification:
     # Angular frequency at which the measured magnitude is largest [rad/s]; None if it has no peak.
     resonance: float | None = None
     warnings: tuple[str, ...] = ()  # warnings for the user, a sentence each
-    # Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it
-    # failed.
+    # Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it failed.
     own: PhysicalEstimates | None = None
     moved: str = ""  # the output to which the amplitude of a free motion refers
 
@@ -129,58 +128,32 @@ class HysteresisIdentification:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """The result of ``rigsight identify``.
+    """The result of ``rigsight identify``."""
 
-    Attributes
-    ----------
-    title
-        Title of the campaign.
-    rig
-        Name of the rig.
-    method
-        Method by which frequency responses were estimated.
-    units
-        Unit by parameter and signal.
-    records
-        Estimation records in the order of the campaign.
-    amplitude_statement
-        Whether the parameters change with the amplitude, in one sentence.
-    changing
-        Names of those that do.
-    joint
-        One set for all records.
-    model
-        Content of ``model.json``.
-    warnings
-        All warnings, each with the name of its record.
-    reached
-        Parameters of the joint fit that stand at a bound which the records ask them to pass.
-    views
-        The linearized rig, for each set of constants of the records; empty for the built-in rigs with one motion, whose transfer
-        functions are fitted record by record.
-    identifiability
-        Parameters that the records determine together; None for these built-in rigs.
-    meanings
-        Meaning of each parameter, by name; empty for these built-in rigs.
-    hysteresis
-        The rig with hysteresis effects; None if not requested. If there is one, it is the `model`.
-    given
-        Parameter values of the given simulation, to compare with.
-    """
-
-    title: str
-    rig: str
-    method: str
-    units: dict[str, str]
-    records: tuple[RecordIdentification, ...]
-    amplitude_statement: str
-    changing: tuple[str, ...]
-    joint: JointIdentification
-    model: dict[str, Any]
-    warnings: tuple[str, ...]
-    reached: tuple[ReachedBound, ...] = ()
+    title: str  # of the campaign
+    rig: str  # name of the rig
+    method: str  # how frequency responses were estimated
+    units: dict[str, str]  # by parameter and signal
+    records: tuple[RecordIdentification, ...]  # estimation records in the order of the campaign
+    amplitude_statement: str  # whether the parameters change with the amplitude, in one sentence
+    changing: tuple[str, ...]  # names of those that do
+    joint: JointIdentification  # one set for all records
+    model: dict[str, Any]  # content of ``model.json``
+    warnings: tuple[str, ...]  # each with the name of its record
+    reached: tuple[
+        ReachedBound, ...
+    ] = ()  # parameters of the joint fit at a bound which the records ask them to pass
+    # The linearized rig, for each set of constants of the records; empty for the built-in rigs with one motion, whose transfer
+    # functions are fitted record by record.
     views: tuple[LinearView, ...] = ()
+    # Parameters that the records determine together; None for these built-in rigs.
     identifiability: Identifiability | None = None
-    meanings: dict[str, str] = field(default_factory=dict)
-    hysteresis: HysteresisIdentification | None = None
-    given: dict[str, float] = field(default_factory=dict)
+    meanings: dict[str, str] = field(
+        default_factory=dict
+    )  # of each parameter, by name; empty for these built-in rigs
+    hysteresis: HysteresisIdentification | None = (
+        None  # the rig with hysteresis effects; the `model` if there is one
+    )
+    given: dict[str, float] = field(
+        default_factory=dict
+    )  # parameter values of the given simulation, to compare with

@@ -1,4 +1,4 @@
-"""Information of fitted records on each parameter and their combinations: the information matrix in relative units."""
+"""Information of fitted records on each parameter and their combinations, and the bounds that they ask parameters to pass."""
 
 from __future__ import annotations
 
@@ -6,18 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import orth
+from scipy.stats import norm
 
-from rigsight.identify.fit.coordinates import Coordinates
-from rigsight.identify.fit.fit_problem import Problem
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.derivatives import central_sensitivities, place_of_fit
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.identify.transfer.running_gear_parameters import LEVEL
 from rigsight.identify.undetermined import POORLY_KNOWN, conditional_errors
-from rigsight.simulate import carries_tangents
+from rigsight.records.record import Floats
 from rigsight.units import characteristic_value
-
-Floats = NDArray[np.float64]
 
 _OWN_SIZE = 0.5
 """Value over its characteristic size from which a parameter of either sign is its own reference, as a stiffness that gives the
@@ -40,8 +38,7 @@ class Information:
     # Their bounds, shape (n,).
     lower: Floats
     upper: Floats
-    # The values after one step to the minimum without bounds, shape (n,); at a minimum inside the bounds
-    # `values`.
+    # The values after one step to the minimum without bounds, shape (n,); at a minimum inside the bounds `values`.
     asked: Floats
     root: Floats  # ``root.T @ root`` is the information matrix in units of the noise, shape (m, n)
     # Length of the change of all outputs, in units of the noise, when parameters take other values.
@@ -80,15 +77,6 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
 def answers_to_states(fit: GreyBoxFit, result: FitResult) -> list[Floats]:
     """Return the derivatives of each record's weighted readings by its initial states and free offsets, at the end of a fit.
 
-    Parameters
-    ----------
-    fit
-        Structure, records and noise.
-    result
-        Its result.
-
-    Returns
-    -------
     Shape (n_readings, n_states + n_offsets) each, per unit of a coordinate of the search.
     """
     return [answers for _, answers in central_sensitivities(*place_of_fit(fit, result, result.values, ()))]
@@ -132,42 +120,13 @@ class _Model:
         return float(np.sqrt(total))
 
 
-def place_of_fit(
-    fit: GreyBoxFit, result: FitResult, values: Mapping[str, float], free: Sequence[str]
-) -> tuple[Problem, Floats]:
-    """Return the problem and the coordinates of parameter values, with the initial states and steps of a result."""
-    coordinates = Coordinates.of(fit.data.structure, free, values, fit.scales)
-    own = coordinates.from_values(values)
-    sizes = fit.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
-    theta = np.concatenate([own, *(state / sizes for state in result.initial_states)])
-    problem = Problem(fit.data, coordinates, sizes.size, np.full(theta.size, np.inf))
-    problem.substeps = list(result.substeps)
-    return problem, theta
-
-
-def central_sensitivities(problem: Problem, theta: Floats) -> list[tuple[Floats, Floats]]:
-    """Return residuals and derivatives per record; if the derivatives are differences, central ones.
-
-    The error of one-sided differences is their step times the curvature, which looks like information where there is none.
-    """
-    forward = problem.sensitivities(theta)
-    if carries_tangents(problem.data.structure):
-        return forward
-    problem.upper = np.full(theta.size, -np.inf)
-    backward = problem.sensitivities(theta)
-    return [
-        (residual, 0.5 * (one + other)) for (residual, one), (_, other) in zip(forward, backward, strict=True)
-    ]
-
-
 def _triangle(rows: Floats) -> Floats:
     return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def _coloring(root: Floats, result: FitResult, names: Sequence[str], sizes: Floats) -> float:
     """Return the ratio of the standard errors to those for white residuals, as the median over the parameters."""
-    remainder, singular, right = np.linalg.svd(root, full_matrices=False)
-    del remainder
+    _, singular, right = np.linalg.svd(root, full_matrices=False)
     known = singular > 1e-6 * singular[:1]
     white = np.sqrt(np.sum((right[known] / singular[known, None]) ** 2, axis=0))
     reported = np.array([result.standard_errors[name] for name in names]) / np.abs(sizes)
@@ -179,3 +138,52 @@ def _coloring(root: Floats, result: FitResult, names: Sequence[str], sizes: Floa
         & (white > 0.0)
     )
     return max(float(np.median(reported[seen] / white[seen])), 1.0) if np.any(seen) else 1.0
+
+
+_STOPPED = 0.1
+"""Distance to the bound over the step that is asked for: a search that could still move would not stop before most of it."""
+
+
+@dataclass(frozen=True)
+class ReachedBound:
+    """A parameter at a bound that the records ask it to pass."""
+
+    # The parameter.
+    name: str
+    unit: str
+    # ``"lower"`` or ``"upper"``, and its value.
+    side: str
+    bound: float
+    # Value that the records ask for, by one step without the bound, and its standard error; a rough value,
+    # because the other parameters are those beside the bound.
+    asked: float
+    std: float
+
+    @property
+    def sentence(self) -> str:
+        """What was found, and what it may mean."""
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        sign = f"the sign of {self.name} or of a signal is wrong, " if self.bound == 0.0 else ""
+        return (
+            f"{self.name} stops at its {self.side} bound of {self.bound:.3g}{unit}; the records ask for about "
+            f"{self.asked:.2g} +/- {self.std:.1g}{unit}. Either {sign}the equations lack an effect or are wrong "
+            f"(see 'rigsight diagnose'), or the rig file must allow such values. The other values hold only beside this bound."
+        )
+
+
+def reached_bounds(found: Information, standard_errors: Mapping[str, float]) -> tuple[ReachedBound, ...]:
+    """Return the parameters that stand at a bound and would pass it significantly.
+
+    A parameter whose interval contains the bound, such as a damping that is zero within its error, is not among them.
+    """
+    width = float(norm.ppf(0.5 + 0.5 * LEVEL))
+    reached = []
+    for index, name in enumerate(found.names):
+        value, asked, std = found.values[index], found.asked[index], standard_errors.get(name, np.inf)
+        for side, bound in (("lower", found.lower[index]), ("upper", found.upper[index])):
+            outward = -1.0 if side == "lower" else 1.0
+            beyond = outward * (asked - bound)
+            stopped = outward * (bound - value) <= _STOPPED * abs(asked - value)
+            if np.isfinite(bound) and stopped and beyond > width * std:
+                reached.append(ReachedBound(name, found.units[index], side, float(bound), float(asked), std))
+    return tuple(reached)

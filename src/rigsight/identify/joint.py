@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from rigsight.errors import InputError
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.start.linear_start import linear_start
 from rigsight.identify.start.scales import characteristic_scales

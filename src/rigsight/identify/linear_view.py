@@ -15,12 +15,10 @@ from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.transfer.record_response import Method
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure
 from rigsight.simulate.linearization import Linearization, linearize
-
-Floats = NDArray[np.float64]
 
 _STEP = 1e-4
 """Relative change of a parameter for a difference: rounding and curvature both contribute an error of 1e-8."""
@@ -55,11 +53,9 @@ class LinearView:
     modes: tuple[Mode, ...]  # its poles by their size, with standard errors
     # Frequency responses of these records together; None if no input moves.
     measured: ResponsesOfInputs | None
-    # The linearized response at the measured frequencies with its standard error, shape (n,) each, by
-    # (source, response).
+    # The linearized response at the measured frequencies with its standard error, shape (n,) each, by (source, response).
     model: Mapping[tuple[str, str], tuple[NDArray[np.complex128], Floats]]
-    # Contribution of a held input to the measured response, shape (n,), by (source, response); none for a
-    # prescribed motion.
+    # Contribution of a held input to the measured response, shape (n,), by (source, response); none for a prescribed motion.
     images: Mapping[tuple[str, str], NDArray[np.complex128]]
 
     def misfit(self, source: str, response: str) -> float:

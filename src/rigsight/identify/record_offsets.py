@@ -6,16 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from rigsight.identify.fit.covariance import SMOOTHED
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure
-
-Floats = NDArray[np.float64]
 
 _CHANCE = 1e-3
 """Probability by chance below which means count as different; with ten outputs this is wrong in one campaign in a hundred."""
@@ -29,33 +26,15 @@ accurate to a thousandth."""
 
 @dataclass(frozen=True)
 class DifferingMeans:
-    """Mean residuals of a model that differ from record to record.
+    """Mean residuals of a model that differ from record to record."""
 
-    Attributes
-    ----------
-    output
-        Name of the output.
-    means
-        Record -> mean of measured minus simulated.
-    share
-        Share of the residual's power that the means explain.
-    probability
-        Probability of such differences by chance if the offset is the same everywhere.
-    """
-
-    output: str
-    means: dict[str, float]
-    share: float
-    probability: float
+    output: str  # its name
+    means: dict[str, float]  # record -> mean of measured minus simulated
+    share: float  # of the residual's power that the means explain
+    probability: float  # of such differences by chance if the offset is the same everywhere
 
     def sentence(self, unit: str) -> str:
-        """Return the finding in words.
-
-        Parameters
-        ----------
-        unit
-            Unit of the output.
-        """
+        """Return the finding in words."""
         lowest, highest = (choose(self.means, key=self.means.__getitem__) for choose in (min, max))
         chance = f"{self.probability:.1g}" if self.probability > _LEAST_TOLD else f"below {_LEAST_TOLD:g}"
         return (
@@ -77,17 +56,7 @@ def differing_means(
     """Return the outputs whose mean residuals differ between records more than by chance.
 
     The variance of a mean comes from the lowest lines of the residual's own spectrum, so that slow disturbances are included.
-
-    Parameters
-    ----------
-    names
-        Name of each record; those with the same name are stretches of one record.
-    records
-        The fitted or scored records.
-    residuals
-        Measured minus simulated per record, shape (n_samples, n_outputs).
-    outputs
-        Names of the columns.
+    Records with the same of the names are stretches of one record; the residuals have the shape (n_samples, n_outputs).
     """
     found = []
     for column, output in enumerate(outputs):
@@ -128,15 +97,7 @@ def _variance_of_mean(remainder: Floats) -> float:
 
 
 def without_offsets(records: Sequence[Record], fit: FitResult) -> list[Record]:
-    """Return records minus the offsets that a fit found in each of them.
-
-    Parameters
-    ----------
-    records
-        The fitted records.
-    fit
-        The result.
-    """
+    """Return the fitted records minus the offsets that the fit found in each of them."""
     return [
         record.with_signals(
             **{name: record[name] - own for name, own in fit.offsets(index).items() if name in record}
@@ -153,21 +114,7 @@ def swallowed_by_offsets(
     values: Mapping[str, float],
     free: Sequence[str],
 ) -> tuple[str, ...]:
-    """Return the parameters that free sensor offsets make undetermined: a rest position, or the zero of a sensor.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    records
-        The records to fit.
-    scales, noise
-        As for `GreyBoxFit`.
-    values
-        Value of every parameter.
-    free
-        Names of the parameters to check.
-    """
+    """Return the free parameters that sensor offsets make undetermined: a rest position, or the zero of a sensor."""
     if not any(record.free_offsets for record in records):
         return ()
     without = [replace(record, free_offsets=()) for record in records]

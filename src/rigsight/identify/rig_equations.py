@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from rigsight.effects.placed import ByIdentity
 from rigsight.effects.symbols import derivative
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Joint, Rig, applied_symbol
 from rigsight.simulate import compose, parameter_vector, record_input, record_values
 from rigsight.simulate.equations.derivatives import slopes_of
@@ -22,8 +21,6 @@ from rigsight.simulate.equations.straight_line import StraightLine, of_parts, st
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.equations.tree import Output
 from rigsight.simulate.input_hold import HeldInput
-
-Floats = NDArray[np.float64]
 
 FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
 """Functions in the equations of effects and rigs that numpy does not have under these names."""
@@ -43,20 +40,10 @@ def _equations_of(key: ByIdentity[Rig]) -> RigEquations:
 class RigEquations:
     """The equations of a rig without effects.
 
-    All functions take the states ``z`` of shape (n_states, n_samples), the inputs ``u`` of shape (3 n_inputs, n_samples) (each
-    with its first and second time derivative) and the parameter vector ``p`` of `structure`, shape (n_parameters,).
-
-    Parameters
-    ----------
-    rig
-        The rig.
-
-    Attributes
-    ----------
-    structure
-        The rig with an additional sensor for each of its states, so that one simulation returns all of them.
-    n_coordinates
-        Degrees of freedom; coordinates come first among the states, then their rates, then the rig's own states.
+    All functions take the states ``z`` of shape (n_states, n_samples): coordinates first, then their rates, then the rig's
+    own states; the inputs ``u`` of shape (3 n_inputs, n_samples) (each with its first and second time derivative) and the
+    parameter vector ``p`` of `structure`, shape (n_parameters,). `structure` has an additional sensor for each state, so that
+    one simulation returns all of them.
     """
 
     def __init__(self, rig: Rig) -> None:

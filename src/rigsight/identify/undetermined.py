@@ -8,13 +8,13 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.records.record import Floats
+
 _LARGEST_POWER = 3
 ONE = 0.03
 """Relative distance up to which a factor between values of the same unit counts as one (and is left out), and a power as a small
 fraction."""
 
-
-Floats = NDArray[np.float64]
 
 POORLY_KNOWN = 0.5
 """Relative standard error from which a parameter is not determined: its 95 % interval reaches zero, or twice the value."""

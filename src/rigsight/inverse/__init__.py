@@ -16,4 +16,4 @@ from rigsight.inverse.measured_motion import record_motion as record_motion
 from rigsight.inverse.missing_force import MissingForce as MissingForce
 from rigsight.inverse.proposal import Proposal as Proposal
 from rigsight.inverse.proposal import ProposedCause as ProposedCause
-from rigsight.inverse.proposal import propose as propose
+from rigsight.inverse.propose import propose as propose

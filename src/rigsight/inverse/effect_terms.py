@@ -19,7 +19,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.effects import Effect, Place
+from rigsight.effects import Effect, Place, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
@@ -93,10 +93,46 @@ class EffectTerms:
         elif effect.place is Place.ACTUATOR:
             yield from _of_drive(effect, self.fit, self.values, self.scales)
         elif is_joint_force(effect) and not _is_resonance(effect):
-            joint = joint_of(self.fit.rig, effect)
-            if joint.name not in self._moved:
-                self._moved[joint.name] = [joint_motion(m, joint, self.values) for m in self.fit.motions]
-            yield from _of_joint(effect, self.fit, self.values, self.scales, self._moved[joint.name])
+            yield from _of_joint(effect, self.fit, self.values, self.scales, self._motion_of(effect))
+
+    def acting(self, effect: Effect, own: Mapping[str, float]) -> tuple[Floats, ...] | None:
+        """Return what an effect that acts would add to what the equations need, along each motion, filtered and thinned.
+
+        Parameters
+        ----------
+        effect
+            One that has a term.
+        own
+            Its parameters by their own names.
+
+        Returns
+        -------
+            Shape (n_equations, n_rows) each; None where it cannot be evaluated.
+        """
+        fit, values, motions = self.fit, self.values, self.fit.motions
+        if effect.place is Place.SENSOR:
+            name, numbers = fit.rig.acts_at(effect), [sp.Symbol(p, real=True) for p in own]
+            assert effect.measured is not None
+            shown = _compiled(effect.measured, (canonical.reading, *numbers))
+            rows = [
+                _influence(fit, m, values, name, m.record[name] - shown(m.record[name], *own.values()))
+                for m in motions
+            ]
+        elif effect.place is Place.ACTUATOR:
+            drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
+            rows = [_lost(drive, effect, own, fit, m, values) for m in motions]
+        else:
+            along = zip(motions, self._motion_of(effect), strict=True)
+            rows = [generalized(m, effect, own, values, moved) for m, moved in along]
+        found = [m.thinned(part) for m, part in zip(motions, rows, strict=True) if part is not None]
+        finite = len(found) == len(motions) and all(np.all(np.isfinite(part)) for part in found)
+        return tuple(found) if finite else None
+
+    def _motion_of(self, effect: Effect) -> list[JointMotion]:
+        joint = joint_of(self.fit.rig, effect)
+        if joint.name not in self._moved:
+            self._moved[joint.name] = [joint_motion(m, joint, self.values) for m in self.fit.motions]
+        return self._moved[joint.name]
 
 
 def _of_joint(
@@ -111,7 +147,7 @@ def _of_joint(
     if springs and not evaluated(joint.stiffness, {**values, **fit.motions[0].record.constants}) > 0.0:
         return
     linear = [p for p in effect.parameters if p.fitted and _is_linear(effect, p)]
-    units = [characteristic_value(p.dimension, scales) for p in linear]
+    units = [_usual(effect, p, scales) for p in linear]
     if effect.holds_constant_force and linear and all(p.lower >= 0.0 for p in linear):
         one_sided = (False,) * len(linear)
     else:
@@ -142,25 +178,28 @@ def _grid_of(
     effect: Effect, linear: Sequence[Parameter], scales: Mapping[str, float]
 ) -> Iterator[dict[str, float]]:
     inside = [p for p in effect.parameters if p.fitted and p not in linear]
-    held = {
-        p.name: p.held_at(characteristic_value(p.dimension, scales))
-        for p in effect.parameters
-        if not p.fitted
-    }
+    held = {p.name: p.held_at(_usual(effect, p, scales)) for p in effect.parameters if not p.fitted}
     n = _GRID.get(len(inside), 2)
-    grids = [_waves(p, scales) if p.name == effect.wave_number else _grid(p, scales, n) for p in inside]
+    grids = [
+        _waves(effect, p, scales) if p.name == effect.wave_number else _grid(effect, p, scales, n)
+        for p in inside
+    ]
     for values in itertools.product(*grids):
         yield {**held, **dict(zip((p.name for p in inside), map(float, values), strict=True))}
 
 
-def _grid(parameter: Parameter, scales: Mapping[str, float], n: int) -> Floats:
-    size = characteristic_value(parameter.dimension, scales)
+def _grid(effect: Effect, parameter: Parameter, scales: Mapping[str, float], n: int) -> Floats:
     low, high = max(parameter.search[0], _LEAST_SHARE), min(parameter.search[1], _MOST_SHARE)
-    return size * np.geomspace(low, 0.97 * high, n)
+    return _usual(effect, parameter, scales) * np.geomspace(low, 0.97 * high, n)
 
 
-def _waves(parameter: Parameter, scales: Mapping[str, float]) -> Floats:
-    return characteristic_value(parameter.dimension, scales) * np.linspace(*parameter.search, _WAVES)
+def _waves(effect: Effect, parameter: Parameter, scales: Mapping[str, float]) -> Floats:
+    return _usual(effect, parameter, scales) * np.linspace(*parameter.search, _WAVES)
+
+
+def _usual(effect: Effect, parameter: Parameter, scales: Mapping[str, float]) -> float:
+    """Return the size of a parameter in the records, at the place of its effect."""
+    return characteristic_value(placed_dimension(effect, parameter.dimension), scales)
 
 
 def _of_drive(
@@ -178,15 +217,28 @@ def _of_drive(
     vanishes = all(p.null == 0.0 for p in effect.parameters)
     if not (is_function and vanishes and fit.motions[0].equations.n_coordinates and all(per_input)):
         return
-    inner = {p.name: _SMALL_PART * characteristic_value(p.dimension, scales) for p in effect.parameters}
-    reaching = _compiled(effect.drive, (canonical.u, *own))
-    columns = []
-    for motion, gain in zip(fit.motions, per_input, strict=True):
-        along, force = _required(drive, fit, motion, values)
-        lost = force - gain * reaching(force / gain, *inner.values())
-        columns.append(motion.thinned(along * lost)[None])
+    inner = {p.name: _SMALL_PART * _usual(effect, p, scales) for p in effect.parameters}
+    columns = [
+        motion.thinned(_lost(drive, effect, inner, fit, motion, values))[None] for motion in fit.motions
+    ]
     if all(np.all(np.isfinite(column)) for column in columns):
         yield Term(effect, inner, (), (), tuple(columns), (True,))
+
+
+def _lost(
+    drive: Drive,
+    effect: Effect,
+    own: Mapping[str, float],
+    fit: EquationFit,
+    motion: RecordMotion,
+    values: Mapping[str, float],
+) -> Floats:
+    """Return the force that a drive effect takes from what the motion requires, shape (n_equations, n_samples)."""
+    assert effect.drive is not None
+    gain = _force_per_input(drive, {**values, **motion.record.constants})
+    along, force = _required(drive, fit, motion, values)
+    reaching = _compiled(effect.drive, (canonical.u, *(sp.Symbol(name, real=True) for name in own)))
+    return np.asarray(along * (force - gain * reaching(force / gain, *own.values())))
 
 
 def _force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:

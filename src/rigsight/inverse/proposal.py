@@ -1,12 +1,7 @@
-"""The missing force first: which families of effects at which places explain what the equations leave along the measured motion.
-
-The equations of motion are a regression along the motion that the sensors show: their numbers and those of the effects are linear
-in it or tried on a grid, so its optimum is global and nothing is simulated. Families are taken one by one, the one first that
-removes most of the residual of stretches that it was not fitted to. It proposes; fits of the simulation decide.
+"""Which families explain a residual along the measured motion: greedy selection, judged on stretches left out.
 
 References
 ----------
-J. Swevers, W. Verdonck and J. De Schutter, IEEE Control Systems 27 (2007) 58, for inverse dynamics as a regression.
 S. A. Billings, *Nonlinear System Identification* (Wiley 2013), for greedy forward selection of terms.
 """
 
@@ -14,28 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.campaign import Campaign
 from rigsight.effects import Effect, Family, kind_of
-from rigsight.errors import SimulationError
-from rigsight.identify import characteristic_scales
-from rigsight.inverse.effect_terms import EffectTerms, Term, is_joint_force
-from rigsight.inverse.equation_fit import (
-    EquationFit,
-    held_numbers,
-    matters,
-    of_undriven,
-    record_motions,
-    with_all_inputs,
-)
+from rigsight.inverse.effect_terms import Term
+from rigsight.inverse.equation_fit import EquationFit
 from rigsight.inverse.measured_motion import WIDER
-from rigsight.inverse.missing_force import MissingForce, missing_forces, noise_of_rows
+from rigsight.inverse.missing_force import MissingForce
 from rigsight.rigs import Rig
 
 Floats = NDArray[np.float64]
@@ -104,75 +90,13 @@ class Proposal:
         }
 
 
-def propose(
-    campaign: Campaign,
-    known: Mapping[str, float],
-    effects: Sequence[Effect],
-    noise: Mapping[str, float] | None = None,
-) -> Proposal | None:
-    """Return the families that explain what the equations of a campaign leave of its estimation records.
-
-    None where the sensors do not show the motion, another program simulates the bodies, or the given simulation has an effect
-    that is no force at a joint.
-
-    Parameters
-    ----------
-    campaign
-        Records and rig.
-    known
-        Constants and parameters of the rig and of the modelled effects; those of the drives set the scale of all forces.
-    effects
-        Candidates at their places.
-    noise
-        Standard deviation of the noise of each sensor; it weighs the joints of a rig against each other.
-    """
-    rig = campaign.rig
-    if rig.mechanism.bodies is not None or not all(map(is_joint_force, campaign.modelled)):
-        return None
-    try:
-        fit, values = _fitted(campaign, known)
-    except SimulationError:
-        return None
-    own = {p.name: values[p.name] for p in (*rig.constants, *rig.parameters)}
-    records = [with_all_inputs(rig, record) for record in campaign.estimation]
-    scales = characteristic_scales(rig, records, own)
-    terms_of = EffectTerms(fit, values, scales)
-    terms = [term for effect in effects for term in terms_of.of(effect)]
-    covariance = noise_of_rows(fit, values, noise or {})
-    by_noise = None
-    if covariance is not None:
-        by_noise = min(1.0, float(np.mean(np.diag(covariance) / fit.rms(values) ** 2)))
-    found = (
-        _Selection(fit, values, terms).proposal(rig)
-        if terms
-        else Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
-    )
-    return replace(found, noise=by_noise, forces=missing_forces(fit, values, covariance))
-
-
-def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit, dict[str, float]]:
-    rig = campaign.rig
-    held = held_numbers(rig) | ({campaign.absent_spring} if campaign.absent_spring else set())
-    start = {p.name: p.default if p.default is not None else 1.0 for p in rig.parameters}
-    start |= {**campaign.constants, **known}
-    motions = record_motions(rig, campaign.estimation, start)
-    held |= of_undriven(motions, start)
-    free = tuple(p.name for p in rig.parameters if p.name not in held and matters(motions, start, p.name))
-    # A constant force and the rest of a spring do the same: the rest stays where it is known.
-    of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
-    ordered = sorted(free, key=lambda name: name in of_rest)
-    fit = EquationFit(rig, motions, campaign.modelled, ordered)
-    fit = EquationFit(rig, motions, campaign.modelled, fit.independent(start))
-    return fit, fit.settled(start)[0]
-
-
-class _Selection:
+class Selection:
     """Greedy selection of families by the residual of held-out stretches, on sums of products."""
 
     def __init__(self, fit: EquationFit, values: Mapping[str, float], terms: Sequence[Term]) -> None:
         self.fit, self.terms = fit, terms
         rows, slopes, columns, stretch = [], [], [], []
-        unit = fit.rms(values)[:, None]
+        self.unit = unit = fit.rms(values)[:, None]
         per_record = max(1, round(2 * _STRETCHES / len(fit.motions)))
         for i, motion in enumerate(fit.motions):
             own = motion.thinned(fit.residual(motion, values))
@@ -190,12 +114,13 @@ class _Selection:
         self.size = np.sqrt(np.mean(matrix**2, axis=0))
         self.size[self.size == 0.0] = 1.0
         self.size[-1] = 1.0
-        matrix, self.n_rows = matrix / self.size, target.size
+        self.matrix, self.n_rows = matrix / self.size, target.size
         self.own = list(range(regressors[0].shape[1]))
         ends = np.cumsum([part.shape[1] for part in regressors])
         self.places = [list(range(a, b)) for a, b in pairwise(ends)]
-        groups = np.concatenate(stretch) % _STRETCHES
-        self.products = np.array([matrix[groups == g].T @ matrix[groups == g] for g in range(_STRETCHES)])
+        self.groups = np.concatenate(stretch) % _STRETCHES
+        parts = [self.matrix[self.groups == g] for g in range(_STRETCHES)]
+        self.products = np.array([part.T @ part for part in parts])
         self.whole = np.sum(self.products, axis=0)
         # Limit of the largest of so many squared normal deviates (Bonferroni), as a share of the squares of all rows. What laws
         # leave moves with the motion: in its band lie fewer rows than in that of the forces.
@@ -203,24 +128,43 @@ class _Selection:
         self.by_chance = min(1.0, 2.0 * math.log(len(terms) / _SIGNIFICANCE) / independent)
 
     def _solved(self, products: Floats, columns: Sequence[int]) -> Floats:
-        normal = products[np.ix_(columns, columns)]
-        ridge = _SMOOTH * self.n_rows * np.eye(len(columns))
-        return np.asarray(np.linalg.solve(normal + ridge, products[columns, -1]))
+        """Return the numbers of columns, shape (.., n_columns), from sums of products, shape (.., n, n)."""
+        at = np.asarray(columns, dtype=np.int64)
+        normal = products[..., at[:, None], at]
+        ridge = _SMOOTH * self.n_rows * np.eye(at.size)
+        return np.asarray(np.linalg.solve(normal + ridge, products[..., at, -1:])[..., 0])
 
-    def _remainder(self, chosen: Sequence[int]) -> float:
+    def remainder(self, chosen: Sequence[int]) -> float:
         """Return the sum of squares of held-out stretches with further columns beside those of the equations."""
-        columns = [*self.own, *chosen]
-        total = 0.0
-        for left_out in self.products:
-            x = self._solved(self.whole - left_out, columns)
-            total += float(
-                left_out[-1, -1]
-                - 2.0 * x @ left_out[columns, -1]
-                + x @ left_out[np.ix_(columns, columns)] @ x
-            )
-        return max(total, 0.0)
+        at = np.asarray([*self.own, *chosen], dtype=np.int64)
+        x = self._solved(self.whole - self.products, [*self.own, *chosen])
+        along = np.einsum("gi,gi->", x, self.products[:, at, -1])
+        squares = np.einsum("gi,gij,gj->", x, self.products[:, at[:, None], at], x)
+        return max(float(self.whole[-1, -1] - 2.0 * along + squares), 0.0)
 
-    def _best(self, rig: Rig, chosen: Sequence[int], taken: Sequence[Key]) -> dict[Key, tuple[float, int]]:
+    def with_added(self, rows: Sequence[Floats]) -> Selection:
+        """Return the selection for records in which a further force acts: what `EffectTerms.acting` gives."""
+        own = np.concatenate([np.ravel(part / self.unit) for part in rows])
+        added = copy(self)
+        added.products = self.products.copy()
+        for g in range(_STRETCHES):
+            here = self.groups == g
+            change = self.matrix[here].T @ own[here]
+            added.products[g, :, -1] += change
+            added.products[g, -1, :] += change
+            added.products[g, -1, -1] += own[here] @ own[here]
+        added.whole = np.sum(added.products, axis=0)
+        return added
+
+    def resampled(self, rng: np.random.Generator) -> Selection:
+        """Return the selection for stretches that are drawn with replacement."""
+        drawn = copy(self)
+        counts = rng.multinomial(_STRETCHES, np.full(_STRETCHES, 1.0 / _STRETCHES))
+        drawn.products = counts[:, None, None] * self.products
+        drawn.whole = np.sum(drawn.products, axis=0)
+        return drawn
+
+    def best(self, rig: Rig, chosen: Sequence[int], taken: Sequence[Key]) -> dict[Key, tuple[float, int]]:
         """Return the best term of each family at each place beside columns that were chosen, with what it leaves."""
         best: dict[Key, tuple[float, int]] = {}
         for i, term in enumerate(self.terms):
@@ -231,30 +175,54 @@ class _Selection:
             own = self._solved(self.whole, [*self.own, *columns])[-len(self.places[i]) :]
             if any(sided and number < 0.0 for sided, number in zip(term.one_sided, own, strict=True)):
                 continue
-            remainder = self._remainder(columns)
+            remainder = self.remainder(columns)
             if key not in best or remainder < best[key][0]:
                 best[key] = (remainder, i)
         return best
 
-    def proposal(self, rig: Rig) -> Proposal:
-        """Take families until none removes enough."""
-        begun = remainder = self._remainder([])
-        chosen: list[int] = []
-        taken: list[ProposedCause] = []
-        alone: tuple[ProposedCause, ...] = ()
+    def selected(self, rig: Rig) -> list[tuple[Key, int, float]]:
+        """Take families until none removes enough: each with its term and what it leaves beside those before it."""
+        remainder, found = self.remainder([]), list[tuple[Key, int, float]]()
         for _ in range(_MOST_CAUSES):
-            best = self._best(rig, chosen, [(cause.family, cause.where) for cause in taken])
-            ordered = sorted(best.items(), key=lambda found: found[1][0])
-            if not alone:
-                alone = tuple(self._cause(key, i, 1.0 - own / begun, []) for key, (own, i) in ordered)
-            if not ordered or not ordered[0][1][0] < (1.0 - max(_WORTH, self.by_chance)) * remainder:
+            chosen = self.columns_of(found)
+            best = self.best(rig, chosen, [key for key, _, _ in found])
+            key = min(best, key=lambda own: best[own][0], default=None)
+            if key is None or not self.is_worth(best[key][0], remainder):
                 break
-            key, (own, i) = ordered[0]
-            taken.append(self._cause(key, i, 1.0 - own / remainder, chosen))
-            chosen, remainder = [*chosen, *self.places[i]], own
+            remainder, i = best[key]
+            found.append((key, i, remainder))
+        return found
+
+    def columns_of(self, found: Sequence[tuple[Key, int, float]]) -> list[int]:
+        """Return the columns of selected terms."""
+        return [column for _, i, _ in found for column in self.places[i]]
+
+    def is_worth(self, after: float, before: float) -> bool:
+        """Return whether a further family removes enough of what was left before."""
+        return after < (1.0 - max(_WORTH, self.by_chance)) * before
+
+    def names(self, rig: Rig, key: Key, known: Sequence[tuple[Key, int, float]]) -> bool:
+        """Return whether a family at a place is taken first beside known ones."""
+        chosen = self.columns_of(known)
+        best = self.best(rig, chosen, [own for own, _, _ in known])
+        first = min(best, key=lambda own: best[own][0], default=None)
+        return first == key and self.is_worth(best[key][0], self.remainder(chosen))
+
+    def proposal(self, rig: Rig) -> Proposal:
+        """Return what every family explains alone, and those that are taken."""
+        begun = self.remainder([])
+        best = self.best(rig, [], [])
+        ordered = sorted(best.items(), key=lambda found: found[1][0])
+        alone = tuple(self._cause(key, i, 1.0 - own / begun, []) for key, (own, i) in ordered)
+        selected = self.selected(rig)
+        remainders = [begun, *(own for _, _, own in selected)]
+        taken = tuple(
+            self._cause(key, i, 1.0 - own / before, self.columns_of(selected[:n]))
+            for n, ((key, i, own), before) in enumerate(zip(selected, remainders, strict=False))
+        )
         judged = frozenset(term.effect.name for term in self.terms)
-        explained = 1.0 - remainder / begun if begun > 0.0 else 0.0
-        return Proposal(tuple(taken), alone, judged, explained, self.by_chance)
+        explained = 1.0 - remainders[-1] / begun if begun > 0.0 else 0.0
+        return Proposal(taken, alone, judged, explained, self.by_chance)
 
     def _cause(self, key: Key, i: int, share: float, chosen: Sequence[int]) -> ProposedCause:
         term, columns = self.terms[i], [*self.own, *chosen, *self.places[i]]

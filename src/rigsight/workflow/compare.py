@@ -13,11 +13,11 @@ from joblib import Parallel, delayed
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_on_record
 from rigsight.compare.comparison import comparison_csv, comparison_json
-from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option, readable
 from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.identify.fit.windows import cut, window_length
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
 from rigsight.report import comparison_figures, render_comparison

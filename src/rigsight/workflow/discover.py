@@ -11,13 +11,12 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
-from rigsight.discover.regression import has_stiffness
 from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.identify.fit.windows import cut, window_length
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record
@@ -103,7 +102,7 @@ def discover_campaign(
 def regression_data(campaign: Campaign) -> RegressionData:
     """Return the data of a campaign for the regression; records of a rig that drifts are cut into windows."""
     _check_can_be_discovered(campaign)
-    drifts = not has_stiffness(campaign)
+    drifts = campaign.absent_spring is not None
     floors = noise_floors(campaign.rig, campaign.records, drifts=drifts)
     length = window_length(campaign.rig, campaign.estimation) if drifts else None
     return RegressionData(

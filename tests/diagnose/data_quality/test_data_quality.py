@@ -17,12 +17,13 @@ from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependen
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model
 from rigsight.diagnose.data_quality.finding import DataQuality, Finding
 from rigsight.diagnose.data_quality.sensor_faults import sensor_faults
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, liveliest
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales, linear_start
+from rigsight.identify.fit.windows import liveliest
 from rigsight.records import Hold, Record
 from rigsight.rigs import AXIS, ELEMENT, RIGS, RUNNING_GEAR, Rig
 from rigsight.simulate import compose, simulate
@@ -76,7 +77,7 @@ def prepared(
         rig=rig,
         estimation=tuple(estimation),
         scoring=tuple(record for record in records if record.role == "validation"),
-        look=liveliest(estimation, rig),
+        look=liveliest(estimation, rig, 8000),
         scales=characteristic_scales(rig, estimation, start),
         noise={floor.output: floor.std for floor in noise_floors(rig, records)},
         held=frozenset(),

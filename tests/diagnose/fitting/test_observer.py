@@ -10,11 +10,11 @@ import pytest
 from scipy.signal import lfilter
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.observer import Observer, followed_sensors, structures_to_fit
+from rigsight.diagnose import diagnose, structures_to_fit
 from rigsight.diagnose.search.horizon import windowing_of
 from rigsight.effects import CATALOGUE, effect_named, placed
 from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.identify.fit.windows import Observer, followed_sensors
 from rigsight.records import Record
 from rigsight.rigs import AXIS, ELEMENT, read_rig_file
 from rigsight.simulate import compose, record_values, simulate, simulate_outputs, structure_of_fit
@@ -126,10 +126,8 @@ def test_an_observer_is_no_part_of_a_result() -> None:
 
 def test_only_a_rig_that_drifts_is_followed_and_by_sensors_of_its_motion() -> None:
     records = stage({})
-    assert followed_sensors(Campaign("s", AXIS, {"gain": 1.0}, {"k": 0.0}, records)) == ("x",)
-    assert (
-        followed_sensors(Campaign("s", ELEMENT, {}, {}, (Record("r", DT, {"x": T, "force": T}, {}),))) == ()
-    )
+    assert followed_sensors(AXIS, records) == ("x",)
+    assert followed_sensors(ELEMENT, [Record("r", DT, {"x": T, "force": T}, {})]) == ()
     sprung = Campaign("s", AXIS, {"gain": 1.0}, {"k": 50.0}, records)
     assert structures_to_fit(sprung, [compose(AXIS)]) == [compose(AXIS)]
     campaign = Campaign("s", AXIS, {"gain": 1.0}, {"k": 0.0}, records)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, liveliest
+from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales
+from rigsight.identify.fit.windows import liveliest
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate

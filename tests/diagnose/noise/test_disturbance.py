@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rigsight.diagnose.fitting.observer import Observer
 from rigsight.diagnose.noise.disturbance import disturbance
 from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.identify.fit.windows import Observer
 from rigsight.records import Record
 from rigsight.rigs import AXIS, ELEMENT
 from rigsight.simulate import compose, simulate

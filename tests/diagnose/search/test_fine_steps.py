@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from rigsight.diagnose.fitting.preparation import fit_context_of
-from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.identify import IdleThreads
+from rigsight.identify.fit.windows import Windowing
 from rigsight.workflow.campaign.read_campaign import read_campaign
 
 

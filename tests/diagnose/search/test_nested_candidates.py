@@ -9,10 +9,10 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
-from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import effect_named, placed
 from rigsight.identify import IdleThreads
+from rigsight.identify.fit.windows import Windowing
 from rigsight.records import Record
 from rigsight.rigs import read_rig_file
 from rigsight.simulate import compose, simulate

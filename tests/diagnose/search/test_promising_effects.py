@@ -9,13 +9,14 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import Diagnosis, diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext, liveliest
+from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.screening import Shortlist
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales
+from rigsight.identify.fit.windows import liveliest
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate

@@ -13,7 +13,6 @@ from scipy.stats import kstest
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.observer import Observer
 from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.homogeneity import adjusted, course, spread
 from rigsight.diagnose.trust.patterns import Pattern, Role, meaning
@@ -21,6 +20,7 @@ from rigsight.diagnose.trust.result import ParameterTrust, Trust
 from rigsight.diagnose.trust.trust import trust
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import characteristic_scales
+from rigsight.identify.fit.windows import Observer
 from rigsight.records.record import Record
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.rigs.reading.rig_file import rig_of_text

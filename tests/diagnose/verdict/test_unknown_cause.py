@@ -11,9 +11,9 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.fit_context import liveliest
 from rigsight.diagnose.verdict.main_cause import traced_to
 from rigsight.effects import effect_named, placed
+from rigsight.identify.fit.windows import liveliest
 from rigsight.inverse import MissingForce
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS

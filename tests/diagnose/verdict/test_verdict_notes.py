@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.verdict import verdict_notes as notes
 from rigsight.effects import effect_named
+from rigsight.identify.fit.windows import Windowing
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
@@ -75,7 +75,7 @@ def test_observers_are_told_with_the_time_over_which_errors_build_up() -> None:
 
 
 def test_windows_are_told_with_their_cycles() -> None:
-    reported = notes.windows_note(basis(windowing=Windowing.by_cycles({})))
+    reported = notes.windows_note(basis(windowing=Windowing(cycles=VERDICT.window_cycles, noise={})))
     assert reported is not None
     assert f"in windows of {VERDICT.window_cycles} cycles" in reported
 
@@ -90,7 +90,12 @@ def test_a_sensitive_motion_is_told_where_the_cause_is_unknown_and_records_are_w
     assert reported is not None
     assert "changes it by 40 times the noise" in reported
     assert notes.sensitive_motion_note(basis("effect")) is None
-    assert notes.sensitive_motion_note(basis("unknown", windowing=Windowing.by_cycles({}))) is None
+    assert (
+        notes.sensitive_motion_note(
+            basis("unknown", windowing=Windowing(cycles=VERDICT.window_cycles, noise={}))
+        )
+        is None
+    )
 
 
 def test_of_pairs_that_imitate_the_nearest_is_told_where_the_cause_is_unknown() -> None:

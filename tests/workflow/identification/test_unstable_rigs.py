@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.absent_spring import with_weighed_spring
+from rigsight.campaign import with_weighed_spring
 from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.identify.identification import Identification
 from rigsight.identify.record_identification import EstimationOptions, identify_record

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from rigsight.diagnose.data_quality.finding import AmplitudeDependence
-from rigsight.diagnose.fitting.windows import leading_output
 from rigsight.diagnose.policy import NOTES
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response, responses_of_inputs
+from rigsight.identify.fit.windows import leading_output
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.records.reference import instrument_of

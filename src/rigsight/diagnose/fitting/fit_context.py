@@ -7,16 +7,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.placed_effects import candidates_on
-from rigsight.diagnose.fitting.windows import cut, shown_by
 from rigsight.diagnose.policy import HORIZON
-from rigsight.effects import Effect, Place
+from rigsight.effects import Effect, Place, placed
 from rigsight.effects import symbols as canonical
-from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
+from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads, free_names
+from rigsight.identify.fit.windows import cut, strongest
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig, joint_of
 from rigsight.simulate import Structure, compose, special_values
 
@@ -30,18 +28,17 @@ class FittedModel:
 
     effects: tuple[Effect, ...]  # the effects added
     fit: FitResult  # the fit to the estimation records
-    # The same numbers on the scoring records, only initial states fitted; without residuals where they cannot
-    # be simulated.
+    # The same numbers on the scoring records, only initial states fitted; without residuals where they cannot be simulated.
     held_out: FitResult
     error_over_noise: float  # RMS of the residuals in units of the noise floor
 
     @property
-    def residuals(self) -> tuple[NDArray[np.float64], ...]:
+    def residuals(self) -> tuple[Floats, ...]:
         """Per scoring record, shape (n_samples, n_outputs), NaN where an output was not measured."""
         return self.held_out.residuals
 
     @property
-    def initial_states(self) -> tuple[NDArray[np.float64], ...]:
+    def initial_states(self) -> tuple[Floats, ...]:
         """Of the equations, per scoring record."""
         return self.held_out.rig_states
 
@@ -72,11 +69,9 @@ class FitContext:
     look: tuple[Record, ...]
     scales: Mapping[str, float]  # size of each base quantity
     noise: Mapping[str, float]  # noise floor of each output
-    # Parameters of the rig that are held in all fits (such as those of an absent spring or of outputs that
-    # were not measured).
+    # Parameters of the rig that are held in all fits (such as those of an absent spring or of outputs that were not measured).
     held: frozenset[str]
-    # Values before any fit, from the given simulation or a regression: fits without the effect may distort
-    # them too much.
+    # Values before any fit, from the given simulation or a regression: fits without the effect may distort them too much.
     start: Mapping[str, float] = field(default_factory=dict)
     given: Mapping[str, float] = field(default_factory=dict)  # parameters of the rig in the given simulation
     # Effects already in the given simulation; every candidate is added to them.
@@ -120,7 +115,7 @@ class FitContext:
             return self
         weights = np.array([1.0 / self.noise[signal.name] for signal in self.rig.outputs])
         remainder = [np.nansum((residual * weights) ** 2, axis=1) for residual in fit.residuals]
-        return replace(self, look=_strongest(self.estimation, remainder))
+        return replace(self, look=strongest(self.estimation, remainder, HORIZON.examined))
 
     def problem(
         self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY
@@ -149,14 +144,8 @@ class FitContext:
             elif rest:
                 # A linear spring cannot tell a constant force from a shifted rest position.
                 names -= self._bias
-        fixed = dict(structure.fixed)
-        for effect in structure.effects:
-            for parameter in effect.parameters:
-                name = structure.parameter_name(effect, parameter.name)
-                if parameter.fitted and name not in fixed:
-                    names.add(name)
-        names -= self.constant_forces_beside(structure.effects).keys()
-        return [name for name in structure.names if name in names]
+        held = self.constant_forces_beside(structure.effects).keys()
+        return [name for name in free_names(structure, names) if name not in held]
 
     def constant_forces_beside(self, effects: Iterable[Effect]) -> dict[str, float]:
         """Return the values at which constant forces are held beside effects with a mean force of their own."""
@@ -268,48 +257,6 @@ def _sees_position(effect: Effect) -> bool:
     return any(canonical.x in expression.free_symbols for expression in expressions)
 
 
-def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
-    """Return the records, those of a free motion only until it has decayed.
-
-    The position at which friction stops a mass changes in jumps with the parameters: a fit that includes the following rest,
-    which may be long, would not leave its start.
-    """
-    cut_off = []
-    for record, output in zip(records, shown_by(rig, records), strict=True):
-        stop = record.n_samples
-        if all(is_constant(record[signal.name]) for signal in rig.inputs):
-            energy = np.cumsum(np.diff(record[output]) ** 2)
-            stop = max(
-                HORIZON.fewest_in_motion, int(np.searchsorted(energy, HORIZON.died_away * energy[-1])) + 1
-            )
-        cut_off.append(record.slice(0, min(stop, record.n_samples)))
-    return tuple(cut_off)
-
-
-def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = HORIZON.examined) -> tuple[Record, ...]:
-    """Return the most excited stretch of each record, together about `n_samples` long."""
-    shown = zip(records, shown_by(rig, records), strict=True)
-    return _strongest(
-        records, [(record[output] - np.mean(record[output])) ** 2 for record, output in shown], n_samples
-    )
-
-
-def _strongest(
-    records: Sequence[Record], powers: Sequence[NDArray[np.float64]], n_samples: int = HORIZON.examined
-) -> tuple[Record, ...]:
-    """Return the stretch of each record with the largest sum of a power, shape (n_samples,), together about `n_samples` long."""
-    share = max(500, n_samples // max(1, len(records)))
-    stretches = []
-    for record, power in zip(records, powers, strict=True):
-        if record.n_samples <= share:
-            stretches.append(record)
-            continue
-        energy = np.cumsum(power)
-        start = int(np.argmax(energy[share:] - energy[:-share]))
-        stretches.append(record.slice(start, start + share))
-    return tuple(stretches)
-
-
 def known_constant_forces(
     rig: Rig, effect: Effect, given: Mapping[str, float], has_stiffness: bool
 ) -> dict[str, float] | None:
@@ -325,3 +272,27 @@ def known_constant_forces(
     if any(name not in known for name in needed):
         return None
     return {name: known[name] for name in names if name in known}
+
+
+def candidates_on(rig: Rig, effects: Iterable[Effect], modelled: Iterable[Effect] = ()) -> list[Effect]:
+    """Return effects at the places of a rig, in the order of the effects, without those that the simulation has already.
+
+    An effect that has a place keeps it. On one mass or one element each effect has only one place, so its name needs no place.
+    """
+    there = {effect.name for effect in modelled}
+    found = []
+    for effect in effects:
+        if rig.has_one_motion or effect.at is not None:
+            found.append(effect)
+        else:
+            found += [placed(effect, place) for place in _places(rig, effect)]
+    return [effect for effect in found if rig.offers(effect) and effect.name not in there]
+
+
+def _places(rig: Rig, effect: Effect) -> tuple[str, ...]:
+    places = rig.places(effect.place)
+    # What comes from outside and not from a motion is the same force at each joint of one coordinate: the first stands for them.
+    if effect.place is not Place.DISTURBANCE:
+        return places
+    motions = {joint.name: joint.motion for joint in rig.mechanism.joints}
+    return tuple({motions[place]: place for place in reversed(places)}.values())[::-1]

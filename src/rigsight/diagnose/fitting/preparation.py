@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.fit_context import FitContext, liveliest, until_rest
-from rigsight.diagnose.fitting.windows import Windowing
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.policy import HORIZON
 from rigsight.identify import (
     FitMemory,
     IdleThreads,
@@ -14,7 +14,8 @@ from rigsight.identify import (
     linear_start,
     swallowed_by_offsets,
 )
-from rigsight.simulate import Structure, compose
+from rigsight.identify.fit.windows import Observer, Windowing, followed_sensors, liveliest, until_rest
+from rigsight.simulate import Structure, compose, structure_of_fit
 
 Prepare = Callable[[Sequence[Structure]], None]
 """Called with the structures that are about to be simulated, to compile them side by side."""
@@ -41,7 +42,7 @@ def fit_context_of(
     return FitContext(
         rig=campaign.rig,
         estimation=fitted,
-        look=liveliest(moving, campaign.rig),
+        look=liveliest(moving, campaign.rig, HORIZON.examined),
         scoring=windowing.cut(campaign.validation or campaign.estimation),
         scales=scales,
         noise=noise,
@@ -52,6 +53,13 @@ def fit_context_of(
         memory=memory,
         threads=threads,
     )
+
+
+def structures_to_fit(campaign: Campaign, structures: Iterable[Structure]) -> list[Structure]:
+    """Return structures as they are simulated in fits to the records of a campaign: with free offsets and with an observer."""
+    sensors = followed_sensors(campaign.rig, campaign.records) if campaign.drifts else ()
+    records = Observer(sensors, bandwidth=0.0).following(campaign.records)
+    return [structure_of_fit(structure, records) for structure in structures]
 
 
 def start_values_of(campaign: Campaign) -> dict[str, float]:

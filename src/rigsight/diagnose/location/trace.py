@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.windows import readings
+from rigsight.identify.fit.windows import readings
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 

@@ -69,46 +69,8 @@ class HorizonNumbers:
         "budget",
         "Largest number of pieces of all records per degree of freedom: every piece adds its own initial state.",
     )
-    died_away: float = number(
-        0.99,
-        "convention",
-        (
-            "Share of the sum of squared sample-to-sample changes of an output after which a free motion has decayed below a "
-            "tenth."
-        ),
-    )
-    fewest_in_motion: int = number(
-        100,
-        "convention",
-        "Minimum samples of a free motion that are kept.",
-    )
     rough_evaluations_of_rig: int = number(
         8,
         "budget",
         "Evaluations of the rig's equations from each other set of start values.",
-    )
-    window_periods: float = number(
-        10.0,
-        "assumption",
-        "Length of a window in typical periods, if a rig drifts and no sensor measures its motion.",
-    )
-    window_samples: int = number(
-        100,
-        "convention",
-        "Minimum samples of such a window.",
-    )
-    most_windows: int = number(
-        40,
-        "budget",
-        "Maximum number of such windows per record.",
-    )
-    fewest_window_samples: int = number(
-        60,
-        "convention",
-        "Minimum samples of a window counted in cycles.",
-    )
-    crossing_above_noise: float = number(
-        3.0,
-        "convention",
-        "Distance from the mean, in units of the noise, that the signal must reach for a zero crossing to count as motion.",
     )

@@ -49,14 +49,6 @@ class NoteNumbers:
             "white and the standard errors assume white noise."
         ),
     )
-    spring_leaves: float = number(
-        0.9,
-        "convention",
-        (
-            "Largest error with a spring, relative to that without, that contradicts a given stiffness of zero: other missing "
-            "effects seem like a weak spring, and lower the error less."
-        ),
-    )
     line_chance: float = number(
         1e-3,
         "convention",

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.fitting.observer import observed_sensors
 from rigsight.diagnose.pushes.measured_motion import Corrections
 from rigsight.diagnose.pushes.probes import PUSH_SIZE, motion_columns, push, signal_columns, with_probes
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
 from rigsight.identify.fit.covariance import symmetric_eigen
-from rigsight.identify.start.place_scales import scales_at_places
+from rigsight.identify.fit.windows import observed_sensors
+from rigsight.identify.start.scales import scales_at_places
 from rigsight.records.record import Record
 from rigsight.simulate import compose, parameter_vector, record_input, record_values, simulate_sets
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion

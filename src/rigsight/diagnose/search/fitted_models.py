@@ -10,7 +10,6 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
-from rigsight.diagnose.fitting.windows import Windowing, leading_output
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.nested_models import lowered_by_extensions
@@ -25,6 +24,7 @@ from rigsight.diagnose.search.worth_fitting import worth_combining, worth_fittin
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
+from rigsight.identify.fit.windows import Windowing, leading_output
 from rigsight.inverse import Proposal, propose
 from rigsight.simulate import Structure
 
@@ -171,7 +171,7 @@ def with_several_effects(
 def _in_windows(campaign: Campaign, noise: Mapping[str, float], models: SingleModels) -> SingleModels:
     """Return the models in windows of a few cycles."""
     leading = leading_output(campaign.rig, campaign.records)
-    windowing = Windowing.by_cycles({leading: noise[leading], **noise})
+    windowing = Windowing(cycles=VERDICT.window_cycles, noise={leading: noise[leading], **noise})
     known = models.context
     context = fit_context_of(campaign, noise, windowing, known.memory, known.threads, known.start)
     reidentified = reidentify(context, models.reidentified.fit.values)

@@ -9,13 +9,18 @@ from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.fitting.observer import Observer, followed_sensors
 from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of, start_values_of
-from rigsight.diagnose.fitting.windows import Windowing, typical_period, window_length
 from rigsight.diagnose.policy import HORIZON, VERDICT
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.errors import SimulationError
 from rigsight.identify import DEFAULT_ACCURACY, FitResult, IdleThreads
+from rigsight.identify.fit.windows import (
+    Observer,
+    Windowing,
+    followed_sensors,
+    typical_period,
+    window_length,
+)
 from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.records.record import Record
 from rigsight.rigs import evaluated
@@ -62,7 +67,7 @@ def windowing_of(
     necessary, but not so high that the tracked noise shows in the error of a true model. If no sensor reads the motion alone,
     records are cut into windows.
     """
-    sensors, poles = followed_sensors(campaign), _poles(campaign)
+    sensors, poles = followed_sensors(campaign.rig, campaign.records), _poles(campaign)
     limit = longest_free_run(poles, campaign.estimation)
     if not sensors or (limit is not None and not campaign.rig.has_one_motion):
         longest = window_length(campaign.rig, campaign.estimation)

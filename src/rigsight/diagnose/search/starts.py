@@ -5,16 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 
-import sympy as sp
-
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.fitting.windows import leading_output
 from rigsight.diagnose.search.persistent_line import persistent_line
 from rigsight.diagnose.search.waves import wave_starts
 from rigsight.effects import Effect, placed_dimension
-from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
-from rigsight.rigs import Rig, evaluated, joint_of
+from rigsight.identify.fit.windows import leading_output
+from rigsight.identify.start.declared_starts import declared_values, in_structure, moved_starts
 from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value
 
@@ -72,7 +69,9 @@ def _plain_starts(
         for start in effect.starts:
             origin = base if start.parent is None else parents.get(start.parent)
             if origin is not None and start.parent != effect.name:
-                own = _evaluated(context, effect, start.values, _known(origin, start.parent))
+                own = declared_values(
+                    context.rig, effect, start.values, _known(origin, start.parent), context.scales
+                )
                 yield with_own_values(structure, effect, origin, {**rest, **own})
         return
     sizes = [characteristic_value(placed_dimension(effect, p.dimension), context.scales) for p in fitted]
@@ -83,22 +82,16 @@ def _plain_starts(
 
 def restart_values(structure: Structure, effect: Effect, fit: FitResult) -> Iterator[dict[str, float]]:
     """Yield further start values for a fit with `effect` that may have stopped in a local minimum."""
-    own = structure.values_of(effect, fit.values)
-    for start in effect.starts:
-        if start.parent == effect.name:
-            moved = {name: evaluated(formula, own) for name, formula in start.values.items()}
-            yield with_own_values(structure, effect, fit, moved)
+    for moved in moved_starts(structure, effect, fit.values):
+        yield {**carried_over(fit.values, fit.structure, structure), **moved}
 
 
 def with_own_values(
     structure: Structure, effect: Effect, origin: FitResult, own: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the values of a fit for a structure with an effect more, with own values of that effect and of the rig."""
-    names = {p.name: structure.parameter_name(effect, p.name) for p in effect.parameters}
-    return {
-        **carried_over(origin.values, origin.structure, structure),
-        **{names.get(name, name): value for name, value in own.items()},
-    }
+    carried = carried_over(origin.values, origin.structure, structure)
+    return {**carried, **in_structure(structure, effect, own)}
 
 
 def sized(value: float, null: float, factor: float) -> float:
@@ -113,46 +106,3 @@ def _known(origin: FitResult, parent: str | None) -> dict[str, float]:
         if effect.name == parent:
             values |= origin.structure.values_of(effect, origin.values)
     return values
-
-
-def _evaluated(
-    context: FitContext, effect: Effect, formulas: Mapping[str, sp.Expr], values: Mapping[str, float]
-) -> dict[str, float]:
-    joint = joint_of(context.rig, effect)
-    sizes = {
-        base: characteristic_value(placed_dimension(effect, base), context.scales)
-        for base in ("drive", "input", "x", "time")
-    }
-    numbers = {
-        canonical.k: evaluated(joint.stiffness, values),
-        canonical.drive_size: sizes["drive"],
-        canonical.input_size: sizes["input"],
-        canonical.x_size: sizes["x"],
-        canonical.v_size: sizes["x"] / sizes["time"],
-        canonical.time_size: sizes["time"],
-    }
-    mechanism = context.rig.mechanism
-    # Of an inertia that changes with the motion its size will do: that where all coordinates are zero.
-    at_zero = {**dict.fromkeys(_moving(context.rig), 0.0), **values}
-    if joint.inertia is None and not mechanism.has_short_inverse:
-        moved = mechanism.inertia_at(joint.motion, at_zero)
-        if moved is not None:
-            numbers[canonical.m] = moved
-    else:
-        inertia = joint.inertia if joint.inertia is not None else mechanism.inertia_along(joint.motion)
-        if inertia is not None:
-            numbers[canonical.m] = evaluated(inertia, at_zero)
-    result = {}
-    for name, formula in formulas.items():
-        own = {s: values[s.name] for s in formula.free_symbols if s not in numbers}
-        value = float(formula.subs({**numbers, **own}))
-        if name != "k":
-            result[name] = value
-        elif isinstance(joint.stiffness, sp.Symbol):
-            # A stiffness that several parameters make keeps the values that they have.
-            result[str(joint.stiffness.name)] = value
-    return result
-
-
-def _moving(rig: Rig) -> list[str]:
-    return [coordinate.name for coordinate in rig.mechanism.coordinates]

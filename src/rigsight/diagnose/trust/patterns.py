@@ -18,8 +18,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from rigsight.diagnose.fitting.windows import leading_output
 from rigsight.diagnose.policy import TRUST
+from rigsight.identify.fit.windows import leading_output
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 

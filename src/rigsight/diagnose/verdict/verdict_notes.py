@@ -15,11 +15,11 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.diagnose.verdict.judgement import Judgement
 from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.identify.fit.windows import Windowing
 
 _REFERENCE_USED = (
     "It is used as instrument when the frequency responses of two amplitudes are compared, if the input responds to it in both; "

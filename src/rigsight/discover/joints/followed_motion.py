@@ -1,7 +1,7 @@
 """Motion of a rig that follows its sensors, and the forces at its joints that this requires.
 
-The rig has an unknown force at some of its joints. The equations are linearized about the current estimate of the motion, a
-smoother improves the estimate, and this is repeated.
+The rig has an unknown force at some of its joints, declared as an effect whose time history is a state. The equations are
+linearized about the current estimate of the motion, a smoother improves the estimate, and this is repeated.
 """
 
 from __future__ import annotations
@@ -10,18 +10,54 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.discover.joints.force_observer import Cases, Gains, cases_of, gains_of, smoothed, whitened
 from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionEquations
-from rigsight.discover.joints.unknown_force import UNKNOWN_FORCE, force_states
-from rigsight.effects import placed
+from rigsight.effects import Effect, placed
+from rigsight.effects.effect import Energy, GainTrend, Place, Signature, State
 from rigsight.parameters import Parameter
-from rigsight.records.record import Record
-from rigsight.rigs import Rig
-from rigsight.simulate import compose
+from rigsight.records.record import Floats, Record
+from rigsight.rigs import Joint, Rig
+from rigsight.simulate import Structure, compose
+from rigsight.simulate.equations.binder import state_symbol
+from rigsight.simulate.equations.structure import input_symbols
 
-Floats = NDArray[np.float64]
+_FORCE = sp.Symbol("missing_force", real=True)
+_RATE = sp.Symbol("missing_force_rate", real=True)
+
+UNKNOWN_FORCE = Effect(
+    name="missing_force",
+    place=Place.DYNAMICS,
+    summary="A force of unknown shape over time resists the motion.",
+    parameters=(),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    torque=_FORCE,
+    states=(State(_FORCE, _RATE, "force"), State(_RATE, sp.S.Zero, "force time^-1")),
+)
+"""An observer adds noise to the second derivative of the force; without it the force is a straight line over time."""
+
+
+def force_states(structure: Structure, effect: Effect) -> tuple[int, int]:
+    """Return the indices of an unknown force and of its rate among the states of a structure."""
+    force, rate = (structure.states.index(state_symbol(effect, symbol)) for symbol in (_FORCE, _RATE))
+    return force, rate
+
+
+def joint_motion(structure: Structure, joint: Joint) -> tuple[sp.Expr, sp.Expr]:
+    """Return the motion of a joint from its rest and its velocity, in the structure's symbols."""
+    mechanism = structure.rig.mechanism
+    bound: dict[sp.Symbol, sp.Expr] = {
+        sp.Symbol(name, real=True): symbol
+        for name, symbol in zip(structure.names, structure.parameter_symbols, strict=True)
+    }
+    for coordinate in mechanism.prescribed:
+        value, rate, _ = input_symbols(mechanism.inputs.index(str(coordinate.prescribed_by)))
+        bound |= {coordinate.symbol: value, coordinate.rate: rate}
+    return (joint.motion - joint.rest).xreplace(bound), mechanism.rate(joint.motion).xreplace(bound)
+
 
 DECADES = (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0)
 """Intensities of an unknown force that are tried, in decades of its size and the motion's angular frequency."""
@@ -108,15 +144,15 @@ def improved(
         one.decade = float(own[int(np.argmin(known))])
     chosen = np.array([[one.decade] for one in followed])
     gains = gains_of(cases, _intensities(followed, chosen, n_records), keep=True)
-    found = smoothed(cases, gains, cases.drive[..., 0], cases.data[..., 0])
+    deviation, error = smoothed(cases, gains, cases.drive[..., 0], cases.data[..., 0])
     moved = 0.0
     for i, one in enumerate(followed):
         one.errors = []
         others = np.setdiff1d(np.arange(one.sizes.size), np.ravel(one.forces))
         for j, motion in enumerate(one.motions):
-            step = found.deviation[: motion.shape[0], i * n_records + j]
+            step = deviation[: motion.shape[0], i * n_records + j]
             one.motions[j] = motion + step * one.sizes
-            one.errors.append(found.error[: motion.shape[0], i * n_records + j] * one.sizes)
+            one.errors.append(error[: motion.shape[0], i * n_records + j] * one.sizes)
             moved = max(moved, float(np.max(np.abs(step[:, others]))))
     return moved
 

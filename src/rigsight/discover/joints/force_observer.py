@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.discover.joints.linearized_motion import LinearizedMotion
+from rigsight.records.record import Floats
 
-Floats = NDArray[np.float64]
 Rows = Callable[[int, int, Floats], None]
 """Called with sample, sensor and whitened rows, shape (n_cases, n_intensities, n_columns)."""
 AtSample = Callable[[int], Floats]
@@ -50,8 +50,7 @@ class Cases:
     start: Floats  # covariance of the first state, shape (n_cases, n_states, n_states)
     # Covariance that an intensity of one adds from sample to sample, shape (n_cases, n_states, n_states).
     walk: Floats
-    # Directions in which the state may jump after some samples, shape (n_samples - 1, n_cases, n_states,
-    # n_directions).
+    # Directions in which the state may jump after some samples, shape (n_samples - 1, n_cases, n_states, n_directions).
     jump: Floats
     jumps: NDArray[np.bool_]  # true for the samples after which it may, shape (n_samples, n_cases)
 
@@ -173,19 +172,12 @@ def whitened(cases: Cases, gains: Gains, drive: AtSample, data: AtSample, tell: 
             state = cases.transition[k][:, None] @ state + drive(k)[:, None]
 
 
-@dataclass(frozen=True, eq=False)
-class Smoothed:
-    """States estimated from a whole record: deviations from the reference and their standard errors, in units of the sizes.
+def smoothed(cases: Cases, gains: Gains, drive: Floats, data: Floats) -> tuple[Floats, Floats]:
+    """Smooth one column of each case, for gains of a single intensity.
 
-    Shape (n_samples, n_cases, n_states) each.
+    Return the states estimated from a whole record as deviations from the reference, and their standard errors, in units of the
+    sizes, shape (n_samples, n_cases, n_states) each.
     """
-
-    deviation: Floats
-    error: Floats
-
-
-def smoothed(cases: Cases, gains: Gains, drive: Floats, data: Floats) -> Smoothed:
-    """Smooth one column of each case, for gains of a single intensity."""
     n_samples, n_cases, n_outputs, n = cases.seen.shape
     before = np.zeros((n_samples, n_cases, n))
     errors = np.zeros((n_samples, n_cases, n_outputs))
@@ -214,4 +206,4 @@ def smoothed(cases: Cases, gains: Gains, drive: Floats, data: Floats) -> Smoothe
         known = gains.predicted[k, :, 0]
         deviation[k] = before[k] - (known @ adjoint)[..., 0]
         error[k] = np.sqrt(np.maximum(np.einsum("cii->ci", known - known @ spread @ known), 0.0))
-    return Smoothed(deviation, error)
+    return deviation, error

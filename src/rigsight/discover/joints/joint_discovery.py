@@ -11,16 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.discover.doubts import still_missing
-from rigsight.discover.held_out import split
+from rigsight.discover.assembly import coefficients_of, discovery_of, still_missing
 from rigsight.discover.joints.joint_force import JointForce, missing_forces, not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm
-from rigsight.discover.regression import STRONG, RegressionData, information_criterion
+from rigsight.discover.regression import STRONG, RegressionData, information_criterion, split
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import independent_samples
-from rigsight.discover.terms.equations import equations, held_numbers
 from rigsight.effects import effect_named, placed
 from rigsight.effects.placed import kind_of
 from rigsight.errors import SimulationError
@@ -33,12 +30,9 @@ from rigsight.identify import (
     swallowed_by_offsets,
     without_offsets,
 )
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
-from rigsight.simulate.model import Model
-
-Floats = NDArray[np.float64]
 
 _EVALUATIONS = 100
 _NO_WORSE = 1.05
@@ -182,24 +176,14 @@ def _assembled(
     # The joints of the chosen equation come first, whatever the ranking by linearized responses.
     own_joints = {str(term.effect.at) for term in chosen.terms}
     joints = tuple(sorted(joints, key=lambda force: force.joint not in own_joints))
-    structure, values = chosen.fit.structure, chosen.fit.values
-    text, latex = equations(structure, held_numbers(chosen.fit))
-    units = {p.name: p.unit for p in structure.parameters}
-    coefficients = {
-        name: Coefficient(values[name], chosen.fit.standard_errors[name], units[name])
-        for name in chosen.fit.free
-    }
-    own = {p.name for p in rig.parameters}
+    coefficients = coefficients_of(chosen.fit)
     nrmse, floor = _relative(rig, data.noise, held_out, chosen)
-    first = rig.outputs[0]
-    return Discovery(
-        title=data.campaign.title,
-        rig=rig.name,
+    return discovery_of(
+        data,
+        chosen.fit,
+        (polisher.estimation, held_out),
         method="discrepancy",
         form="linearized responses",
-        equations=text,
-        latex=latex,
-        rig_parameters={name: c for name, c in coefficients.items() if name in own},
         terms=_terms(chosen, joints, coefficients),
         alternatives=tuple(
             Alternative(
@@ -212,15 +196,11 @@ def _assembled(
             for one in ordered
         ),
         force_equation={},
-        held_out=tuple(record.name for record in held_out),
         held_out_error=chosen.error_over_noise,
         held_out_nrmse=nrmse,
         noise_floor=floor,
         independent=independent,
         runs=tuple(_runs(rig, held_out, chosen)),
-        output=first.name,
-        unit=first.unit,
-        model=Model.of(structure, values, polisher.estimation[0].hold).to_json(),
         warnings=tuple(_warnings(polisher.how, chosen, ordered, joints, coefficients)),
         joints=joints,
     )

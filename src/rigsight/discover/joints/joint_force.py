@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.joints.followed_motion import FollowedMotion, within_reach
 from rigsight.discover.joints.joint_law import LawTerm, RegressedLaw, force_along, inclusion, regressed_laws
 from rigsight.discover.joints.joint_motion import JointMotion, followed_again, joint_motions, noise_of
 from rigsight.errors import InputError, SimulationError
-from rigsight.records.record import Record
+from rigsight.identify.typical_size import typical_size
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
-
-Floats = NDArray[np.float64]
 
 _ROUNDS = 7
 """Alternating estimates of law and motion: parameters that were identified without the force are far off at first."""
@@ -32,93 +30,48 @@ _RULED_OUT = 3.0
 """Factor over the smallest sensor residual (RMS) at which a joint is ruled out."""
 _SETTLED = 0.01
 """Relative change of parameters and coefficients below which the rounds have converged."""
-_LARGE = 98.0
-"""Percentile of the magnitude of a motion or force that is taken as its size."""
 
 
 @dataclass(frozen=True, eq=False)
 class ForceTrace:
-    """The missing force of a joint along one record, shape (n_samples,) each.
-
-    Attributes
-    ----------
-    record
-        Its name.
-    t
-        Time [s].
-    displacement, velocity
-        Motion of the joint from its rest.
-    force, standard_error
-        The force that resists it, and its standard error.
-    law
-        The force according to the law.
-    """
+    """The missing force of a joint along one record, shape (n_samples,) each."""
 
     record: str
-    t: Floats
-    displacement: Floats
+    t: Floats  # time [s]
+    displacement: Floats  # of the joint from its rest, as its velocity
     velocity: Floats
-    force: Floats
+    force: Floats  # resists the joint
     standard_error: Floats
-    law: Floats
+    law: Floats  # the force according to the law
 
 
 @dataclass(frozen=True, eq=False)
 class JointLaw:
-    """The law of a missing force.
+    """The law of a missing force."""
 
-    Attributes
-    ----------
-    terms
-        The most significant first; empty if no term describes the force.
-    share
-        Share of the force's mean square that they explain.
-    inclusion
-        Share of resampled data sets (stretches of the records, drawn at random) in which sparse regression selects a term, by
-        the name of the effect.
-    """
-
-    terms: tuple[LawTerm, ...]
-    share: float
+    terms: tuple[LawTerm, ...]  # the most significant first; empty if no term describes the force
+    share: float  # of the force's mean square that they explain
+    # Share of resampled data sets (stretches of the records, drawn at random) in which sparse regression selects a term, by the
+    # name of the effect.
     inclusion: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
 class JointForce:
-    """The force missing at one joint, if the whole missing force acts there.
+    """The force missing at one joint, if the whole missing force acts there."""
 
-    Attributes
-    ----------
-    joint
-        Its name.
-    x_unit, unit
-        Of its motion, and of the force.
-    traces
-        The force and the motion, per record.
-    share
-        Share of the weighted square of the rig's free-run errors that the force explains; all sensors together.
-    error_over_noise
-        Remaining sensor residual, RMS in units of the noise floors; far above 1, a force at this joint alone is not the cause.
-    standard_error
-        RMS of the standard error of the force.
-    law
-        The fitted law.
-    parameters
-        The rig's own, estimated with the law.
-    criterion
-        Bayesian information criterion of law, parameters and remaining unknown force; the smallest comes first.
-    """
-
-    joint: str
-    x_unit: str
-    unit: str
-    traces: tuple[ForceTrace, ...]
+    joint: str  # its name
+    x_unit: str  # of its motion
+    unit: str  # of the force
+    traces: tuple[ForceTrace, ...]  # force and motion, per record
+    # Share of the weighted square of the rig's free-run errors that the force explains; all sensors together.
     share: float
+    # Remaining sensor residual, RMS in units of the noise floors; far above 1, a force at this joint alone is not the cause.
     error_over_noise: float
-    standard_error: float
-    law: JointLaw
-    parameters: Mapping[str, float]
-    criterion: float
+    standard_error: float  # RMS of that of the force
+    law: JointLaw  # the fitted law
+    parameters: Mapping[str, float]  # the rig's own, estimated with the law
+    criterion: float  # BIC of law, parameters and remaining unknown force; the smallest comes first
 
     @property
     def sentence(self) -> str:
@@ -157,23 +110,8 @@ def missing_forces(
 ) -> tuple[JointForce, ...]:
     """Return the force that would have to be missing at each joint; the most likely joint comes first.
 
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        Estimation records: inputs and sensor readings. A sensor may be missing in some.
-    values
-        Constants and re-identified parameters, by name.
-    noise
-        Noise floor of each output.
-    rng
-        Source of the ensemble for the inclusion probabilities of the first joint's terms; None to leave them out.
-
-    Raises
-    ------
-    InputError
-        If there is no record.
+    A sensor may be missing in some records. The values are constants and re-identified parameters, the noise is the floor of each
+    output, and `rng` draws the ensemble for the inclusion probabilities of the first joint's terms; None leaves them out.
     """
     if not records:
         raise InputError("Finding a missing force needs at least one record; there is none.")
@@ -210,13 +148,7 @@ def missing_forces(
 
 
 def not_contradicted(forces: Sequence[JointForce]) -> tuple[JointForce, ...]:
-    """Return the missing forces whose error over all sensors is at most a few times that of the best one.
-
-    Parameters
-    ----------
-    forces
-        Result of `missing_forces`.
-    """
+    """Return the missing forces whose error over all sensors is at most a few times that of the best one."""
     least = min((force.error_over_noise for force in forces), default=0.0)
     return tuple(force for force in forces if force.error_over_noise <= _RULED_OUT * least)
 
@@ -266,12 +198,7 @@ def _law_change(before: RegressedLaw | None, law: RegressedLaw) -> float:
 
 def _sizes(one: JointMotion) -> dict[str, float]:
     """Return the size of each base quantity at a joint."""
-
-    def size(signals: Sequence[Floats]) -> float:
-        together = np.concatenate([np.abs(signal - np.median(signal)) for signal in signals])
-        return float(np.percentile(together, _LARGE)) or 1.0
-
-    x, v, force = size(one.displacement), size(one.velocity), size(one.force)
+    x, v, force = (typical_size(own) for own in (one.displacement, one.velocity, one.force))
     return {"x": x, "time": x / v, "force": force, "drive": force}
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.joints.joint_motion import JointMotion
 from rigsight.discover.joints.sensor_regression import SensorRegression, sensor_regressions
@@ -20,18 +19,16 @@ from rigsight.discover.regression import STRONG, alike, inclusion_probabilities,
 from rigsight.discover.terms.library import (
     Candidate,
     TermSignals,
-    deflection_along,
+    along,
     mixed,
     offered_effects,
     term_signals,
-    torque_along,
 )
 from rigsight.discover.terms.monomials import LINEAR
 from rigsight.effects import Effect, Place, placed
 from rigsight.effects.placed import kind_of
+from rigsight.records.record import Floats
 from rigsight.rigs import Joint, Rig, evaluated
-
-Floats = NDArray[np.float64]
 
 _MOST_TERMS = 4
 _SAME_COLUMN = 1.0 - 1e-7
@@ -48,24 +45,12 @@ _LOOKED_AT = 2
 
 @dataclass(frozen=True, eq=False)
 class LawTerm:
-    """A term of a law.
+    """A term of a law."""
 
-    Attributes
-    ----------
-    effect
-        The term, placed at its joint.
-    values
-        Its parameters by their own names: coefficients, and nonlinear parameters inside the term.
-    std
-        Standard error of each coefficient.
-    units
-        Of `values`.
-    """
-
-    effect: Effect
-    values: Mapping[str, float]
-    std: Mapping[str, float]
-    units: Mapping[str, str]
+    effect: Effect  # the term, placed at its joint
+    values: Mapping[str, float]  # coefficients, and nonlinear parameters inside the term, by their own names
+    std: Mapping[str, float]  # standard error of each coefficient
+    units: Mapping[str, str]  # of `values`
 
     @property
     def text(self) -> str:
@@ -117,9 +102,9 @@ def force_along(term: LawTerm, found: JointMotion, index: int, parameters: Mappi
     """Return the resisting force of a term along the motion of its joint in a record, shape (n_samples,)."""
     motion = _motion(found, index)
     if term.effect.torque is not None:
-        return torque_along(term.effect, term.values, motion)
+        return along(term.effect.torque, term.values, motion)
     return evaluated(found.joint.stiffness, parameters) * (
-        deflection_along(term.effect, term.values, motion) - motion.x
+        along(term.effect.deflection, term.values, motion) - motion.x
     )
 
 
@@ -134,10 +119,7 @@ def regressed_laws(
     """Return, for each joint, the law with the fewest terms that the sensors do not distinguish from the most likely one."""
     records = found[0].records
     offered = [_offered(one, sizes) for one, sizes in zip(found, scales, strict=True)]
-    signals = [
-        [np.column_stack([part for s in own for part in s.parts[i]]) for i in range(len(records))]
-        for own in offered
-    ]
+    signals = [_columns(own, len(records)) for own in offered]
     regressions = sensor_regressions([one.followed for one in found], records, noise, signals)
     return [
         _best_law(of_joint, own, np.concatenate(course), one)
@@ -154,9 +136,7 @@ def inclusion(
 ) -> dict[str, float]:
     """Return inclusion probabilities: the shares of resampled data sets in which terms are selected, by name of the effect."""
     offered = _offered(found, scales)
-    signals = [
-        np.column_stack([part for s in offered for part in s.parts[i]]) for i in range(len(found.records))
-    ]
+    signals = _columns(offered, len(found.records))
     ((*regressions,),) = sensor_regressions([found.followed], found.records, noise, [signals])
     regression = min(regressions, key=lambda one: abs(one.decade - law.decade))
     library = _library(regression, offered, np.concatenate(signals), found)
@@ -175,6 +155,11 @@ def _offered(found: JointMotion, scales: Mapping[str, float]) -> list[TermSignal
     motions = [_motion(found, index) for index in range(len(found.records))]
     offered = [s for effect in joint_effects(rig, found.joint) for s in term_signals(effect, motions, scales)]
     return [s for s in offered if all(np.all(np.isfinite(part)) for own in s.parts for part in own)]
+
+
+def _columns(offered: Sequence[TermSignals], n_records: int) -> list[Floats]:
+    """Return the parts of all terms along each record, shape (n_samples, n_parts) each."""
+    return [np.column_stack([part for s in offered for part in s.parts[i]]) for i in range(n_records)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,17 +16,15 @@ from rigsight.discover.joints.followed_motion import (
     DECADES,
     FollowedMotion,
     improved,
+    joint_motion,
     with_unknown_forces,
 )
 from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionEquations
-from rigsight.discover.joints.unknown_force import joint_motion
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Joint, Rig
 from rigsight.simulate import parameter_vector, record_input, rest_state
 from rigsight.simulate.equations.linear_forms import slope
 from rigsight.simulate.simulation import record_values
-
-Floats = NDArray[np.float64]
 
 _PASSES = 4
 _SETTLED = 1e-2
@@ -38,32 +36,16 @@ when the motion reverses."""
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """One joint, if the unknown force acts there alone.
-
-    Attributes
-    ----------
-    joint
-        The joint.
-    followed
-        The rig with the unknown force there.
-    records
-        The measured records.
-    displacement, velocity
-        Of the joint from its rest, shape (n_samples,) per record.
-    force, error
-        The unknown force that resists it and its standard error, per record.
-    remainder
-        Weighted sum of squares of the sensor residuals of this motion.
-    """
+    """One joint, if the unknown force acts there alone; signals of shape (n_samples,) per record."""
 
     joint: Joint
-    followed: FollowedMotion
-    records: tuple[Record, ...]
-    displacement: tuple[Floats, ...]
+    followed: FollowedMotion  # the rig with the unknown force there
+    records: tuple[Record, ...]  # the measured records
+    displacement: tuple[Floats, ...]  # of the joint from its rest, as its velocity
     velocity: tuple[Floats, ...]
-    force: tuple[Floats, ...]
-    error: tuple[Floats, ...]
-    remainder: float
+    force: tuple[Floats, ...]  # the unknown force that resists it
+    error: tuple[Floats, ...]  # its standard error
+    remainder: float  # weighted sum of squares of the sensor residuals of this motion
 
 
 def noise_of(rig: Rig, noise: Mapping[str, float]) -> Floats:
@@ -76,16 +58,7 @@ def joint_motions(
 ) -> tuple[JointMotion, ...]:
     """Return each joint with the unknown force that would have to act there alone, in the order of the rig.
 
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        Inputs and sensor readings.
-    values
-        Constants and re-identified parameters, by name.
-    noise
-        Noise floor of each output.
+    The values are constants and re-identified parameters, the noise is the floor of each output.
     """
     floors = noise_of(rig, noise)
     joints = rig.mechanism.joints

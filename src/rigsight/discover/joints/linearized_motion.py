@@ -15,7 +15,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.records.record import Record
+from rigsight.identify.rig_equations import FUNCTIONS, rows_of
+from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, parameter_vector, record_input
 from rigsight.simulate.equations.derivatives import slopes_of
 from rigsight.simulate.equations.elimination import Elimination
@@ -25,15 +26,12 @@ from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.simulation import record_values
 
-Floats = NDArray[np.float64]
-
 _LONGEST_STEP = 0.5
 """Integration step times the fastest rate of the linearized equations; this is well within the stability limit of the method."""
 _MOST_STEPS = 32
 """Largest number of steps per piece of the input; a state too stiff for it is assumed to follow without delay."""
 _LOOKED_AT = 25
 """Number of samples of a record at which the fastest rate is computed."""
-_FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,28 +42,18 @@ class LinearizedMotion:
     transition: Floats  # derivative of the next state by this one, shape (n_samples - 1, n_states, n_states)
     # Derivative of the next state by parameters, shape (n_samples - 1, n_states, n_parameters).
     by_parameter: Floats
-    # State simulated one sample ahead from a reference state, minus the next reference state, shape
-    # (n_samples - 1, n_states).
+    # State simulated one sample ahead from a reference state, minus the next reference state, shape (n_samples - 1, n_states).
     defect: Floats
     seen: Floats  # derivative of the readings by the state, shape (n_samples, n_outputs, n_states)
     # Derivative of the readings by parameters, shape (n_samples, n_outputs, n_parameters).
     seen_by_parameter: Floats
-    # Measured minus the readings of the reference, shape (n_samples, n_outputs); NaN where nothing was
-    # measured.
+    # Measured minus the readings of the reference, shape (n_samples, n_outputs); NaN where nothing was measured.
     residual: Floats
     dt: float  # sample time [s]
 
 
 class MotionEquations:
-    """The equations of a structure as functions of arrays.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    fitted
-        Names of the parameters with respect to which derivatives are taken.
-    """
+    """The equations of a structure as functions of arrays, with derivatives by some of its parameters."""
 
     def __init__(self, structure: Structure, fitted: Sequence[str]) -> None:
         self.structure = structure
@@ -231,7 +219,7 @@ def _in_parts(
     begun = elimination.begun(structure.steps)
     values = straight_line([*elimination.entries, *elimination.loads, *others], begun)
     slopes = slopes_of(straight_line([*elimination.left, *others], begun), directions)
-    modules = [_FUNCTIONS, "numpy"]
+    modules = [FUNCTIONS, "numpy"]
     return values.function(arguments, modules), slopes.function(
         [*arguments, *elimination.accelerations], modules
     )
@@ -241,16 +229,12 @@ def _compiled(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) ->
     # Names of states contain points and parentheses.
     plain = {symbol: sp.Symbol(f"a{i}", real=True) for i, symbol in enumerate(arguments)}
     written = [sp.sympify(expression).xreplace(plain) for expression in expressions]
-    return sp.lambdify(list(plain.values()), written, [_FUNCTIONS, "numpy"], cse=True)
+    return sp.lambdify(list(plain.values()), written, [FUNCTIONS, "numpy"], cse=True)
 
 
 def _evaluated(function: Any, arguments: Sequence[Any], count: int) -> Floats:
     with np.errstate(all="ignore"):
-        values = function(*arguments)
-    found = np.empty((len(values), count))
-    for row, value in zip(found, values, strict=True):
-        row[:] = value
-    return found
+        return rows_of(function(*arguments), count)
 
 
 def _input_at(held: HeldInput, pieces: NDArray[np.int_], tau: Floats) -> Floats:

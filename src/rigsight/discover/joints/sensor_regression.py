@@ -10,14 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.discover.joints.followed_motion import BREADTH, FollowedMotion, prior_spread
 from rigsight.discover.joints.force_observer import cases_of, gains_of, whitened
 from rigsight.discover.regression import N_BLOCKS, Projected
-from rigsight.records.record import Record
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats, Record
 
 _DECADES = (4.0, 1.0, -2.0, -5.0, -10.0)
 """Intensities of the unknown force that a law leaves, in the same units as for the whole force; the last is practically zero."""

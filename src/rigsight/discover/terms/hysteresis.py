@@ -13,16 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rigsight.discover.motion import Motion
-from rigsight.discover.regression import Projected
-from rigsight.discover.weak_form import Rows
+from rigsight.discover.regression import Projected, Regressed
 from rigsight.effects import Effect, SumAndDifference
 from rigsight.effects import symbols as canonical
-from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
+from rigsight.records.record import Floats
 from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose, simulate_sets
 from rigsight.simulate.input_hold import hold_motion
@@ -95,7 +92,7 @@ class LoopShape:
         )
 
     @property
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest value of each refined coordinate."""
         sizes = [r for pair in self.pairs for r in (pair.sum_range, pair.difference_range)]
         ranges = [_logarithms(r) for r in sizes]
@@ -142,7 +139,7 @@ class Loop:
     """The shape of a loop and its column."""
 
     values: Mapping[str, float]  # nonlinear parameters of the effect
-    column: NDArray[np.float64]  # rows of the loop's own deflection in all records, shape (n_rows,)
+    column: Floats  # rows of the loop's own deflection in all records, shape (n_rows,)
     share: float  # share of the residual of the rig's own terms that the loop explains
 
 
@@ -151,26 +148,17 @@ def loop_structure(effect: Effect) -> Structure:
     return compose(RIGS["element"], [effect])
 
 
-def best_loop(
-    effect: Effect,
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    driven: bool,
-    threads: IdleThreads,
-) -> Loop | None:
+def best_loop(effect: Effect, regressed: Regressed) -> Loop | None:
     """Return the loop that explains most of the residual of the rig's own terms; None if none explains any of it."""
-    shape = LoopShape.of(effect)
-    structure = loop_structure(effect)
+    shape, structure, projected = LoopShape.of(effect), loop_structure(effect), regressed.projected
     grid, bounds = shape.grid, shape.bounds
     n_refined = bounds[0].size
 
-    def columns_at(points: Sequence[Point]) -> NDArray[np.float64]:
-        shapes = [shape.values(point, scales) for point in points]
-        return _columns(structure, effect, motions, rows, shapes, scales["x"], threads)
+    def columns_at(points: Sequence[Point]) -> Floats:
+        shapes = [shape.values(point, regressed.scales) for point in points]
+        return _columns(structure, effect, regressed, shapes)
 
-    sign = -1.0 if driven else 1.0
+    sign = -1.0 if regressed.driven else 1.0
     columns = sign * columns_at(grid)
     shares = [_share(projected, columns[:, i]) for i in range(len(grid))]
     starts = _apart(grid, shares)
@@ -179,7 +167,7 @@ def best_loop(
 
     rest = projected.rest
 
-    def remainder(column: NDArray[np.float64]) -> NDArray[np.float64]:
+    def remainder(column: Floats) -> Floats:
         if not np.all(np.isfinite(column)):
             return rest
         column = projected.rest_of(column)
@@ -187,9 +175,9 @@ def best_loop(
 
     def refined(start: Point) -> Loop:
         kept = start[n_refined:]
-        seen: dict[bytes, NDArray[np.float64]] = {}
+        seen: dict[bytes, Floats] = {}
 
-        def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        def around(theta: Floats) -> Floats:
             """Return the residual at a point and one step along each axis; a few loops at once cost as much as one."""
             key = theta.tobytes()
             if key not in seen:
@@ -200,10 +188,10 @@ def best_loop(
                 seen[key] = np.column_stack([remainder(near[:, i]) for i in range(len(points))])
             return seen[key]
 
-        def here(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        def here(theta: Floats) -> Floats:
             return np.asarray(around(theta)[:, 0])
 
-        def slopes(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        def slopes(theta: Floats) -> Floats:
             near = around(theta)
             return np.asarray((near[:, 1:] - near[:, :1]) / _STEP)
 
@@ -211,7 +199,7 @@ def best_loop(
         solution = least_squares(here, first, jac=slopes, bounds=bounds, ftol=1e-6, max_nfev=_REFINEMENTS)
         point = (*map(float, solution.x), *kept)
         column = sign * columns_at([point])[:, 0]
-        return Loop(shape.values(point, scales), column, _share(projected, column))
+        return Loop(shape.values(point, regressed.scales), column, _share(projected, column))
 
     return max(map(refined, starts), key=lambda loop: loop.share)
 
@@ -226,7 +214,7 @@ def _apart(grid: Sequence[Point], shares: Sequence[float]) -> list[Point]:
     return found[:_STARTS]
 
 
-def _share(projected: Projected, column: NDArray[np.float64]) -> float:
+def _share(projected: Projected, column: Floats) -> float:
     """Return the share that a loop explains; 0 for a loop that would have to drive the motion instead of resisting it."""
     if not np.all(np.isfinite(column)):
         return 0.0
@@ -235,14 +223,8 @@ def _share(projected: Projected, column: NDArray[np.float64]) -> float:
 
 
 def _columns(
-    structure: Structure,
-    effect: Effect,
-    motions: Sequence[Motion],
-    rows: Rows,
-    shapes: Sequence[Mapping[str, float]],
-    x_size: float,
-    threads: IdleThreads,
-) -> NDArray[np.float64]:
+    structure: Structure, effect: Effect, regressed: Regressed, shapes: Sequence[Mapping[str, float]]
+) -> Floats:
     """Return the rows of several loops' deflections, shape (n_rows, n_loops)."""
     motion_of_element = structure.rig.motion
     fixed = {p.name: 0.0 for p in structure.rig.parameters} | {motion_of_element.stiffness.name: 1.0}
@@ -251,15 +233,15 @@ def _columns(
     values = [{**fixed, effect.post_yield_stiffness_ratio: 0.0, **inner} for inner in shapes]
     p = np.array([[v[name] for v in values] for name in structure.names])
 
-    def block(index: int) -> NDArray[np.float64]:
-        motion = motions[index]
+    def block(index: int) -> Floats:
+        motion = regressed.motions[index]
         held = hold_motion(motion.x, motion.v, motion.dt)
         start = np.zeros((len(structure.states), len(shapes)))
         with np.errstate(all="ignore"):
             z = simulate_sets(structure, held, p, start, motion.x.size, _SUBSTEPS)[:, 0, :]
-            z = np.where(np.abs(z) < _RUNAWAY * x_size, z, np.nan)
+            z = np.where(np.abs(z) < _RUNAWAY * regressed.scales["x"], z, np.nan)
         return np.column_stack(
-            [rows.of(np.ascontiguousarray(z[:, i]), motion.dt) for i in range(len(shapes))]
+            [regressed.rows.of(np.ascontiguousarray(z[:, i]), motion.dt) for i in range(len(shapes))]
         )
 
-    return np.concatenate(threads.results(block, [motion.x.size for motion in motions]))
+    return np.concatenate(regressed.threads.results(block, [m.x.size for m in regressed.motions]))

@@ -8,7 +8,6 @@ the rest. Each effect then contributes one column to the library, at its best no
 from __future__ import annotations
 
 import itertools
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,20 +15,18 @@ from typing import Any, Literal
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from rigsight.discover.motion import Motion
-from rigsight.discover.regression import Projected
+from rigsight.discover.regression import Projected, Regressed
 from rigsight.discover.terms.hysteresis import best_loop, is_loop
 from rigsight.discover.terms.monomials import MONOMIALS
-from rigsight.discover.weak_form import Rows
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Place
 from rigsight.effects.symbols import derivative
-from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 from rigsight.units import characteristic_value
 
@@ -46,24 +43,13 @@ _MOST_SHARE = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One effect at its best nonlinear parameters, as one column of the library.
-
-    Attributes
-    ----------
-    effect
-        The effect.
-    inner
-        Values of the nonlinear parameters inside the term.
-    linear
-        Share of each of the effect's linear parameters in the coefficient of the column; empty if it has none.
-    column
-        Rows of all records, shape (n_rows,).
-    """
+    """One effect at its best nonlinear parameters, as one column of the library."""
 
     effect: Effect
-    inner: Mapping[str, float]
+    inner: Mapping[str, float]  # values of the nonlinear parameters inside the term
+    # Share of each of the effect's linear parameters in the coefficient of the column; empty if it has none.
     linear: Mapping[str, float]
-    column: NDArray[np.float64]
+    column: Floats  # rows of all records, shape (n_rows,)
 
     @property
     def name(self) -> str:
@@ -111,69 +97,39 @@ def _filters_drive(effect: Effect) -> bool:
     return effect.place is Place.ACTUATOR and effect.drive is not None and is_filter(effect)
 
 
-def candidates(
-    effects: Sequence[Effect],
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    driven: bool,
-    threads: IdleThreads | None = None,
-) -> list[Candidate]:
+def candidates(effects: Sequence[Effect], regressed: Regressed) -> list[Candidate]:
     """Return one candidate per effect, at the nonlinear parameters that explain most of the residual of the rig's own terms."""
-    sign = -1.0 if driven else 1.0
-    helpers = threads or IdleThreads()
     plain = [effect for effect in effects if _is_plain(effect)]
     found = []
-    for effect, column in zip(plain, _library_columns(plain, motions, rows), strict=True):
-        found.append(Candidate(effect, {}, {effect.parameters[0].name: 1.0}, sign * column))
+    for effect in plain:
+        (parameter,) = effect.parameters
+        shape = _slope(effect, parameter)
+        column = regressed.column(along(shape, {}, motion) for motion in regressed.motions)
+        found.append(Candidate(effect, {}, {parameter.name: 1.0}, column))
 
     def at_best_values(effect: Effect) -> Candidate | None:
-        if is_loop(effect):
-            return _loop(effect, motions, rows, projected, scales, driven, helpers)
-        return _best_inner(effect, motions, rows, projected, scales, sign)
+        if not is_loop(effect):
+            return _best_inner(effect, regressed)
+        loop = best_loop(effect, regressed)
+        return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
 
     others = [effect for effect in effects if effect not in plain]
-    return found + [best for best in helpers.side_by_side(at_best_values, others) if best is not None]
+    fitted = regressed.threads.side_by_side(at_best_values, others)
+    return found + [best for best in fitted if best is not None]
 
 
-def _loop(
-    effect: Effect,
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    driven: bool,
-    threads: IdleThreads,
-) -> Candidate | None:
-    loop = best_loop(effect, motions, rows, projected, scales, driven, threads)
-    return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
-
-
-def _best_inner(
-    effect: Effect,
-    motions: Sequence[Motion],
-    rows: Rows,
-    projected: Projected,
-    scales: Mapping[str, float],
-    sign: float,
-) -> Candidate | None:
+def _best_inner(effect: Effect, regressed: Regressed) -> Candidate | None:
     best: Candidate | None = None
     highest = 0.0
-    for signals in term_signals(effect, motions, scales):
-        parts = sign * np.column_stack(
-            [
-                np.concatenate([rows.of(one, m.dt) for one, m in zip(part, motions, strict=True)])
-                for part in zip(*signals.parts, strict=True)
-            ]
-        )
-        candidate, share = mixed(signals, parts, projected)
+    for signals in term_signals(effect, regressed.motions, regressed.scales):
+        parts = np.column_stack([regressed.column(part) for part in zip(*signals.parts, strict=True)])
+        candidate, share = mixed(signals, parts, regressed.projected)
         if share > highest:
             best, highest = candidate, share
     return best
 
 
-def mixed(signals: TermSignals, parts: NDArray[np.float64], projected: Projected) -> tuple[Candidate, float]:
+def mixed(signals: TermSignals, parts: Floats, projected: Projected) -> tuple[Candidate, float]:
     """Return the parts of a term as one column, mixed as in the regression, and the share that it explains."""
     weights, share = projected.explained(parts)
     if not np.any(weights):
@@ -189,42 +145,6 @@ def _is_plain(effect: Effect) -> bool:
     return effect.torque is not None and not effect.states and len(effect.parameters) == 1
 
 
-def _library_columns(
-    effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows
-) -> list[NDArray[np.float64]]:
-    """Return the columns of the terms without nonlinear parameters, computed by a pysindy library from [x, x']."""
-    if not effects:
-        return []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from pysindy import CustomLibrary
-
-    library = CustomLibrary(
-        library_functions=[_term(effect) for effect in effects],
-        function_names=[_constant_name(effect.name) for effect in effects],
-    )
-    columns: list[list[NDArray[np.float64]]] = [[] for _ in effects]
-    for motion in motions:
-        # In SI, because a sine requires the angle in radians; every regression scales its columns itself.
-        values = np.asarray(library.fit_transform(np.column_stack([motion.x, motion.v])))
-        for i in range(len(effects)):
-            columns[i].append(rows.of(np.ascontiguousarray(values[:, i]), motion.dt))
-    return [np.concatenate(parts) for parts in columns]
-
-
-def _term(effect: Effect) -> Any:
-    compiled = sp.lambdify((canonical.x, canonical.v), _slope(effect, effect.parameters[0]), "numpy")
-
-    def term(x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(compiled(x, v))
-
-    return term
-
-
-def _constant_name(name: str) -> Any:
-    return lambda _x, _v: name
-
-
 def _slope(effect: Effect, parameter: Parameter) -> sp.Expr:
     assert effect.torque is not None
     return derivative(effect.torque, sp.Symbol(parameter.name, real=True))
@@ -236,11 +156,10 @@ class TermSignals:
 
     effect: Effect
     inner: Mapping[str, float]  # values of the nonlinear parameters inside the term
-    # Linear parameters, one for each part; empty if the term has a single part without a coefficient of its
-    # own.
+    # Linear parameters, one for each part; empty if the term has a single part without a coefficient of its own.
     names: tuple[str, ...]
     # For each record, the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
-    parts: tuple[tuple[NDArray[np.float64], ...], ...]
+    parts: tuple[tuple[Floats, ...], ...]
 
 
 def term_signals(
@@ -274,40 +193,27 @@ def _grid(parameter: Parameter, scales: Mapping[str, float]) -> list[float]:
 
 def _signals(
     effect: Effect, linear: Sequence[Parameter], inner: Mapping[str, float], motion: Motion
-) -> list[NDArray[np.float64]]:
+) -> list[Floats]:
     """Return the parts of an effect as resisting forces per unit of their coefficient."""
     if effect.delay is not None:
         time = motion.dt * np.arange(motion.u.size)
-        return [motion.u - np.interp(time - _evaluated(effect.delay, inner, motion), time, motion.u)]
+        return [motion.u - np.interp(time - along(effect.delay, inner, motion), time, motion.u)]
     if effect.torque is not None:
-        return [_evaluated(_slope(effect, p), inner, motion) for p in linear]
+        return [along(_slope(effect, p), inner, motion) for p in linear]
     if effect.deflection is not None:
-        return [_evaluated(effect.deflection, inner, motion) - motion.x]
+        return [along(effect.deflection, inner, motion) - motion.x]
     assert effect.drive is not None
     defaults = {p.name: p.default for p in effect.parameters if p.default is not None}
     states = states_along(effect, {**defaults, **inner}, motion) if effect.states else {}
-    return [motion.u - _evaluated(effect.drive, {**inner, **states}, motion)]
+    return [motion.u - along(effect.drive, {**inner, **states}, motion)]
 
 
-def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
-    """Return the torque of a static effect along a measured motion, shape (n_samples,)."""
-    assert effect.torque is not None
-    return _evaluated(effect.torque, values, motion)
-
-
-def deflection_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
-    """Return the deflection of the spring along a measured motion with a static effect (such as play), shape (n_samples,)."""
-    assert effect.deflection is not None
-    return _evaluated(effect.deflection, values, motion)
-
-
-def _evaluated(
-    expression: sp.Expr, inner: Mapping[str, float | NDArray[np.float64]], motion: Motion
-) -> NDArray[np.float64]:
-    function = _compiled(expression, tuple(inner))
-    return np.broadcast_to(function(motion.x, motion.v, motion.u, *inner.values()), motion.x.shape).astype(
-        np.float64
-    )
+def along(expression: sp.Expr | None, values: Mapping[str, float | Floats], motion: Motion) -> Floats:
+    """Return a static part of an effect (torque, deflection) along a measured motion, shape (n_samples,)."""
+    assert expression is not None
+    function = _compiled(expression, tuple(values))
+    shown = function(motion.x, motion.v, motion.u, *values.values())
+    return np.broadcast_to(shown, motion.x.shape).astype(np.float64)
 
 
 @lru_cache(maxsize=256)
@@ -341,9 +247,7 @@ def is_filter(effect: Effect) -> bool:
     return linear_filter(_rates(effect)) is not None
 
 
-def states_along(
-    effect: Effect, values: Mapping[str, float], motion: Motion
-) -> dict[str, NDArray[np.float64]]:
+def states_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> dict[str, Floats]:
     """Return the states of a filter along a motion by name, shape (n_samples,) each.
 
     They start in equilibrium with the first sample of each signal.

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.parameters import Parameter
+from rigsight.records.record import Floats
 from rigsight.simulate import Structure, parameter_vector
 from rigsight.units import characteristic_value
 
@@ -50,29 +51,19 @@ class _Split:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Maps a vector of search coordinates to the parameters of a structure and back.
-
-    Attributes
-    ----------
-    structure
-        Rig and effects.
-    free
-        Parameters that are fitted.
-    lower, upper
-        Bounds of the coordinates, shape (n_free,).
-    """
+    """Maps a vector of search coordinates to the parameters of a structure and back."""
 
     structure: Structure
-    free: tuple[str, ...]
-    base: NDArray[np.float64]
+    free: tuple[str, ...]  # parameters that are fitted
+    base: Floats
     index: NDArray[np.intp]
-    scale: NDArray[np.float64]
+    scale: Floats
     logarithmic: NDArray[np.bool_]
     pairs: tuple[_Pair, ...]
     excesses: tuple[tuple[int, int], ...]
     split: _Split | None
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
+    lower: Floats  # bounds of the coordinates, shape (n_free,)
+    upper: Floats
 
     @classmethod
     def of(
@@ -135,7 +126,7 @@ class Coordinates:
             upper=upper,
         )
 
-    def to_parameters(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_parameters(self, theta: Floats) -> Floats:
         """Return the full parameter vector, shape (n_parameters,), for coordinates of shape (n_free,)."""
         own = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, theta, 0.0)), theta) * self.scale
         p = self.base.copy()
@@ -156,7 +147,7 @@ class Coordinates:
             p[self.index[share]] = theta[share] / whole
         return p
 
-    def from_values(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+    def from_values(self, values: Mapping[str, float]) -> Floats:
         """Return the coordinates of parameter values, moved inside the bounds, shape (n_free,)."""
         plain = np.array([values[name] for name in self.free])
         own = plain / self.scale
@@ -179,7 +170,7 @@ class Coordinates:
         width = np.minimum(self.upper - self.lower, 1e6)
         return np.clip(theta, self.lower + _MARGIN * width, self.upper - _MARGIN * width)
 
-    def _power(self, pair: _Pair, p: NDArray[np.float64]) -> float:
+    def _power(self, pair: _Pair, p: Floats) -> float:
         if pair.exponent is None:
             return 1.0
         fixed = dict(self.structure.fixed)
@@ -187,7 +178,7 @@ class Coordinates:
             return fixed[pair.exponent]
         return float(p[self.structure.names.index(pair.exponent)])
 
-    def derivatives(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def derivatives(self, theta: Floats) -> Floats:
         """Return d parameters / d coordinates of all parameters, shape (n_parameters, n_free)."""
         p = self.to_parameters(theta)
         own = np.where(self.logarithmic, p[self.index], self.scale)
@@ -220,7 +211,7 @@ class Coordinates:
             slopes[self.index[share], columns] = with_memory / whole**2 * np.array([-without, 1.0])
         return slopes
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def jacobian(self, theta: Floats) -> Floats:
         """Return d parameters / d coordinates of the free parameters, shape (n_free, n_free)."""
         return self.derivatives(theta)[self.index]
 

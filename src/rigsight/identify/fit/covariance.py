@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import norm, t
 
+from rigsight.records.record import Floats
+
 _ROUNDED_EIGENVALUE = 1e-14
 """Share of the largest eigenvalue below which the effect of a direction of the coordinates is rounding error."""
 _MARGIN = 3.0
@@ -29,12 +31,12 @@ duration of the record and not on the sample rate, and the resonance excited by 
 
 
 def colored_covariance(
-    sensitivities: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    sensitivities: Sequence[tuple[Floats, Floats]],
     n_common: int,
     n_outputs: Sequence[int] | None = None,
     derivative_error: float = 0.0,
     for_intervals: bool = False,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return the covariance of the common coordinates, allowing for colored residuals.
 
     ``(J^T J)^-1 (sum_f J(f)^* S(f) J(f)^T) (J^T J)^-1`` with the smoothed residual spectrum S of each record, a matrix over its
@@ -47,26 +49,23 @@ def colored_covariance(
     (1987) 703; F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110, for the degrees of freedom of a sum.
     """
     own_sizes = [derivative.shape[1] - n_common for _, derivative in sensitivities]
-    n_total = n_common + sum(own_sizes)
-    bread = np.zeros((n_total, n_total))
-    filling = np.zeros((n_total, n_total))
-    first = n_common
+    firsts = n_common + np.cumsum([0, *own_sizes])
+    bread = np.zeros((int(firsts[-1]), int(firsts[-1])))
+    filling = np.zeros_like(bread)
     stacked = [1] * len(sensitivities) if n_outputs is None else n_outputs
-    for (residual, derivative), n_own, count in zip(sensitivities, own_sizes, stacked, strict=True):
-        columns = np.concatenate([np.arange(n_common), first + np.arange(n_own)]).astype(np.intp)
-        first += n_own
+    places = [
+        np.concatenate([np.arange(n_common), first + np.arange(size)]).astype(np.intp)
+        for first, size in zip(firsts, own_sizes, strict=False)
+    ]
+    for (residual, derivative), columns, count in zip(sensitivities, places, stacked, strict=True):
         bread[np.ix_(columns, columns)] += derivative.T @ derivative
         filling[np.ix_(columns, columns)] += spectral_product(residual, derivative, count)
     covariance = sandwich_covariance(bread, filling, derivative_error)[:n_common, :n_common]
     if for_intervals and n_common:
         inverse = sandwich_covariance(bread, bread, derivative_error)[:, :n_common]
         inverse = np.where(np.isfinite(inverse), inverse, 0.0)
-        places = [
-            np.concatenate([np.arange(n_common), np.arange(size) + n_common + sum(own_sizes[:index])])
-            for index, size in enumerate(own_sizes)
-        ]
         reads = [
-            (residual, derivative @ inverse[place.astype(np.intp)], count)
+            (residual, derivative @ inverse[place], count)
             for (residual, derivative), place, count in zip(sensitivities, places, stacked, strict=True)
         ]
         widened = np.sqrt(_interval_factors(reads))
@@ -74,9 +73,7 @@ def colored_covariance(
     return np.asarray(covariance)
 
 
-def _interval_factors(
-    reads: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], int]],
-) -> NDArray[np.float64]:
+def _interval_factors(reads: Sequence[tuple[Floats, Floats, int]]) -> Floats:
     """Return the factors on variances for the few degrees of freedom of the noise, shape (n,).
 
     Each of the records has its residuals, the weights with which the estimates read them, and the number of its outputs.
@@ -102,23 +99,11 @@ def _interval_factors(
     return np.asarray((remainder + 1.0) / remainder * (t.ppf(quantile, remainder) / norm.ppf(quantile)) ** 2)
 
 
-def sandwich_covariance(
-    bread: NDArray[np.float64], filling: NDArray[np.float64], derivative_error: float = 0.0
-) -> NDArray[np.float64]:
-    """Return ``bread^-1 filling bread^-1``, with infinite variances for coordinates that the bread does not determine.
+def sandwich_covariance(bread: Floats, filling: Floats, derivative_error: float = 0.0) -> Floats:
+    """Return ``bread^-1 filling bread^-1``, shape (n, n), with infinite variances for what the bread does not determine.
 
-    Parameters
-    ----------
-    bread
-        J^T J of the weighted residuals, shape (n, n).
-    filling
-        Covariance of J^T r, shape (n, n); equal to the bread if the residuals are independent with variance 1.
-    derivative_error
-        Relative error of the derivatives in the bread.
-
-    Returns
-    -------
-    Shape (n, n).
+    The bread is J^T J of the weighted residuals, with a relative error of the derivatives. The filling is the covariance of
+    J^T r; it equals the bread if the residuals are independent with variance 1.
     """
     if bread.shape[0] == 0:
         return np.zeros((0, 0))
@@ -139,7 +124,7 @@ def sandwich_covariance(
     return np.asarray(covariance)
 
 
-def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.float64]) -> NDArray[np.float64]:
+def propagated_covariance(covariance: Floats, chain: Floats) -> Floats:
     """Return ``chain covariance chain^T``, for variances that may be infinite."""
     infinite = np.isinf(np.diag(covariance))
     finite = np.where(infinite[:, None] | infinite[None, :], 0.0, covariance)
@@ -151,23 +136,10 @@ def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.flo
     return np.asarray(result)
 
 
-def spectral_product(
-    residual: NDArray[np.float64], derivative: NDArray[np.float64], count: int
-) -> NDArray[np.float64]:
-    """Return the covariance of J^T r of one record from the smoothed spectrum of its residual.
+def spectral_product(residual: Floats, derivative: Floats, count: int) -> Floats:
+    """Return the covariance of J^T r of one record from the smoothed spectrum of its residual, shape (n, n).
 
-    Parameters
-    ----------
-    residual
-        Residuals of `count` outputs, one after the other, shape (count * n_samples,).
-    derivative
-        J, in the same order, shape (count * n_samples, n).
-    count
-        Number of outputs.
-
-    Returns
-    -------
-    Shape (n, n).
+    Residuals and derivatives are those of `count` outputs, one after the other: (count * n_samples,) and (count * n_samples, n).
     """
     by_output = residual.reshape(count, -1)
     n = by_output.shape[1]
@@ -193,7 +165,7 @@ def smoothed_spectrum(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128
     return np.asarray(np.convolve(around, np.full(2 * half + 1, 1.0 / (2 * half + 1)), "valid"))
 
 
-def symmetric_eigen(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
     """Return eigenvalues in ascending order, shape (n,), and eigenvectors as columns, shape (n, n).
 
     Divide and conquer is faster but has failed on a well-conditioned matrix of 90 rows; relatively robust representations are

@@ -13,12 +13,10 @@ from rigsight.effects import Place
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.typical_size import size_of_signal
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure
 from rigsight.units import parse_dimension
-
-Floats = NDArray[np.float64]
 
 _FIRST_SAMPLES = 7
 _RESTING = 1e-3

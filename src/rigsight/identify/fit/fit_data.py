@@ -1,18 +1,94 @@
-"""Data of a fit: measured samples with their weights, residuals."""
+"""What goes into a fit, what comes out of it, and how outcomes are recalled."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.fit.idle_threads import IdleThreads
-from rigsight.records.record import Record
-from rigsight.simulate import Structure, record_input, record_values, state_limits
+from rigsight.records.record import Floats, Record
+from rigsight.simulate import Structure, Substeps, record_input, record_values, state_limits
 from rigsight.simulate.input_hold import HeldInput
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """Result of an output-error fit."""
+
+    structure: Structure  # rig and effects that were fitted
+    success: bool  # whether the optimizer converged
+    message: str  # that of the optimizer
+    values: dict[str, float]  # every parameter of the structure by name, fitted or not
+    standard_errors: dict[str, float]  # of the fitted ones, for colored residuals; infinite if undetermined
+    initial_states: tuple[Floats, ...]  # per record: states of the structure, then free offsets
+    cost: float  # sum of squared weighted residuals
+    n_samples: int  # number of residuals in that sum
+    n_evaluations: int  # of residuals and derivatives
+    free: tuple[str, ...]  # names of the fitted parameters, in the order of `covariance`
+    covariance: Floats  # shape (n_free, n_free), in units of the parameters
+    # Measured minus simulated per record, shape (n_samples, n_outputs), NaN for an output that was not measured.
+    residuals: tuple[Floats, ...]
+    substeps: tuple[Substeps, ...] = ()  # integration steps per piece of the input of each record
+    offset_names: tuple[str, ...] = ()  # sensors whose offsets were free in each record, in that order
+
+    @property
+    def rig_states(self) -> tuple[Floats, ...]:
+        """Initial states of the structure per record, shape (n_states,), without offsets of sensors."""
+        count = len(self.offset_names)
+        return tuple(state[: state.size - count] for state in self.initial_states)
+
+    def offsets(self, index: int) -> dict[str, float]:
+        """Return the offset of each sensor in the record with an index in the fit, by name; empty if none was free."""
+        if not self.offset_names:
+            return {}
+        own = self.initial_states[index][-len(self.offset_names) :]
+        return dict(zip(self.offset_names, map(float, own), strict=True))
+
+    @property
+    def weighted_rms(self) -> float:
+        """RMS of the weighted residuals."""
+        return float(np.sqrt(self.cost / self.n_samples))
+
+
+class FitMemory(Protocol):
+    """Storage of the outcomes of fits, so that interrupted work can be continued."""
+
+    def recall(self, key: str) -> Mapping[str, Any] | None:
+        """Return the outcome that was stored under a key, None if there is none."""
+
+    def remember(self, key: str, outcome: Mapping[str, Any]) -> None:
+        """Store an outcome, which consists of numbers and text, under a key."""
+
+
+def record_digest(record: Record) -> str:
+    """Return a hash of everything that a fit uses of a record."""
+    digest = hashlib.blake2b(digest_size=16)
+    reported: list[Any] = [record.n_samples, record.dt, record.hold, sorted(record.signals)]
+    # Added only if present, so that outcomes stored before such constants existed remain valid.
+    reported += [sorted(record.constants.items())] if record.constants else []
+    reported += [sorted(record.observed.items())] if record.observed else []
+    digest.update(json.dumps(reported).encode())
+    for name in sorted(record.signals):
+        digest.update(np.ascontiguousarray(record[name]).tobytes())
+    return digest.hexdigest()
+
+
+def fit_key(problem: Sequence[Any], theta: Floats, settings: Sequence[Any]) -> str:
+    """Return a hash of a fit: of its problem (plain data), its start and its settings.
+
+    Start values are hashed bit by bit: a fit from a slightly different value is a different fit.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    digest.update(json.dumps([problem, settings]).encode())
+    digest.update(theta.tobytes())
+    return digest.hexdigest()
+
 
 Result = TypeVar("Result")
 
@@ -27,8 +103,8 @@ class RecordData:
     # The record, and its input between samples.
     record: Record
     held: HeldInput
-    measured: NDArray[np.float64]  # shape (n_samples, n_outputs), NaN for an output that was not measured
-    weights: NDArray[np.float64]  # reciprocal noise of each output, 0 if it was not measured
+    measured: Floats  # shape (n_samples, n_outputs), NaN for an output that was not measured
+    weights: Floats  # reciprocal noise of each output, 0 if it was not measured
     # Indices in the parameter vector of the record's own constants, and their values.
     own: tuple[tuple[int, float], ...] = ()
 
@@ -36,7 +112,7 @@ class RecordData:
         """Return the data with only the first samples of measurement and input."""
         return replace(self, held=self.held.first(n_samples), measured=self.measured[:n_samples])
 
-    def parameters(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def parameters(self, p: Floats) -> Floats:
         """Return parameters, shape (n_parameters,) or (n_parameters, n_sets), with the record's own constants."""
         if not self.own:
             return p
@@ -53,7 +129,7 @@ class FitData:
     structure: Structure  # rig and effects; the free offsets of sensors come after all other states
     records: tuple[RecordData, ...]
     limited: NDArray[np.bool_]  # true for states that cannot leave a range, shape (n_states,)
-    unlimited_sizes: NDArray[np.float64]  # characteristic size of each state, shape (n_states, 1)
+    unlimited_sizes: Floats  # characteristic size of each state, shape (n_states, 1)
     accuracy: float  # relative accuracy of the simulations
     # Threads among which the records are distributed.
     threads: IdleThreads = field(default_factory=IdleThreads)
@@ -62,7 +138,7 @@ class FitData:
         """Return the results of a function for the index of each record, in their order."""
         return self.threads.results(one, [record.record.n_samples for record in self.records])
 
-    def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def state_sizes(self, p: Floats) -> Floats:
         """Return the unit of each initial state in the fit, shape (n_states, n_sets).
 
         A state with a limited range is fitted in units of that range, which may depend on the parameters: beyond its ends the
@@ -87,7 +163,7 @@ def record_data(
     return RecordData(record, record_input(structure, record), measured, weights, places)
 
 
-def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def weighted(record: RecordData, out: Floats) -> tuple[Floats, Floats]:
     """Return weighted residuals (n,) of the first set and its outputs minus those of each other one (n, n_sets - 1)."""
     used = np.flatnonzero(record.weights > 0.0)
     n_samples, _, n_sets = out.shape
@@ -101,3 +177,12 @@ def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.f
         np.subtract(out[:, i, :1], out[:, i, 1:], out=differences[rows])
         differences[rows] *= record.weights[i]
     return residuals, differences
+
+
+def free_names(structure: Structure, of_rig: Iterable[str]) -> list[str]:
+    """Return these parameters of the rig and all of the effects that a fit may move, in the order of the structure."""
+    names, fixed = set(of_rig), dict(structure.fixed)
+    for effect in structure.effects:
+        own = (structure.parameter_name(effect, p.name) for p in effect.parameters if p.fitted)
+        names.update(name for name in own if name not in fixed)
+    return [name for name in structure.names if name in names]

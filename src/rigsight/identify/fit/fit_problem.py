@@ -17,6 +17,7 @@ from rigsight.errors import SimulationError
 from rigsight.identify.fit.coordinates import FINE_STEP, STEP, Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.fit_data import FitData, weighted
+from rigsight.records.record import Floats
 from rigsight.simulate import (
     FittedRecord,
     Substeps,
@@ -48,13 +49,13 @@ _DIVERGED = 1e100
 class Evaluation:
     """Cost r^T r, J^T J and J^T r at coordinates."""
 
-    theta: NDArray[np.float64]
+    theta: Floats
     cost: float
-    normal: NDArray[np.float64]
-    gradient: NDArray[np.float64]
+    normal: Floats
+    gradient: Floats
 
     @cached_property
-    def compressed(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def compressed(self) -> tuple[Floats, Floats]:
         """R and c with R^T R = J^T J and R^T c = J^T r, also for linearly dependent derivatives.
 
         For a column of zeros, J^T J has a one on its diagonal.
@@ -77,13 +78,7 @@ class Evaluation:
 class Problem:
     """Cost, gradient and Gauss-Newton matrix as functions of the coordinates, with the last evaluation kept."""
 
-    def __init__(
-        self,
-        data: FitData,
-        coordinates: Coordinates,
-        n_states: int,
-        upper: NDArray[np.float64],
-    ) -> None:
+    def __init__(self, data: FitData, coordinates: Coordinates, n_states: int, upper: Floats) -> None:
         self.data = data
         self.coordinates = coordinates
         self.n_states = n_states
@@ -100,13 +95,13 @@ class Problem:
         self._last: Evaluation | None = None
         self._best = float("inf")
 
-    def states(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def states(self, theta: Floats) -> list[Floats]:
         """Return the initial states per record."""
         places = theta[self.n_free :].reshape(len(self.data.records), self.n_states)
         sizes = self.data.state_sizes(self.coordinates.to_parameters(theta[: self.n_free])[:, None])[:, 0]
         return [row * sizes for row in places]
 
-    def choose_substeps(self, theta: NDArray[np.float64]) -> None:
+    def choose_substeps(self, theta: Floats) -> None:
         """Choose the substeps of each record that give the requested accuracy at these coordinates."""
         p = self.coordinates.to_parameters(theta[: self.n_free])
         states = self.states(theta)
@@ -128,7 +123,7 @@ class Problem:
 
         self.substeps = self.data.of_each_record(chosen)
 
-    def refined(self, theta: NDArray[np.float64]) -> bool:
+    def refined(self, theta: Floats) -> bool:
         """Double the substeps if the cost could then be lowered further from here; return True if so."""
         before = self.substeps
         within_reach = self._removable(theta)
@@ -140,11 +135,11 @@ class Problem:
         self.substeps, self._last = before, None
         return False
 
-    def _worth_refining(self, theta: NDArray[np.float64]) -> float:
+    def _worth_refining(self, theta: Floats) -> float:
         n_samples = sum(np.count_nonzero(np.isfinite(record.measured)) for record in self.data.records)
         return _MOST_WORTH if self.at(theta).cost > _FAR**2 * n_samples else _WORTH_REFINING
 
-    def _removable(self, theta: NDArray[np.float64]) -> float:
+    def _removable(self, theta: Floats) -> float:
         """Return the share of the cost by which a full Gauss-Newton step would lower it in the linear approximation."""
         evaluation = self.at(theta)
         if not np.isfinite(evaluation.cost):
@@ -152,7 +147,7 @@ class Problem:
         _, projection = evaluation.compressed
         return float(projection @ projection) / max(evaluation.cost, 1e-300)
 
-    def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(self, theta: Floats) -> Floats:
         """Return a vector with the same cost and the same projection on the derivatives as the residuals."""
         evaluation = self.at(theta)
         if not np.isfinite(evaluation.cost):
@@ -163,12 +158,12 @@ class Problem:
         rest = max(evaluation.cost - float(projection @ projection), 0.0)
         return np.append(projection, np.sqrt(rest))
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def jacobian(self, theta: Floats) -> Floats:
         """Return the derivatives of `residual`."""
         root, _ = self.at(theta).compressed
         return np.vstack([root, np.zeros(theta.size)])
 
-    def at(self, theta: NDArray[np.float64]) -> Evaluation:
+    def at(self, theta: Floats) -> Evaluation:
         """Evaluate, or return the last evaluation if it was here."""
         if self._last is not None and np.array_equal(self._last.theta, theta):
             return self._last
@@ -184,9 +179,7 @@ class Problem:
         self.n_evaluations += 1
         return self._last
 
-    def _put_together(
-        self, products: NDArray[np.float64], projections: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _put_together(self, products: Floats, projections: Floats) -> tuple[Floats, Floats]:
         """Return the normal equations of all coordinates from those of each record for parameters and its own initial states."""
         n_records, free = products.shape[0], slice(None, self.n_free)
         own = self.n_free + np.arange(n_records * self.n_states).reshape(n_records, self.n_states)
@@ -205,15 +198,13 @@ class Problem:
         own = self.n_free + index * self.n_states + np.arange(self.n_states)
         return np.concatenate([np.arange(self.n_free), own]).astype(np.intp)
 
-    def sensitivities(
-        self, theta: NDArray[np.float64]
-    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    def sensitivities(self, theta: Floats) -> list[tuple[Floats, Floats]]:
         """Return, for each record, the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
         data = self.data
         if carries_tangents(data.structure):
             p, dp, x0, dx0 = self._place(theta)
 
-            def tangents(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            def tangents(index: int) -> tuple[Floats, Floats]:
                 own, n = data.records[index], data.records[index].record.n_samples
                 with np.errstate(all="ignore"):
                     out = simulate_tangents(
@@ -233,7 +224,7 @@ class Problem:
             return data.of_each_record(tangents)
         shifts, sets, states = self._sets(theta)
 
-        def differences(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        def differences(index: int) -> tuple[Floats, Floats]:
             residual, changes = self._differences(index, sets, states[index])
             with np.errstate(all="ignore"):
                 changes /= shifts[self.columns(index)]
@@ -241,9 +232,7 @@ class Problem:
 
         return data.of_each_record(differences)
 
-    def _place(
-        self, theta: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _place(self, theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Return parameters, initial states and their derivatives by the coordinates on which a record depends.
 
         Shapes (n_parameters,), (n_parameters, n), (n_records, n_states) and (n_states, n) with n = n_free + n_states. Structures
@@ -256,9 +245,7 @@ class Problem:
         dx0 = np.hstack([np.zeros((self.n_states, self.n_free)), np.diag(sizes)])
         return p, dp, theta[self.n_free :].reshape(len(self.data.records), self.n_states) * sizes, dx0
 
-    def _sets(
-        self, theta: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _sets(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the shift of each coordinate, and the sets of which differences are taken: the point and each shifted point.
 
         The sets are parameters, shape (n_parameters, n_sets), and initial states, shape (n_records, n_states, n_sets).
@@ -277,7 +264,7 @@ class Problem:
         states[:, own, 1 + self.n_free + own] += shifts[self.n_free :].reshape(places.shape)
         return shifts, p, states * self.data.state_sizes(p)
 
-    def _products(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def _products(self, theta: Floats) -> list[Floats]:
         """Return each record's products of residual and derivatives, shape (1 + n, 1 + n), n = n_free + n_states."""
         data = self.data
         if data.structure.is_shifted or data.structure.histories:
@@ -309,17 +296,15 @@ class Problem:
         return [own * np.outer(scale, scale) for own, scale in zip(products, per_shift, strict=True)]
 
     def _of_equal_rigs(
-        self,
-        p: NDArray[np.float64],
-        several: Callable[[NDArray[np.float64], list[int]], NDArray[np.float64]],
-    ) -> Callable[[Sequence[int]], list[NDArray[np.float64]]]:
+        self, p: Floats, several: Callable[[Floats, list[int]], Floats]
+    ) -> Callable[[Sequence[int]], list[Floats]]:
         """Return a function of shares of the records that calls another one for each group with equal constants."""
 
-        def of_share(share: Sequence[int]) -> list[NDArray[np.float64]]:
+        def of_share(share: Sequence[int]) -> list[Floats]:
             groups: dict[tuple[tuple[int, float], ...], list[int]] = {}
             for index in share:
                 groups.setdefault(self.data.records[index].own, []).append(index)
-            found: dict[int, NDArray[np.float64]] = {}
+            found: dict[int, Floats] = {}
             for group in groups.values():
                 own = self.data.records[group[0]].parameters(p)
                 found.update(zip(group, several(own, group), strict=True))
@@ -334,19 +319,14 @@ class Problem:
                 (
                     substeps,
                     FittedRecord(
-                        record.held,
-                        substeps.per_piece(record.held.n_pieces),
-                        record.measured,
-                        record.weights,
+                        record.held, substeps.per_piece(record.held.n_pieces), record.measured, record.weights
                     ),
                 )
                 for substeps, record in zip(self.substeps, self.data.records, strict=True)
             ]
         return [fitted for _, fitted in self._fitted]
 
-    def _differences(
-        self, index: int, p: NDArray[np.float64], x0: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _differences(self, index: int, p: Floats, x0: Floats) -> tuple[Floats, Floats]:
         """Return weighted residuals (n,) of the first set, and its outputs minus those of each other (n, n_sets - 1)."""
         record = self.data.records[index]
         with np.errstate(all="ignore"):

@@ -15,25 +15,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.fit.fit_data import FitData, record_data
+from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
-from rigsight.identify.fit.fit_result import FitMemory, FitResult, fit_key, record_digest
 from rigsight.identify.fit.idle_threads import IdleThreads
-from rigsight.identify.fit.search import FINE_TOLERANCE, off_kinks, searched
+from rigsight.identify.fit.search import FINE_TOLERANCE, VariableProjection, off_kinks, searched
 from rigsight.identify.fit.settled_states import SearchStart
-from rigsight.identify.fit.variable_projection import VariableProjection
-from rigsight.records.record import Record
-from rigsight.simulate import (
-    Structure,
-    Substeps,
-    simulate_outputs,
-    structure_of_fit,
-)
+from rigsight.records.record import Floats, Record
+from rigsight.simulate import Structure, Substeps, simulate_outputs, structure_of_fit
 from rigsight.units import characteristic_value
 
 DEFAULT_ACCURACY = 1e-4
@@ -42,31 +34,18 @@ _MOST_ROUNDS = 4
 """Largest number of successive searches with finer steps."""
 _WORTH_A_ROUND = 1e-3
 """Share of the cost by which a round must have lowered it for another round."""
-_Outcome = tuple[NDArray[np.float64], bool, str]
+_Outcome = tuple[Floats, bool, str]
 """Coordinates and initial states at the end of a search, whether it converged, and the optimizer's message."""
 
 
 class GreyBoxFit:
     """Output-error least squares of a structure on records.
 
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    records
-        Records to fit; a record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of
-        them (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of
-        the result.
-    scales
-        Size of each base quantity, see `characteristic_scales`.
-    output_noise
-        Standard deviation by which the residuals of each output are divided.
-    accuracy
-        Relative accuracy of the simulations; the number of substeps follows from it.
-    memory
-        Storage of outcomes; a stored fit is not repeated and gives the same result.
-    threads
-        Threads among which the records are distributed; None for the calling thread alone.
+    A record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of them
+    (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of the
+    result. `scales` are those of `characteristic_scales`; residuals are divided by `output_noise`. The number of substeps
+    follows from the relative accuracy of the simulations. A fit that the memory holds is not repeated and gives the same
+    result.
     """
 
     def __init__(
@@ -114,35 +93,18 @@ class GreyBoxFit:
         self,
         start: Mapping[str, float],
         free: Sequence[str],
-        initial_states: Sequence[NDArray[np.float64]] | None = None,
+        initial_states: Sequence[Floats] | None = None,
         max_evaluations: int = 60,
         tolerance: float = 1e-7,
         finish: bool = True,
         substeps: Sequence[int] | None = None,
     ) -> FitResult:
-        """Fit the free parameters and every record's initial state.
+        """Fit the free parameters (there may be none) and every record's initial state.
 
-        Parameters
-        ----------
-        start
-            Value of every parameter of the structure.
-        free
-            Names of those to fit; may be empty, then only initial states are.
-        initial_states
-            Start values per record, as in `FitResult`; default from the first samples.
-        max_evaluations
-            Limit for the optimizer.
-        tolerance
-            Relative change of the cost at which the optimizer stops.
-        finish
-            Compute standard errors, and residuals with the accurate integrator. False for a rough fit.
-        substeps
-            Integration steps per piece of the input of each record; by default they follow from the accuracy.
-
-        Returns
-        -------
-        The result; ``success`` is False, with the reason as ``message``, if the start cannot be simulated or the optimizer ran
-        out of evaluations.
+        Without substeps and initial states these follow from the accuracy and from the first samples. `tolerance` is the
+        relative change of the cost at which the optimizer stops; a rough fit (not `finish`) has no standard errors and no
+        accurate residuals. ``success`` is False, with the reason as ``message``, if the start cannot be simulated or the
+        optimizer ran out of evaluations.
         """
         begin = SearchStart.of(self.data, self.scales, start, free, initial_states)
         coordinates, theta = begin.coordinates, begin.theta
@@ -158,7 +120,7 @@ class GreyBoxFit:
         if theta.size == 0:
             return self._result(problem, theta, True, "Nothing to fit.", finish)
 
-        def search(theta: NDArray[np.float64] = theta) -> _Outcome:
+        def search(theta: Floats = theta) -> _Outcome:
             for _ in range(_MOST_ROUNDS if finish and substeps is None else 1):
                 solution = searched(problem, theta, (lower, upper), tolerance, max_evaluations)
                 theta = solution.x
@@ -186,21 +148,7 @@ class GreyBoxFit:
         """Fit the free parameters to many short records, each with the best initial state for the parameters.
 
         For motion with friction or hysteresis: there, `fit`, which varies everything together, can stop far from the minimum.
-
-        Parameters
-        ----------
-        start, free
-            As for `fit`.
-        max_evaluations
-            Limit for the optimizer in each round.
-        tolerance
-            Relative change of the cost at which a round ends.
-        most_rounds
-            Largest number of rounds; between them other values of limited states are tried.
-
-        Returns
-        -------
-        As for `fit`.
+        Between rounds other values of limited states are tried.
         """
         begin = SearchStart.of(self.data, self.scales, start, free)
         coordinates, n_free = begin.coordinates, len(free)
@@ -226,20 +174,11 @@ class GreyBoxFit:
         together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
         return self._result(together, *outcome, finish=True)
 
-    def information(self, start: Mapping[str, float], free: Sequence[str]) -> NDArray[np.float64]:
+    def information(self, start: Mapping[str, float], free: Sequence[str]) -> Floats:
         """Return the information of the records on parameters at their start, with unknown initial states.
 
-        This is the Fisher information of relative changes (of changes in units of the size, if a value is zero); NaN if the start
-        cannot be simulated.
-
-        Parameters
-        ----------
-        start, free
-            As for `fit`.
-
-        Returns
-        -------
-        Shape (n_free, n_free).
+        This is the Fisher information of relative changes (of changes in units of the size, if a value is zero), shape
+        (n_free, n_free); NaN if the start cannot be simulated.
         """
         begin, n = SearchStart.of(self.data, self.scales, start, free), len(free)
         problem = Problem(self.data, begin.coordinates, begin.n_states, np.full(begin.theta.size, np.inf))
@@ -272,89 +211,75 @@ class GreyBoxFit:
         return theta, success, message
 
     def _key(
-        self,
-        coordinates: Coordinates,
-        start: Mapping[str, float],
-        theta: NDArray[np.float64],
-        settings: Sequence[float],
+        self, coordinates: Coordinates, start: Mapping[str, float], theta: Floats, settings: Sequence[float]
     ) -> str:
         if self.memory is None:
             return ""
         values = [float(start[name]) for name in self.structure.names]
         return fit_key([*self._problem, values, list(coordinates.free)], theta, settings)
 
-    def _failed(self, problem: Problem, theta: NDArray[np.float64], message: str) -> FitResult:
-        coordinates = problem.coordinates
-        p = coordinates.to_parameters(theta[: len(coordinates.free)])
-        n = len(coordinates.free)
-        return FitResult(
-            structure=self.structure,
-            success=False,
-            message=message,
-            values=self._values(p),
-            standard_errors=dict.fromkeys(coordinates.free, float("inf")),
-            initial_states=tuple(problem.states(theta)),
-            cost=float("inf"),
-            n_samples=self.n_samples,
-            n_evaluations=1,
-            free=coordinates.free,
-            covariance=np.full((n, n), np.inf),
-            residuals=(),
-            substeps=(Substeps(MOST_SUBSTEPS),) * len(self.data.records),
-            offset_names=self.data.structure.offsets,
-        )
+    def _failed(self, problem: Problem, theta: Floats, message: str) -> FitResult:
+        n = problem.n_free
+        problem.n_evaluations, problem.substeps = 1, [Substeps(MOST_SUBSTEPS)] * len(self.data.records)
+        return self._found(problem, theta, (False, message), float("inf"), np.full((n, n), np.inf), ())
 
     def _result(
-        self, problem: Problem, theta: NDArray[np.float64], success: bool, message: str, finish: bool
+        self, problem: Problem, theta: Floats, success: bool, message: str, finish: bool
     ) -> FitResult:
-        coordinates, n_evaluations = problem.coordinates, problem.n_evaluations
-        n_free = len(coordinates.free)
-        p = coordinates.to_parameters(theta[:n_free])
-        states = problem.states(theta)
-        cost = problem.at(theta).cost
-        residuals: tuple[NDArray[np.float64], ...] = ()
-        covariance = np.full((n_free, n_free), np.nan)
-        if finish:
-            try:
-                residuals = tuple(self.data.of_each_record(lambda i: self._remainder(i, p, states[i])))
-            except SimulationError as error:
-                return self._failed(problem, theta, str(error))
-            cost = float(
-                sum(
-                    np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self.data.records, strict=True)
-                )
-            )
-        if finish and n_free:
-            outputs = [int(np.count_nonzero(d.weights)) for d in self.data.records]
+        outcome, n_free = (success, message), problem.n_free
+        own, states = theta[:n_free], problem.states(theta)
+        evaluations, cost = problem.n_evaluations, problem.at(theta).cost
+        # The evaluation at the end is no part of the search.
+        problem.n_evaluations = evaluations
+        if not finish:
+            return self._found(problem, theta, outcome, cost, np.full((n_free, n_free), np.nan), ())
+        p = problem.coordinates.to_parameters(own)
+        try:
+            residuals = tuple(self.data.of_each_record(lambda i: self._remainder(i, p, states[i])))
+        except SimulationError as error:
+            return self._failed(problem, theta, str(error))
+        weights = [record.weights for record in self.data.records]
+        cost = float(sum(np.nansum((r * w) ** 2) for r, w in zip(residuals, weights, strict=True)))
+        covariance = np.zeros((0, 0))
+        if n_free:
+            sensitivities, outputs = problem.sensitivities(theta), [int(np.count_nonzero(w)) for w in weights]
             covariance = colored_covariance(
-                problem.sensitivities(theta), n_free, outputs, problem.derivative_error, for_intervals=True
+                sensitivities, n_free, outputs, problem.derivative_error, for_intervals=True
             )
-            covariance = propagated_covariance(covariance, coordinates.jacobian(theta[:n_free]))
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if n_free else np.zeros(0)
+            covariance = propagated_covariance(covariance, problem.coordinates.jacobian(own))
+        return self._found(problem, theta, outcome, cost, covariance, residuals)
+
+    def _found(
+        self,
+        problem: Problem,
+        theta: Floats,
+        outcome: tuple[bool, str],
+        cost: float,
+        covariance: Floats,
+        residuals: tuple[Floats, ...],
+    ) -> FitResult:
+        free = problem.coordinates.free
+        p = problem.coordinates.to_parameters(theta[: problem.n_free])
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return FitResult(
             structure=self.structure,
-            success=success,
-            message=message,
-            values=self._values(p),
-            standard_errors=dict(zip(coordinates.free, map(float, errors), strict=True)),
-            initial_states=tuple(states),
+            success=outcome[0],
+            message=outcome[1],
+            # The bandwidths of an observer come after all other parameters.
+            values=dict(zip(self.structure.names, map(float, p), strict=False)),
+            standard_errors=dict(zip(free, map(float, errors), strict=True)),
+            initial_states=tuple(problem.states(theta)),
             cost=cost,
             n_samples=self.n_samples,
-            n_evaluations=n_evaluations,
-            free=coordinates.free,
+            n_evaluations=problem.n_evaluations,
+            free=free,
             covariance=covariance,
             residuals=residuals,
             substeps=tuple(problem.substeps),
             offset_names=self.data.structure.offsets,
         )
 
-    def _values(self, p: NDArray[np.float64]) -> dict[str, float]:
-        # The bandwidths of an observer come after all other parameters.
-        return dict(zip(self.structure.names, map(float, p), strict=False))
-
-    def _remainder(
-        self, index: int, p: NDArray[np.float64], state: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _remainder(self, index: int, p: Floats, state: Floats) -> Floats:
         """Return measured minus accurately simulated outputs of a record."""
         d = self.data.records[index]
         return d.measured - simulate_outputs(

@@ -20,13 +20,7 @@ Result = TypeVar("Result")
 
 
 class IdleThreads:
-    """The threads of a number of jobs.
-
-    Parameters
-    ----------
-    n_jobs
-        Number of threads that may compute at the same time, including the calling one.
-    """
+    """The threads of a number of jobs: at most so many compute at the same time, including the calling one."""
 
     def __init__(self, n_jobs: int = 1) -> None:
         self._n_jobs = n_jobs
@@ -47,15 +41,7 @@ class IdleThreads:
                 self._busy -= 1
 
     def side_by_side(self, one: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """Yield the results of a function for each item, in order; threads without an item help with the records of others.
-
-        Parameters
-        ----------
-        one
-            Fits one model.
-        items
-            Models.
-        """
+        """Yield the results of a function for each item, in order; threads without an item help with the records of others."""
         if self._n_jobs == 1:
             yield from map(one, items)
             return
@@ -68,29 +54,13 @@ class IdleThreads:
         yield from parallel(delayed(counted)(item) for item in items)
 
     def results(self, one: Callable[[int], Result], sizes: Sequence[int]) -> list[Result]:
-        """Return the results of a function for the numbers ``0, 1, ...``, in order.
-
-        Parameters
-        ----------
-        one
-            Called for each number, by any thread.
-        sizes
-            Amount of work of each, in any unit.
-        """
+        """Return the results of a function for the numbers ``0, 1, ...``, in order; `sizes` is the amount of work of each."""
         return self.results_of_shares(lambda numbers: [one(number) for number in numbers], sizes)
 
     def results_of_shares(
         self, several: Callable[[Sequence[int]], Sequence[Result]], sizes: Sequence[int]
     ) -> list[Result]:
-        """Return the same for a function that takes several numbers at once.
-
-        Parameters
-        ----------
-        several
-            Called for shares of the numbers, by any thread; returns its results in their order.
-        sizes
-            Amount of work of each number, in any unit.
-        """
+        """Return the same for a function that takes several numbers at once and returns its results in their order."""
         free = self._borrowed(len(sizes) - 1)
         if not free or self._pool is None:
             return list(several(range(len(sizes))))

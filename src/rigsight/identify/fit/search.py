@@ -1,26 +1,183 @@
-"""Optimizer of a fit: a bounded trust region, with coarse finite differences where friction sliders make the cost nonsmooth.
+"""How a fit searches its minimum: by a bounded trust region, beside it variable projection and steps off kinks.
 
-When a slider slips one sample later, the cost has a kink, and a descent along exact derivatives stops at one of many kinks,
-depending on rounding. Finite differences over steps as large as the standard errors average over kinks and are continuous in the
-parameters and the data: the point at which Gauss-Newton steps from them vanish is stable. Derivatives integrated along with the
-motion cannot do this.
+Variable projection: only the parameters are coordinates, and the initial states of all records are refitted at each step. Windows
+of records have far more initial states than parameters, and with stick-slip friction these jump as the parameters change: a joint
+step in all coordinates would be rejected, a step followed by refitting each window is not.
+
+Kinks: when a friction slider slips one sample later, the cost has a kink, and a descent along exact derivatives stops at one of
+many, depending on rounding. Finite differences over steps as large as the standard errors average over kinks and are continuous
+in the parameters and the data: the point at which Gauss-Newton steps from them vanish is stable. Derivatives integrated along
+with the motion cannot do this.
+
+References
+----------
+G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; L. Kaufman, BIT 15 (1975) 49, for the projected derivatives.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.errors import SimulationError
-from rigsight.identify.fit.coordinates import STEP
-from rigsight.identify.fit.fit_data import weighted
+from rigsight.identify.fit.coordinates import STEP, Coordinates
+from rigsight.identify.fit.covariance import symmetric_eigen
+from rigsight.identify.fit.fit_data import FitData, weighted
 from rigsight.identify.fit.fit_problem import Evaluation, Problem
-from rigsight.simulate import simulate_outputs
+from rigsight.records.record import Floats
+from rigsight.simulate import simulate_outputs, simulate_sets
+
+_DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)
+"""Dampings of the Levenberg-Marquardt steps of an initial state that are tried at once, in units of the normalized equations."""
+_ASIDE = (-0.3, 0.3)
+"""Shares of its range by which a limited state is moved in further trials: its derivative is zero after it has slipped."""
+_FEW_STEPS = 8
+_MANY_STEPS = 15
+_SETTLED = 1e-3
+"""Share of a record's cost below which no further step is made."""
+_PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Start values of limited states between the rounds of a search, as shares of their range."""
+_DEPENDENT_STATE = 1e-9
+"""Part of the response to an initial state outside that to the others below which they give it no more than rounding."""
+
+
+class VariableProjection(Problem):
+    """Cost, gradient and Gauss-Newton matrix as functions of the parameters' coordinates.
+
+    `places` are the initial states of each record in units of their sizes, between `lower` and `upper`, shape (n_states,) each.
+    """
+
+    def __init__(
+        self,
+        data: FitData,
+        coordinates: Coordinates,
+        places: Sequence[Floats],
+        lower: Sequence[Floats],
+        upper: Sequence[Floats],
+    ) -> None:
+        n_states = len(data.structure.states)
+        super().__init__(data, coordinates, n_states, np.concatenate([coordinates.upper, *upper]))
+        self.places = list(places)
+        self._lower, self._upper = lower, upper
+        self._settled_at = self.places
+
+    def jacobian(self, theta: Floats) -> Floats:
+        """Return the derivatives of `residual`; the search continues from the point where they are requested."""
+        evaluation = self.at(theta)
+        self.places = self._settled_at
+        root, _ = evaluation.compressed
+        return np.vstack([root, np.zeros(theta.size)])
+
+    def at(self, theta: Floats) -> Evaluation:
+        """Refit the initial states, then evaluate with their directions projected out of the derivatives."""
+        if self._last is not None and np.array_equal(self._last.theta, theta):
+            return self._last
+        p = self.coordinates.to_parameters(theta)
+        settled = self.data.of_each_record(lambda i: self._settled(i, p, self.places[i], _FEW_STEPS)[0])
+        n = theta.size
+        normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging simulation overflows here
+            for residual, derivative in self.sensitivities(np.concatenate([theta, *settled])):
+                cost += float(residual @ residual)
+                own, rest = _projected(derivative[:, :n], derivative[:, n:], residual)
+                normal += own.T @ own
+                gradient += own.T @ rest
+        if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
+            cost = float("inf")
+        self._best = min(self._best, cost)
+        self._last, self._settled_at = Evaluation(theta.copy(), cost, normal, gradient), settled
+        self.n_evaluations += 1
+        return self._last
+
+    def settle_anew(self, theta: Floats) -> float:
+        """Refit the initial states from several values of limited states, and return the cost."""
+        self._last = None
+        p = self.coordinates.to_parameters(theta)
+
+        def best(index: int) -> tuple[Floats, float]:
+            place = self.places[index]
+            starts = [place]
+            if np.any(self.data.limited):
+                starts += [np.where(self.data.limited, share, place) for share in _PLACES]
+            tried = [self._settled(index, p, start, _MANY_STEPS) for start in starts]
+            return min(tried, key=lambda found: found[1])
+
+        found = self.data.of_each_record(best)
+        for index, (place, _) in enumerate(found):
+            self.places[index] = place
+        return sum((cost for _, cost in found), start=0.0)
+
+    def _settled(self, index: int, p: Floats, place: Floats, most: int) -> tuple[Floats, float]:
+        """Return the best initial state near a given one, and its cost."""
+        n, cost = self.n_states, float("inf")
+        low, high = self._lower[index][:, None], self._upper[index][:, None]
+        for _ in range(most):
+            step = np.where(place + STEP > self._upper[index], -STEP, STEP)
+            lanes = place[:, None] + np.column_stack([np.zeros(n), np.diag(step)])
+            residuals = self._residuals(index, p, lanes)
+            residual = residuals[:, 0]
+            with np.errstate(over="ignore", invalid="ignore"):
+                cost = float(residual @ residual)
+            if not np.isfinite(cost):
+                return place, float("inf")
+            derivative = np.nan_to_num((residuals[:, 1:] - residuals[:, :1]) / step, posinf=0.0, neginf=0.0)
+            tried = np.clip(self._candidates(place, derivative, residual), low, high)
+            with np.errstate(over="ignore", invalid="ignore"):
+                costs = np.sum(self._residuals(index, p, tried) ** 2, axis=0)
+            costs[~np.isfinite(costs)] = np.inf
+            best = int(np.argmin(costs))
+            if costs[best] >= cost:
+                break
+            place, gained, cost = tried[:, best], cost - float(costs[best]), float(costs[best])
+            if gained < _SETTLED * cost:
+                break
+        return place, cost
+
+    def _candidates(self, place: Floats, derivative: Floats, residual: Floats) -> Floats:
+        """Return initial states to try, shape (n_states, n_lanes)."""
+        size = np.linalg.norm(derivative, axis=0)
+        size[size == 0.0] = 1.0
+        normal = (derivative / size).T @ (derivative / size)
+        values, vectors = symmetric_eigen(normal)
+        slope = vectors.T @ ((derivative / size).T @ residual)
+        steps = [
+            (vectors @ (slope / (np.maximum(values, 0.0) + damping + 1e-12))) / size for damping in _DAMPINGS
+        ]
+        lanes = [place - step for step in steps]
+        if np.any(self.data.limited):
+            lanes += [np.where(self.data.limited, place + aside, place) for aside in _ASIDE]
+        return np.column_stack(lanes)
+
+    def _residuals(self, index: int, p: Floats, places: Floats) -> Floats:
+        record = self.data.records[index]
+        sets = np.repeat(record.parameters(p)[:, None], places.shape[1], axis=1)
+        with np.errstate(all="ignore"):
+            out = simulate_sets(
+                self.data.structure,
+                record.held,
+                sets,
+                places * self.data.state_sizes(sets),
+                record.record.n_samples,
+                self.substeps[index],
+            )
+            first, against_first = weighted(record, out)
+            return np.column_stack([first, first[:, None] + against_first])
+
+
+def _projected(own: Floats, states: Floats, residual: Floats) -> tuple[Floats, Floats]:
+    """Return derivatives and residual with the directions of the initial states projected out."""
+    size = np.linalg.norm(states, axis=0)
+    size[size == 0.0] = 1.0
+    base, triangle = np.linalg.qr(states / size)
+    base = base[:, np.abs(np.diag(triangle)) > _DEPENDENT_STATE]
+    return own - base @ (base.T @ own), residual - base @ (base.T @ residual)
+
 
 FINE_TOLERANCE = 1e-6
 """Tolerance above which a search is only a rough one, for which kinks do not matter."""
-_SETTLED = 3e-3
+_VANISHED = 3e-3
 """Length of a step, in standard errors, at which the search ends: with steps that halve, at most a hundredth remains."""
 _MOST_STEPS = 20
 """Five were enough if steps shrink by themselves; if the search alternates between two points, halved steps need about twice as
@@ -41,11 +198,7 @@ which cannot resolve less."""
 
 
 def searched(
-    problem: Problem,
-    theta: NDArray[np.float64],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    tolerance: float,
-    max_evaluations: int,
+    problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], tolerance: float, max_evaluations: int
 ) -> OptimizeResult:
     """Return the result of the optimizer."""
     return least_squares(
@@ -63,11 +216,8 @@ def searched(
 
 
 def off_kinks(
-    problem: Problem,
-    theta: NDArray[np.float64],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    n_samples: int,
-) -> NDArray[np.float64] | None:
+    problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], n_samples: int
+) -> Floats | None:
     """Return the point near the end of a search where Gauss-Newton steps from long differences vanish."""
     before = problem.at(theta)
     variance = before.cost / max(n_samples, 1)
@@ -83,11 +233,8 @@ def off_kinks(
 
 
 def _settled(
-    problem: Problem,
-    theta: NDArray[np.float64],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    variance: float,
-) -> NDArray[np.float64] | None:
+    problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], variance: float
+) -> Floats | None:
     """Return the point where the steps vanish; None if they do not, or only at a higher cost."""
     place, share, last, first = theta, 1.0, np.zeros(theta.size), float("inf")
     for _ in range(_MOST_STEPS):
@@ -96,7 +243,7 @@ def _settled(
             return None
         first = min(first, evaluation.cost)
         step, length = _step(evaluation, bounds)
-        if length <= _SETTLED * np.sqrt(variance):
+        if length <= _VANISHED * np.sqrt(variance):
             return place if evaluation.cost <= first + _WORST * variance else None
         # Near a kink the search may alternate between two points.
         returns = float((step / problem.steps) @ (last / problem.steps)) < 0.0
@@ -106,9 +253,7 @@ def _settled(
     return None
 
 
-def _differences(
-    evaluation: Evaluation, bounds: tuple[NDArray[np.float64], NDArray[np.float64]], variance: float
-) -> NDArray[np.float64]:
+def _differences(evaluation: Evaluation, bounds: tuple[Floats, Floats], variance: float) -> Floats:
     """Return the standard error of each coordinate with all others held; a coordinate without influence keeps the small step."""
     curvature = np.diag(evaluation.normal)
     error = np.sqrt(variance / np.maximum(curvature, 1e-300))
@@ -116,14 +261,14 @@ def _differences(
     return np.where(curvature > 0.0, np.clip(error, STEP, widest), STEP)
 
 
-def _evaluated(problem: Problem, place: NDArray[np.float64]) -> Evaluation:
+def _evaluated(problem: Problem, place: Floats) -> Evaluation:
     """Return the equations of a step: accurate residuals, and derivatives by long differences."""
     data, n = problem.data, place.size
     p = problem.coordinates.to_parameters(place[: problem.n_free])
     states = problem.states(place)
     normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
 
-    def accurate(index: int) -> NDArray[np.float64]:
+    def accurate(index: int) -> Floats:
         record = data.records[index]
         n_samples = record.record.n_samples
         own = record.parameters(p)
@@ -139,9 +284,7 @@ def _evaluated(problem: Problem, place: NDArray[np.float64]) -> Evaluation:
     return Evaluation(place, cost, normal, gradient)
 
 
-def _step(
-    evaluation: Evaluation, bounds: tuple[NDArray[np.float64], NDArray[np.float64]]
-) -> tuple[NDArray[np.float64], float]:
+def _step(evaluation: Evaluation, bounds: tuple[Floats, Floats]) -> tuple[Floats, float]:
     """Return a Gauss-Newton step within the bounds, and the change of the residuals, which bounds its size in standard errors.
 
     Coordinates that the step would move beyond a bound are held.

@@ -11,11 +11,11 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.first_states import first_state, moves_freely, state_at_rest
 from rigsight.identify.fit.fit_data import FitData, RecordData
+from rigsight.records.record import Floats
 from rigsight.simulate import has_dry_friction, parameter_vector, simulate_sets
 
 _STATE_RANGE = 20.0
@@ -24,8 +24,6 @@ _HIDDEN_RANGE = 3.0
 """The same for a state of an effect, which no sensor shows and whose estimate is its equilibrium. Further off, its own motion
 would explain what its equation does not: a resonance that begins at twenty times the motion of the mass on which it hangs."""
 
-
-Floats = NDArray[np.float64]
 
 _FIRST_SAMPLES = 25
 """Number of samples of the first stretch."""
@@ -218,12 +216,12 @@ class SearchStart:
 
     coordinates: Coordinates  # of the free parameters
     # Free parameters, then the initial states of each record, shape (n_free + n_records * n_states,).
-    theta: NDArray[np.float64]
+    theta: Floats
     # Initial states of each record in units of their sizes, each of shape (n_states,).
-    places: list[NDArray[np.float64]]
+    places: list[Floats]
     # Bounds of the initial states of each record, as `places`.
-    lower: list[NDArray[np.float64]]
-    upper: list[NDArray[np.float64]]
+    lower: list[Floats]
+    upper: list[Floats]
 
     @property
     def n_states(self) -> int:
@@ -237,7 +235,7 @@ class SearchStart:
         scales: Mapping[str, float],
         values: Mapping[str, float],
         free: Sequence[str],
-        initial_states: Sequence[NDArray[np.float64]] | None = None,
+        initial_states: Sequence[Floats] | None = None,
     ) -> SearchStart:
         """Return the start of a search."""
         coordinates = Coordinates.of(data.structure, free, values, scales)

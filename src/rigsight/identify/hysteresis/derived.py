@@ -10,15 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Effect, SumAndDifference
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
-from rigsight.identify.fit.fit_result import FitResult
-from rigsight.records.record import Record
+from rigsight.identify.fit.fit_data import FitResult
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import ELEMENT
 from rigsight.simulate import Structure, compose, simulate_sets
 from rigsight.simulate.input_hold import hold_motion
@@ -33,21 +32,11 @@ _SUBSTEPS = 2
 
 @dataclass(frozen=True)
 class Derived:
-    """A quantity derived from parameters.
-
-    Attributes
-    ----------
-    name, unit
-        Name and unit.
-    value
-        Value at the fitted parameters; infinite if it has no bound.
-    lower, upper
-        Interval of confidence `LEVEL`; -inf to inf if the parameters are undetermined.
-    """
+    """A quantity derived from parameters, with its interval of confidence `LEVEL`; -inf to inf if they are undetermined."""
 
     name: str
     unit: str
-    value: float
+    value: float  # at the fitted parameters; infinite if it has no bound
     lower: float
     upper: float
 
@@ -62,25 +51,16 @@ class LoopArea:
 
 @dataclass(frozen=True)
 class DerivedQuantities:
-    """Quantities derived from hysteresis parameters.
+    """Quantities derived from hysteresis parameters."""
 
-    Attributes
-    ----------
-    pairs
-        Sum and difference, in this order, of each pair that is searched in this form.
-    saturation
-        Limit of the state of a spring with memory under increasing load, z_max = (A / (beta + gamma))^(1/n) for a Bouc-Wen
-        spring; None for effects without it.
-    saturation_in_words
-        Statement on the saturation from the sign of the pair's sum (beta + gamma); empty without one.
-    loop_areas
-        Energy per cycle at each amplitude.
-    """
-
-    pairs: tuple[Derived, ...]
+    pairs: tuple[
+        Derived, ...
+    ]  # sum and difference, in this order, of each pair that is searched in this form
+    # Limit of the state of a spring with memory under increasing load, z_max = (A / (beta + gamma))^(1/n) for a Bouc-Wen spring;
+    # None for effects without it.
     saturation: Derived | None
-    saturation_in_words: str
-    loop_areas: tuple[LoopArea, ...]
+    saturation_in_words: str  # from the sign of the pair's sum (beta + gamma); empty without one
+    loop_areas: tuple[LoopArea, ...]  # energy per cycle at each amplitude
 
 
 def derived_quantities(
@@ -90,27 +70,16 @@ def derived_quantities(
     rng: np.random.Generator,
     n_draws: int = _DRAWS,
 ) -> DerivedQuantities:
-    """Derive pairs, saturation and loop areas from a fit.
+    """Derive pairs, saturation, and loop areas at some deflections (such as `record_amplitudes`) from a fit with its covariance.
 
-    Parameters
-    ----------
-    fit
-        Fit with values and covariance.
-    amplitudes
-        Deflections at which loop areas are computed, such as those reached in records (`record_amplitudes`).
-    scales
-        Size of each base quantity, as in the fit.
-    rng
-        Draws the parameters.
-    n_draws
-        Number of draws.
+    The scales are those of the fit; the parameters are drawn `n_draws` times.
     """
     structure = fit.structure
     draws = parameter_draws(fit, scales, rng, n_draws)
     determined = _determined(fit)
     known = dict(structure.fixed)
 
-    def of(name: str) -> NDArray[np.float64]:
+    def of(name: str) -> Floats:
         if name in structure.names:
             return np.asarray(draws[structure.names.index(name)])
         return np.full(draws.shape[1], known[name])
@@ -149,7 +118,7 @@ def derived_quantities(
 
 def parameter_draws(
     fit: FitResult, scales: Mapping[str, float], rng: np.random.Generator, n_draws: int
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return the fitted parameters and draws of their covariance, shape (n_parameters, 1 + n_draws).
 
     The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear. Draws outside the
@@ -177,12 +146,7 @@ def parameter_draws(
     return draws
 
 
-def _moved_inside(
-    drawn: NDArray[np.float64],
-    covariance: NDArray[np.float64],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _moved_inside(drawn: Floats, covariance: Floats, lower: Floats, upper: Floats) -> Floats:
     """Move draws of shape (n_draws, n_free) to the bounds that they exceed; other coordinates follow by their correlation."""
     moved = drawn.copy()
     for i in range(lower.size):
@@ -192,21 +156,16 @@ def _moved_inside(
     return np.clip(moved, lower, upper)
 
 
-def _sizes(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sizes(covariance: Floats) -> Floats:
     size = np.sqrt(np.diag(covariance))
     return np.asarray(np.where(size == 0.0, 1.0, size))
 
 
-def loop_area(structure: Structure, p: NDArray[np.float64], amplitude: float) -> NDArray[np.float64]:
+def loop_area(structure: Structure, p: Floats, amplitude: float) -> Floats:
     """Return the energy per cycle of the spring for parameter sets of shape (n_parameters, n_sets), shape (n_sets,).
 
     The effects that change the spring (its deflection or its torque) are simulated on a bench that moves them slowly and
     sinusoidally; the last of four cycles is used. Damping and friction parallel to the spring are left out.
-
-    Raises
-    ------
-    InputError
-        If no effect changes the spring, or the amplitude is not positive.
     """
     effects = [e for e in structure.effects if e.spring is not None or e.deflection is not None]
     if not any(effect.spring is not None for effect in effects):
@@ -280,7 +239,7 @@ def saturation_level(effect: Effect) -> sp.Expr | None:
     return levels[0].xreplace({there: here for here, there in own.items()}) if len(levels) == 1 else None
 
 
-def _saturation(level: sp.Expr, own: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+def _saturation(level: sp.Expr, own: Mapping[str, Floats]) -> Floats:
     """Return the limit for values of the parameters, infinite if there is none."""
     reached = sp.lambdify([sp.Symbol(name, real=True) for name in own], level, "numpy")
     with np.errstate(all="ignore"):
@@ -302,7 +261,7 @@ def _in_words(saturation: Derived, total: str) -> str:
     )
 
 
-def _derived(name: str, unit: str, samples: NDArray[np.float64], determined: bool) -> Derived:
+def _derived(name: str, unit: str, samples: Floats, determined: bool) -> Derived:
     """Take the value from the first sample and the interval from the others."""
     if not determined:
         return Derived(name, unit, float(samples[0]), -np.inf, np.inf)

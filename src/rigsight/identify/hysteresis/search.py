@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
 from scipy.stats import qmc
 
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.records.record import Floats
 
 _APART = 0.1
 """Distance in the unit cube above which two ends of a search count as different."""
@@ -22,7 +23,7 @@ _EVENLY = 0.1
 _UNUSABLE = 1e100
 """Cost of a set that cannot be simulated; its square is still finite."""
 
-Cost = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Cost = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +35,11 @@ class SearchBox:
     """
 
     # Range of each coordinate, shape (n_free,).
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
+    lower: Floats
+    upper: Floats
 
     @classmethod
-    def around(cls, coordinates: Coordinates, center: NDArray[np.float64], spread: float) -> SearchBox:
+    def around(cls, coordinates: Coordinates, center: Floats, spread: float) -> SearchBox:
         """Take the declared range of a parameter if it has one, else a range around `center`."""
         structure = coordinates.structure
         of_rig = {p.name for p in structure.rig.parameters}
@@ -56,29 +57,10 @@ class SearchBox:
             lower[split.share], upper[split.share] = 0.0, whole * spread
         return cls(lower, upper)
 
-    def coordinates(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, places: Floats) -> Floats:
         """Return the search coordinates of points in the unit cube, both of shape (..., n_free)."""
         low, high = np.arcsinh(self.lower / _EVENLY), np.arcsinh(self.upper / _EVENLY)
         return np.asarray(_EVENLY * np.sinh(low + places * (high - low)))
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Ends of a global search, best first."""
-
-    coordinates: NDArray[np.float64]  # shape (n_ends, n_free)
-    costs: NDArray[np.float64]  # shape (n_ends,)
-    n_evaluations: int  # number of simulated parameter sets
-
-    @property
-    def usable(self) -> NDArray[np.float64]:
-        """Coordinates of the ends that can be simulated."""
-        usable = self.coordinates[self.costs < _UNUSABLE]
-        if usable.size == 0:
-            raise InputError(
-                "No parameter set in the search range can be simulated. Give better start values or a smaller spread."
-            )
-        return usable
 
 
 def search(
@@ -89,14 +71,14 @@ def search(
     n_generations: int = 100,
     n_sets: int = 96,
     n_ends: int = 8,
-    progress: Callable[[int], None] | None = None,
-) -> Found:
-    """Search the lowest cost over the whole box."""
+    progress: Callable[[int], None] = lambda _: None,
+) -> Floats:
+    """Search the lowest cost over the whole box; return the coordinates of its ends, best first, shape (n_ends, n_free)."""
     n_free = box.lower.size
-    seen: list[NDArray[np.float64]] = []
-    paid: list[NDArray[np.float64]] = []
+    seen: list[Floats] = []
+    paid: list[Floats] = []
 
-    def of_places(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of_places(places: Floats) -> Floats:
         sets = np.atleast_2d(places.T)
         costs = cost(box.coordinates(sets))
         usable = np.where(np.isfinite(costs), np.minimum(costs, _UNUSABLE), _UNUSABLE)
@@ -104,13 +86,10 @@ def search(
         paid.append(usable)
         return usable
 
-    generation = 0
+    generations = itertools.count(1)
 
     def count_generation(*_: object) -> None:
-        nonlocal generation
-        generation += 1
-        if progress is not None:
-            progress(generation)
+        progress(next(generations))
 
     # scipy's stubs do not know that a vectorized cost returns one value per column.
     vectorized: Any = of_places
@@ -132,15 +111,20 @@ def search(
     # The population ends in one basin, which may be wrong because the simulation is coarse; other basins were visited before.
     places, costs = np.concatenate(seen), np.concatenate(paid)
     kept = _different(places, costs, n_ends)
-    return Found(box.coordinates(places[kept]), costs[kept], costs.size)
+    usable = [place for place in kept if costs[place] < _UNUSABLE]
+    if not usable:
+        raise InputError(
+            "No parameter set in the search range can be simulated. Give better start values or a smaller spread."
+        )
+    return box.coordinates(places[usable])
 
 
-def _sobol(n_sets: int, n_free: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def _sobol(n_sets: int, n_free: int, rng: np.random.Generator) -> Floats:
     sampler = qmc.Sobol(n_free, rng=rng)
     return np.asarray(sampler.random_base2(int(np.ceil(np.log2(n_sets)))))[:n_sets]
 
 
-def _different(places: NDArray[np.float64], costs: NDArray[np.float64], most: int) -> list[int]:
+def _different(places: Floats, costs: Floats, most: int) -> list[int]:
     """Return the indices of the best points that differ from each other, best first."""
     kept: list[int] = []
     for i in np.argsort(costs):

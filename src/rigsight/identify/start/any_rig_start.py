@@ -9,30 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from rigsight.errors import InputError
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.first_states import rig_state
-from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.identify.fit.windows import pieces
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.start.linearized_responses import LinearizedResponses
-from rigsight.identify.start.place_scales import scales_at_places
+from rigsight.identify.start.scales import scales_at_places
 from rigsight.identify.start.spread_search import AGREEING, PERSISTENT, balanced, ends_of_search
 from rigsight.identify.start.weak_equations import WeakEquations
 from rigsight.identify.typical_size import size_of_signal
 from rigsight.parameters import Parameter
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, parameter_vector
 from rigsight.simulate.prescribed_motion import smooth_motion
-
-Floats = NDArray[np.float64]
 
 _SEED = 0
 """Fixed, so that the same records give the same start."""
@@ -186,14 +183,11 @@ class _Rough:
         return explained, self._fitted(1, values, scales)
 
     def _fitted(self, count: int, start: Mapping[str, float], scales: Mapping[str, float]) -> FitResult:
-        pieces = []
-        for record in self._records:
-            edges = np.unique(np.linspace(0, record.n_samples, count + 1).astype(int))
-            pieces += [record.slice(int(a), int(b)) for a, b in pairwise(edges)]
+        fitted = [piece for record in self._records for piece in pieces(record, count)]
         # Each piece has its own initial state, so only some of many are used.
         if count > 1:
-            pieces = pieces[:: max(1, -(-len(pieces) // _MOST_PIECES))]
-        problem = GreyBoxFit(compose(self._rig), pieces, scales, self._noise)
+            fitted = fitted[:: max(1, -(-len(fitted) // _MOST_PIECES))]
+        problem = GreyBoxFit(compose(self._rig), fitted, scales, self._noise)
         reported = _reported(problem.information(start, self._free), self._free)
         return problem.fit(
             start, reported, None, _ROUGH_EVALUATIONS, tolerance=_ROUGH_TOLERANCE, finish=False

@@ -20,11 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.rig_equations import RigEquations
-from rigsight.identify.start.projection import SIGNIFICANT_POWER
-from rigsight.records.record import Record
+from rigsight.identify.start.measured_states import SIGNIFICANT_POWER
+from rigsight.records.record import Floats, Record
 from rigsight.simulate.equations.structure import input_symbols
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 USABLE_BAND = 0.8
@@ -50,20 +49,9 @@ class _Lines:
 
 
 class LinearizedResponses:
-    """The error of the spectra of records as a function of a rig's parameters.
+    """The error of the spectra of records as a function of a rig's free parameters, the values of all others being known.
 
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    records
-        Estimation records.
-    values
-        Value of each known constant and parameter.
-    free
-        Names of the unknown parameters.
-    middle
-        States about which the rig moves in each record, shape (n_states,) each.
+    The rig moves about the states `middle` in each record, shape (n_states,) each.
     """
 
     def __init__(
@@ -147,10 +135,7 @@ class LinearizedResponses:
 def _lines(equations: RigEquations, record: Record, p: Floats, most: int) -> _Lines:
     n_samples = record.n_samples
     omega: Floats = 2.0 * np.pi * np.asarray(np.fft.rfftfreq(n_samples, record.dt)[1:], dtype=np.float64)
-    held = record.hold == "foh", record.hold == "zoh"
-    phase = omega * record.dt / 2.0
-    sinc = np.sin(phase) / phase
-    hold = sinc**2 if held[0] else sinc * np.exp(-1j * phase) if held[1] else np.ones_like(omega)
+    hold = response_of_hold(record, omega)
     u = equations.inputs_of(record)[1]
     mean = np.zeros(u.shape[0])
     mean[0::3] = np.mean(u[0::3], axis=1)
@@ -169,6 +154,15 @@ def _lines(equations: RigEquations, record: Record, p: Floats, most: int) -> _Li
     kept = kept[:: max(1, kept.size // most)]
     weights = 1.0 / np.sqrt(floor + _RELATIVE_ERROR**2 * power[:, kept])
     return _Lines(omega[kept], inputs[:, kept], shown[:, kept], weights, seen, p, mean)
+
+
+def response_of_hold(record: Record, omega: Floats) -> Complexes:
+    """Return the frequency response of the hold of a record's input, shape (n_lines,)."""
+    phase = omega * record.dt / 2.0
+    sinc = np.sin(phase) / phase
+    if record.hold == "zoh":
+        return np.asarray(sinc * np.exp(-1j * phase))
+    return np.asarray(sinc**2 if record.hold == "foh" else np.ones_like(omega), dtype=np.complex128)
 
 
 def _spectrum(signal: Floats) -> Complexes:

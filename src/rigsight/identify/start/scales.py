@@ -1,4 +1,7 @@
-"""Characteristic size of each base quantity in a campaign, as units of searches."""
+"""Characteristic size of each base quantity in a campaign, as units of searches.
+
+For any rig they follow from its motion in the records according to its equations, so they do not depend on which sensors exist.
+"""
 
 from __future__ import annotations
 
@@ -6,34 +9,198 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigsight.identify.start.place_scales import scales_at_places
-from rigsight.identify.typical_size import typical_size
+from rigsight.errors import SimulationError
+from rigsight.identify.fit.first_states import rig_state
+from rigsight.identify.fit.windows import pieces
+from rigsight.identify.rig_equations import RigEquations, equations_of
+from rigsight.identify.typical_size import size_about_zero, size_of_signal, typical_size
 from rigsight.records.plausibility import is_constant
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig, evaluated
+from rigsight.simulate import simulate_outputs
 from rigsight.simulate.prescribed_motion import smooth_motion
+from rigsight.units import size_of
+
+_ACCURACY = 1e-4
+"""Relative accuracy of the simulation, more than sufficient for sizes."""
+_PIECES = (1, 20)
+"""Numbers of pieces into which a record is cut, in turn, until the motion can be simulated and has about the measured size. Each
+piece starts from the measured state, because an unstable or drifting rig leaves the measured motion after some time."""
+_BEYOND = 3.0
+"""Largest ratio of simulated to measured motion; a rig with estimated parameters at its resonance stays below."""
+
+
+def simulated_motion(
+    equations: RigEquations, record: Record, values: Mapping[str, float]
+) -> tuple[Floats, Floats]:
+    """Return states and inputs with their derivatives in a record according to a rig's equations, by rows."""
+    u = equations.inputs_of(record)[1]
+    found: Floats | None = None
+    for count in _PIECES:
+        try:
+            own = [_states(equations, piece, values) for piece in pieces(record, count)]
+        except SimulationError:
+            continue
+        found = np.concatenate(own, axis=1)
+        if _within_reach(equations, record, values, found, u):
+            break
+    if found is None:
+        # Used if the motion cannot be simulated.
+        found = np.repeat(rig_state(equations, record, values)[:, None], record.n_samples, axis=1)
+    return found, u
+
+
+def _states(equations: RigEquations, record: Record, values: Mapping[str, float]) -> Floats:
+    structure = equations.structure
+    held, p = equations.inputs_of(record)[0], equations.parameters(values, record)
+    start = rig_state(equations, record, values)
+    out = simulate_outputs(structure, held, p, start, record.n_samples, _ACCURACY)
+    return out[:, len(equations.sensor_names) :].T
+
+
+def _within_reach(
+    equations: RigEquations, record: Record, values: Mapping[str, float], z: Floats, u: Floats
+) -> bool:
+    """Return True if no simulated reading has a much larger range than the measured one."""
+    shown = equations.readings(z, u, equations.parameters(values, record))
+    return all(
+        np.ptp(reading) <= _BEYOND * np.ptp(record[name]) or np.ptp(record[name]) == 0.0
+        for name, reading in zip(equations.sensor_names, shown, strict=True)
+        if name in record
+    )
+
+
+_Signals = Mapping[str, list[Floats]]
+
+_LEAST_SHARE = 1e-3
+"""Share of the value at which a parameter is as important as any other term. A parameter below this share gets this size, because
+steps relative to its value would be lost in rounding."""
+_UNKNOWN = 1.0
+"""Size of a quantity that is zero everywhere."""
+
+
+def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:
+    """Return the size of each base quantity at each place of a rig, and of each of its parameters and states."""
+    equations = equations_of(rig)
+    signals: dict[str, list[Floats]] = {}
+    own_sizes: list[Floats] = []
+    for record in records:
+        found, own_size = _in_record(equations, record, values)
+        own_sizes.append(own_size)
+        for name, samples in found.items():
+            signals.setdefault(name, []).append(samples)
+    scales: dict[str, float] = {}
+    joints = {joint.name: _of_joint(joint.name, signals) for joint in rig.mechanism.joints}
+    first = next(
+        iter(joints.values()), {"x": _UNKNOWN, "force": _UNKNOWN, "drive": _UNKNOWN, "time": _UNKNOWN}
+    )
+    sources = [size_of_signal(signals[f"input {s.name}"]) for s in rig.inputs]
+    own_states = [f"value {state.name}" for state in rig.mechanism.states]
+    length = size_of_signal(signals[own_states[0]]) if own_states else _UNKNOWN
+    plain = {**first, "input": next(iter(sources), 0.0) or _UNKNOWN, "length": length or _UNKNOWN}
+    places: dict[str, dict[str, float]] = {name: {**plain, **sizes} for name, sizes in joints.items()}
+    for drive in rig.mechanism.drives:
+        moved = next((name for name in joints if f"{drive.name}>{name}" in signals), None)
+        own = {
+            "input": size_of_signal(signals[f"signal@{drive.name}"]),
+            "drive": size_of_signal(signals[f"force@{drive.name}"]),
+        }
+        places[drive.name] = {**plain, **(joints[moved] if moved else {}), **_not_zero(own)}
+    for name in [*(s.name for s in rig.mechanism.states), *equations.sensor_names]:
+        key = f"reading@{name}" if name in equations.sensor_names else f"value {name}"
+        slope = f"slope@{name}" if name in equations.sensor_names else f"change {name}"
+        x = size_of_signal(signals[key])
+        places[name] = {**plain, **_not_zero({"x": x, "time": _over(x, size_about_zero(signals[slope]))})}
+    scales |= plain
+    for place, sizes in places.items():
+        scales |= {f"{base}@{place}": size for base, size in sizes.items()}
+    for name in equations.state_names:
+        scales[size_of(name)] = size_of_signal(signals[f"value {name}"]) or _UNKNOWN
+    numbers = equations.parameters(values, records[0])
+    for name, number, role in zip(equations.structure.names, numbers, np.min(own_sizes, axis=0), strict=True):
+        least = _LEAST_SHARE * role if np.isfinite(role) else 0.0
+        scales[size_of(name)] = float(max(abs(number), least)) or _UNKNOWN
+    return scales
+
+
+def _in_record(
+    equations: RigEquations, record: Record, values: Mapping[str, float]
+) -> tuple[dict[str, Floats], Floats]:
+    """Return motions and forces at each place in a record, and the size at which each parameter matters."""
+    z, u = simulated_motion(equations, record, values)
+    p, n = equations.parameters(values, record), equations.n_coordinates
+    rates = equations.rates(z, u, p)
+    accelerations = rates[n : 2 * n]
+    found = equations.at_places(z, u, p)
+    found |= {f"value {name}": row for name, row in zip(equations.state_names, z, strict=True)}
+    found |= {f"change {name}": row for name, row in zip(equations.state_names, rates, strict=True)}
+    found |= {f"input {s.name}": record[s.name] for s in equations.rig.inputs}
+    shown, slopes = equations.readings(z, u, p), equations.reading_slopes(z, u, p)
+    for name, reading, slope in zip(equations.sensor_names, shown, slopes, strict=True):
+        found |= {f"reading@{name}": record.signals.get(name, reading), f"slope@{name}": slope}
+    found |= _inertial(equations, z, u, p, record.dt, found)
+    return found, _own_sizes(equations, z, u, p, accelerations)
+
+
+def _inertial(
+    equations: RigEquations, z: Floats, u: Floats, p: Floats, dt: float, found: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    """Return the inertial force along each joint, and the force there with the same acceleration as each drive (``D>J``)."""
+    mechanism, along = equations.rig.mechanism, equations.slopes_along(z, u, p)
+    own: dict[str, Floats] = {}
+    if equations.n_coordinates == 0 or z.shape[1] < 2:
+        return own
+    mobility = np.linalg.pinv(equations.mass(z, u, p))
+    for joint in mechanism.joints:
+        slopes = along[joint.name]
+        if not np.any(slopes):
+            continue
+        inertia = 1.0 / np.einsum("ik,kij,jk->k", slopes, mobility, slopes)
+        own[f"inertia@{joint.name}"] = inertia * np.gradient(found[f"rate@{joint.name}"], dt)
+        for drive in mechanism.drives:
+            share = inertia * np.einsum("ik,kij,jk->k", slopes, mobility, along[drive.name])
+            if np.any(share):
+                own[f"{drive.name}>{joint.name}"] = share * found[f"force@{drive.name}"]
+    return own
+
+
+def _of_joint(name: str, signals: _Signals) -> dict[str, float]:
+    x = size_of_signal(signals[f"motion@{name}"])
+    driven = [key for key in signals if key.endswith(f">{name}")]
+    keys = [f"inertia@{name}", f"spring@{name}", f"damper@{name}", f"own@{name}", *driven]
+    drive = max(size_of_signal(signals[key]) for key in keys if key in signals)
+    force = size_of_signal(signals[f"spring@{name}"]) or drive
+    time = _over(x, size_about_zero(signals[f"rate@{name}"]))
+    return _not_zero({"x": x, "force": force, "drive": drive, "time": time})
+
+
+def _own_sizes(equations: RigEquations, z: Floats, u: Floats, p: Floats, accelerations: Floats) -> Floats:
+    """Return the size at which each parameter matters as much as the largest part of an equation, shape (n_parameters,)."""
+    largest, changes = equations.changes_of_equations(z, u, p, accelerations)
+    size = np.sqrt(np.mean(largest**2, axis=1))[:, None]
+    change = np.sqrt(np.mean(changes**2, axis=2))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.where((change > 0.0) & (size > 0.0), size / change, np.inf)
+    return np.asarray(np.nanmin(np.where(np.isfinite(own), own, np.inf), axis=0))
+
+
+def _over(x: float, rate: float) -> float:
+    return x / rate if rate > 0.0 else 0.0
+
+
+def _not_zero(sizes: Mapping[str, float]) -> dict[str, float]:
+    return {base: size or _UNKNOWN for base, size in sizes.items()}
 
 
 def characteristic_scales(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the size of each base quantity of `rigsight.units` in these records.
+    """Return the size of each base quantity of `rigsight.units` in these records, for constants and parameters by name.
 
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        Estimation records.
-    values
-        Constants and identified parameters of the rig, by name.
-
-    Returns
-    -------
     ``x`` displacement, ``input``, ``drive`` (force of the drive), ``force`` (of the spring), ``time`` [s] (reciprocal of the
-    angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 if there is none), each without a place
-    and at every joint, drive, sensor and state (``force@shaft``); for a rig with more than one motion also ``size@NAME`` for each
-    of its parameters, coordinates, rates (``size@d(NAME)``) and states.
+    angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 if there is none), each without a
+    place and at every joint, drive, sensor and state (``force@shaft``); for a rig with more than one motion also
+    ``size@NAME`` for each of its parameters, coordinates, rates (``size@d(NAME)``) and states.
     """
     if not rig.has_one_motion:
         return scales_at_places(rig, records, values)

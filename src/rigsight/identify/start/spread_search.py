@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.parameters import Parameter
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _SPREADS = (1.5, 4.0)
 """Standard deviations of the starts in natural logarithms, in turn: parameters of comparable terms differ from their expected
@@ -45,8 +44,7 @@ class SearchSpace:
     """Coordinates of unknown parameters: logarithms of those with one sign, others in units of their size."""
 
     parameters: tuple[Parameter, ...]  # the unknown parameters
-    # The expected value of each, or the expected size of one that may have either sign, shape
-    # (n_parameters,).
+    # The expected value of each, or the expected size of one that may have either sign, shape (n_parameters,).
     expected: Floats
 
     @property
@@ -81,8 +79,7 @@ class SearchSpace:
 
 
 def balanced(
-    parameters: Sequence[Parameter],
-    terms: Callable[[Floats], Sequence[tuple[int, float, Floats]]],
+    parameters: Sequence[Parameter], terms: Callable[[Floats], Sequence[tuple[int, float, Floats]]]
 ) -> SearchSpace:
     """Return a space about the values at which the terms of each equation have equal size, as far as that is possible."""
     prior = np.array([np.log(abs(p.default)) if p.default else 0.0 for p in parameters])
@@ -112,10 +109,7 @@ def balanced(
 
 
 def ends_of_search(
-    space: SearchSpace,
-    errors: Callable[[Floats], Floats],
-    rng: np.random.Generator,
-    agreeing: int = AGREEING,
+    space: SearchSpace, errors: Callable[[Floats], Floats], rng: np.random.Generator, agreeing: int = AGREEING
 ) -> list[tuple[float, Floats]]:
     """Return the local minima of a sum of squared errors reached from many starts, lowest first: cost and parameter values."""
     first = space.start()

@@ -26,19 +26,19 @@ from numpy.typing import NDArray
 from rigsight.identify.rig_equations import FUNCTIONS, RigEquations, rows_of
 from rigsight.identify.start.measured_states import (
     MeasuredStates,
+    Projection,
     measured_states,
+    projected,
     sensor_factors,
     supposed_states,
 )
-from rigsight.identify.start.projection import Projection, projected
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate.equations.structure import input_symbols
 
 _MOST_FACTORS = 6
 """Largest power that is expanded; energies contain squares, and potentials somewhat higher powers."""
 
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _MOST_POINTS = 400
@@ -64,8 +64,7 @@ class _Block:
     omega: Floats  # angular frequencies [rad/s], shape (n_points,)
     terms: Complexes  # projected signals of the terms, shape (n_terms, n_points)
     squares: Floats  # their squared absolute values
-    # Derivatives of the terms by coordinates and own states, for each power of ``j omega``: (n_terms, 3,
-    # n_states').
+    # Derivatives of the terms by coordinates and own states, for each power of ``j omega``: (n_terms, 3, n_states').
     slopes: Floats
     # Square root of the covariance of coordinates and own states, shape (n_points, n_states', n_sensors).
     noise: Complexes
@@ -77,23 +76,9 @@ class _Block:
 
 
 class WeakEquations:
-    """The error of a rig's equations in records as a function of its parameters.
+    """The error of a rig's equations in records as a function of its free parameters, the values of all others being known.
 
-    Parameters
-    ----------
-    equations
-        Equations of the rig.
-    records
-        Estimation records; those that do not show all states are not used here.
-    values
-        Value of each known constant and parameter.
-    free
-        Names of the unknown parameters.
-
-    Attributes
-    ----------
-    n_records
-        Number of records that show all states; if zero, only `term_sizes` is meaningful.
+    Records that do not show all states are not used here; if none does (`n_records` is zero), only `term_sizes` is meaningful.
     """
 
     def __init__(

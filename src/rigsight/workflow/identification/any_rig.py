@@ -9,9 +9,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.absent_spring import with_weighed_spring
-from rigsight.diagnose.fitting.windows import cut, window_length
+from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.identify import (
     FitResult,
@@ -23,6 +21,7 @@ from rigsight.identify import (
     swallowed_by_offsets,
 )
 from rigsight.identify.amplitude_dependence import amplitude_dependence, measured_amplitude
+from rigsight.identify.fit.windows import cut, window_length
 from rigsight.identify.identifiability import helpful_sensors, identifiability, relative_errors
 from rigsight.identify.identification import (
     Identification,
@@ -30,7 +29,7 @@ from rigsight.identify.identification import (
     PathIdentification,
     RecordIdentification,
 )
-from rigsight.identify.information import Information, information
+from rigsight.identify.information import Information, information, reached_bounds
 from rigsight.identify.linear_view import (
     LinearView,
     by_constants,
@@ -39,7 +38,6 @@ from rigsight.identify.linear_view import (
     measured_responses,
     near_rest,
 )
-from rigsight.identify.reached_bounds import reached_bounds
 from rigsight.identify.record_identification import EstimationOptions
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN

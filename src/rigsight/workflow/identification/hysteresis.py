@@ -12,7 +12,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect, Place
 from rigsight.errors import InputError
 from rigsight.identify import FitResult, GreyBoxFit, calibrate_to_records, characteristic_scales
-from rigsight.identify.hysteresis.parameters import free_parameters, special_structure
+from rigsight.identify.hysteresis.calibration import free_parameters, special_structure
 from rigsight.identify.identification import EffectScore, HysteresisIdentification, Identification
 from rigsight.metrics import nrmse
 from rigsight.records import Record

@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import cut
 from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
 from rigsight.identify.amplitude_dependence import measured_amplitude
+from rigsight.identify.fit.windows import cut
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
-from rigsight.identify.information import information
+from rigsight.identify.information import ReachedBound, information, reached_bounds
 from rigsight.identify.joint import JointFit
-from rigsight.identify.reached_bounds import ReachedBound, reached_bounds
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.metrics import nrmse

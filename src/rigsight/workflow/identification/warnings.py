@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.windows import cut
 from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.identify.fit.windows import cut
 from rigsight.identify.identification import JointIdentification, RecordIdentification
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.transfer.record_response import driven_band

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, liveliest
-from rigsight.diagnose.fitting.windows import Windowing
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
+from rigsight.identify.fit.windows import Windowing, liveliest
 from rigsight.rigs import AXIS
 
 from ..test_sensitive_motion import NOISE, RIG, measured
@@ -25,9 +26,9 @@ def benches() -> tuple[FitContext, FitContext]:
     """The bench of whole records, and that of windows of four cycles."""
     records = measured([effect.name for effect in PAIR], {"g": 1.35e-4, "u_0": 0.1}, 3000)
     made = []
-    for windowing in (Windowing(), Windowing.by_cycles({"x": NOISE})):
+    for windowing in (Windowing(), Windowing(cycles=VERDICT.window_cycles, noise={"x": NOISE})):
         fitted, scored = windowing.cut(records[:2]), windowing.cut(records[2:])
-        look = liveliest(fitted, AXIS)
+        look = liveliest(fitted, AXIS, 8000)
         scales = characteristic_scales(AXIS, records, RIG)
         made.append(
             FitContext(AXIS, fitted, scored, look, scales, {"x": NOISE}, frozenset({"gain"}), start=RIG)

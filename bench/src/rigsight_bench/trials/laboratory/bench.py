@@ -11,10 +11,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.effects import Effect, effect_named, kind_of, placed
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, characteristic_scales
+from rigsight.identify.fit.windows import cut, window_length
 from rigsight.identify.typical_size import typical_size
 from rigsight.records import Record
 from rigsight.rigs import Rig, evaluated

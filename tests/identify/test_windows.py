@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.windows import Windowing, cut, readings, window_length
 from rigsight.excitation import linear_sweep
+from rigsight.identify.fit.windows import Windowing, cut, readings, window_length
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 
@@ -102,7 +102,7 @@ def swept(n_samples: int = 8000, quiet: int = 500) -> Record:
 
 def test_windows_of_cycles_join_to_the_record_and_hold_as_many_cycles_each() -> None:
     record = swept()
-    windows = Windowing.by_cycles({"x": 1e-3}).cut([record])
+    windows = Windowing(cycles=4, noise={"x": 1e-3}).cut([record])
     np.testing.assert_array_equal(np.concatenate([w["x"] for w in windows]), record["x"])
     cycles = [np.count_nonzero((w["x"][:-1] < 0.0) & (w["x"][1:] >= 0.0)) for w in windows[1:-1]]
     assert len(cycles) > 10
@@ -112,14 +112,14 @@ def test_windows_of_cycles_join_to_the_record_and_hold_as_many_cycles_each() -> 
 
 
 def test_windows_of_cycles_are_long_enough_to_fit_an_initial_state() -> None:
-    windows = Windowing.by_cycles({"x": 1e-3}).cut([swept(2000, quiet=0)])
+    windows = Windowing(cycles=4, noise={"x": 1e-3}).cut([swept(2000, quiet=0)])
     assert min(w.n_samples for w in windows) >= 60
 
 
 def test_noise_makes_no_cycles() -> None:
     rng = np.random.default_rng(0)
     record = Record("rest", DT, {"x": 1e-3 * rng.standard_normal(4000)}, {"x": "m"})
-    assert len(Windowing.by_cycles({"x": 1e-3}).cut([record])) < 4
+    assert len(Windowing(cycles=4, noise={"x": 1e-3}).cut([record])) < 4
 
 
 def test_without_length_and_cycles_records_stay_whole() -> None:
@@ -133,7 +133,7 @@ def test_without_length_and_cycles_records_stay_whole() -> None:
 def test_cycles_are_those_of_a_sensor_that_the_record_holds() -> None:
     record = swept()
     named = replace(record, signals={"load": record["x"]})
-    windows = Windowing.by_cycles({"x": 1e-3, "load": 1e-3}).cut([record, named])
+    windows = Windowing(cycles=4, noise={"x": 1e-3, "load": 1e-3}).cut([record, named])
     assert [w.n_samples for w in windows[: len(windows) // 2]] == [
         w.n_samples for w in windows[len(windows) // 2 :]
     ]

@@ -1,4 +1,4 @@
-"""Parameters that a free motion leaves undetermined: inertias and forces are known only up to a common factor.
+"""Which parameters must fits hold: one of those that a free motion leaves open, and the spring that an axis is given without?
 
 If no input moves and no known constant is involved, all inertias, stiffnesses, dampings and forces can be multiplied by one
 factor without changing the motion. One of them is then held, so that the fit does not drift along that direction.
@@ -6,18 +6,27 @@ factor without changing the motion. One of them is then held, so that the fit do
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from rigsight.effects import Effect
+from rigsight.errors import InputError, SimulationError
+from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.identify.fit.windows import cut, window_length
+from rigsight.identify.linear_view import longest_free_run
 from rigsight.identify.rig_equations import equations_of
+from rigsight.identify.start.linear_start import linear_start
+from rigsight.identify.start.scales import characteristic_scales
 from rigsight.identify.undetermined import listed
 from rigsight.parameters import Parameter
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 from rigsight.rigs.reading.dimensions import UnitError, dimension
+from rigsight.simulate import compose
 
 _DRAWS = 3
 """Number of random points at which the equations are compared; different expressions do not agree there by chance."""
@@ -28,27 +37,13 @@ _MASS = "[mass]"
 
 @dataclass(frozen=True)
 class OpenFactor:
-    """Parameters that records determine only up to a common factor, and the one that is held.
+    """Parameters that records determine only up to a common factor, and the one that is held."""
 
-    Attributes
-    ----------
-    names
-        All of them, including the one that is held.
-    held
-        Name of the one that is held.
-    value
-        Its value [SI].
-    unit
-        Its unit.
-    is_given
-        Whether the value was given; otherwise it is the default of the rig, or one.
-    """
-
-    names: tuple[str, ...]
-    held: str
-    value: float
+    names: tuple[str, ...]  # all of them, including the one that is held
+    held: str  # name of the one that is held
+    value: float  # its value [SI]
     unit: str
-    is_given: bool
+    is_given: bool  # whether the value was given; otherwise it is the default of the rig, or one
 
     @property
     def sentence(self) -> str:
@@ -66,16 +61,7 @@ def open_factor(
 ) -> OpenFactor | None:
     """Return the parameters that records of a free motion determine only up to a common factor, None if the factor is determined.
 
-    Parameters
-    ----------
-    rig
-        The rig.
-    records
-        The fitted records.
-    constants
-        The rig's constants by name.
-    given
-        Parameters with a known or assumed value; one of them is held if it is among the undetermined ones.
+    Of those with a given value one is held.
     """
     if not rig.is_driven or any(not is_constant(r[s.name]) for r in records for s in rig.inputs):
         return None
@@ -131,3 +117,64 @@ def _rest_makes_up(rig: Rig, records: Sequence[Record]) -> bool:
     moved = {str(symbol) for symbol in rig.motion.rest.free_symbols | rig.motion.bias.free_symbols}
     levels = {round(float(record[rig.inputs[0].name][0]), 12) for record in records}
     return bool(free & moved) and len(levels) == 1
+
+
+_CLEARLY = 5.0
+"""Standard errors from zero at which the stiffness is significant; large, because the residual is not white."""
+_LEAVES = 0.9
+"""Largest error with a spring, relative to that without, that contradicts a given stiffness of zero: other missing effects seem
+like a weak spring, and lower the error less."""
+
+
+def weighed_spring(
+    rig: Rig,
+    records: Sequence[Record],
+    constants: Mapping[str, float],
+    given: Mapping[str, float],
+    modelled: Sequence[Effect],
+    stiffness: str,
+    held: Mapping[str, float],
+) -> tuple[bool, str] | None:
+    """Return whether the records of an axis show an absent spring, and a note; None if they cannot be fitted.
+
+    A stiffness of zero that is given states that there is no spring. It is fitted to windows of the records, beside the same fit
+    with zero: if it differs from zero beyond its error and lowers the error, the records contradict the statement.
+    """
+    known = {**held, **{symbol.name: 0.0 for symbol in rig.motion.rest.free_symbols}}
+    try:
+        start = {**constants, **linear_start(rig, records, constants, known)}
+    except InputError:
+        return None
+    start = {**start, **given, stiffness: start[stiffness]} if modelled else start
+    motion = rig.motion
+    assert motion.inertia is not None
+    equation = [evaluated(part, start) for part in (motion.inertia, motion.damping, motion.stiffness)]
+    limit = longest_free_run(np.roots(equation).astype(np.complex128), records)
+    length = min(window_length(rig, records), limit or np.inf)
+    windows, structure = cut(records, length), compose(rig, modelled)
+    sizes = {
+        s.name: max(float(np.std(np.concatenate([r[s.name] for r in records]))), 1e-300) for s in rig.outputs
+    }
+    problem = GreyBoxFit(structure, windows, characteristic_scales(rig, records, start), sizes)
+    free = [p.name for p in rig.parameters if p.name not in known]
+    try:
+        without = problem.fit({**start, stiffness: 0.0}, [n for n in free if n != stiffness])
+        fits = [problem.fit({**found, **known}, free) for found in (start, without.values)]
+    except SimulationError:
+        return None
+    sprung = min(fits, key=lambda fit: fit.cost)
+    value, std = sprung.values[stiffness], sprung.standard_errors[stiffness]
+    unit = next(p.unit for p in rig.parameters if p.name == stiffness)
+    share = math.sqrt(sprung.cost / max(without.cost, 1e-300))
+    found = abs(value) > _CLEARLY * std and share < _LEAVES
+    done = (
+        f"fits estimate {stiffness}, the given simulation keeps 0"
+        if found
+        else f"{stiffness} = 0 is held in all fits"
+    )
+    note = (
+        f"{stiffness} = 0 stands for no spring. Estimated from windows of {length:.3g} s, "
+        f"{stiffness} is {value:.3g} +/- {std:.2g} {unit} "
+        f"and leaves {share:.2f} times the error without a spring: {done}."
+    )
+    return found, note

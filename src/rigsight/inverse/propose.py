@@ -1,0 +1,102 @@
+"""The missing force first: which families of effects at which places explain what the equations leave along the measured motion.
+
+The equations of motion are a regression along the motion that the sensors show: their numbers and those of the effects are linear
+in it or tried on a grid, so its optimum is global and nothing is simulated. Families are taken one by one, the one first that
+removes most of the residual of stretches that it was not fitted to. It proposes; fits of the simulation decide.
+
+References
+----------
+J. Swevers, W. Verdonck and J. De Schutter, IEEE Control Systems 27 (2007) 58, for inverse dynamics as a regression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.campaign import Campaign
+from rigsight.effects import Effect
+from rigsight.errors import SimulationError
+from rigsight.identify import characteristic_scales
+from rigsight.inverse.effect_terms import EffectTerms, is_joint_force
+from rigsight.inverse.equation_fit import (
+    EquationFit,
+    held_numbers,
+    matters,
+    of_undriven,
+    record_motions,
+    with_all_inputs,
+)
+from rigsight.inverse.missing_force import missing_forces, noise_of_rows
+from rigsight.inverse.proposal import Proposal, Selection
+
+
+def propose(
+    campaign: Campaign,
+    known: Mapping[str, float],
+    effects: Sequence[Effect],
+    noise: Mapping[str, float] | None = None,
+) -> Proposal | None:
+    """Return the families that explain what the equations of a campaign leave of its estimation records.
+
+    None where the sensors do not show the motion, another program simulates the bodies, or the given simulation has an effect
+    that is no force at a joint.
+
+    Parameters
+    ----------
+    campaign
+        Records and rig.
+    known
+        Constants and parameters of the rig and of the modelled effects; those of the drives set the scale of all forces.
+    effects
+        Candidates at their places.
+    noise
+        Standard deviation of the noise of each sensor; it weighs the joints of a rig against each other.
+    """
+    terms_of = along_motion(campaign, known)
+    if terms_of is None:
+        return None
+    fit, values = terms_of.fit, terms_of.values
+    terms = [term for effect in effects for term in terms_of.of(effect)]
+    covariance = noise_of_rows(fit, values, noise or {})
+    by_noise = None
+    if covariance is not None:
+        by_noise = min(1.0, float(np.mean(np.diag(covariance) / fit.rms(values) ** 2)))
+    found = (
+        Selection(fit, values, terms).proposal(campaign.rig)
+        if terms
+        else Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
+    )
+    return replace(found, noise=by_noise, forces=missing_forces(fit, values, covariance))
+
+
+def along_motion(campaign: Campaign, known: Mapping[str, float]) -> EffectTerms | None:
+    """Return effects as terms of the equations along the motion of the estimation records; None as for `propose`."""
+    rig = campaign.rig
+    if rig.mechanism.bodies is not None or not all(map(is_joint_force, campaign.modelled)):
+        return None
+    try:
+        fit, values = _fitted(campaign, known)
+    except SimulationError:
+        return None
+    own = {p.name: values[p.name] for p in (*rig.constants, *rig.parameters)}
+    records = [with_all_inputs(rig, record) for record in campaign.estimation]
+    return EffectTerms(fit, values, characteristic_scales(rig, records, own))
+
+
+def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit, dict[str, float]]:
+    rig = campaign.rig
+    held = held_numbers(rig) | ({campaign.absent_spring} if campaign.absent_spring else set())
+    start = {p.name: p.default if p.default is not None else 1.0 for p in rig.parameters}
+    start |= {**campaign.constants, **known}
+    motions = record_motions(rig, campaign.estimation, start)
+    held |= of_undriven(motions, start)
+    free = tuple(p.name for p in rig.parameters if p.name not in held and matters(motions, start, p.name))
+    # A constant force and the rest of a spring do the same: the rest stays where it is known.
+    of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
+    ordered = sorted(free, key=lambda name: name in of_rest)
+    fit = EquationFit(rig, motions, campaign.modelled, ordered)
+    fit = EquationFit(rig, motions, campaign.modelled, fit.independent(start))
+    return fit, fit.settled(start)[0]
