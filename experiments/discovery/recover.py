@@ -20,7 +20,7 @@ from rich.console import Console
 from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep, multisine, multisine_lines
 from rigsight.records import Record
-from rigsight.report.discovery import discovery_summary
+from rigsight.report.terminal import discovery_summary
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import compose, simulate

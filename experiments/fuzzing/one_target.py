@@ -19,7 +19,7 @@ _INSTRUMENTED = [
     "rigsight.workflow.inspect",
     "rigsight.workflow.own.effect_declaration",
     "rigsight.workflow.own.own_effects",
-    "rigsight.workflow.run.json_file",
+    "rigsight.workflow.campaign.model_file",
 ]
 if sys.argv[1] == "campaign.toml":
     _INSTRUMENTED.append("tomllib")

@@ -66,34 +66,7 @@ _HOMES = {
 }
 """Public name -> module that defines it."""
 
-__all__ = [
-    "CATALOGUE",
-    "Campaign",
-    "ColumnMapping",
-    "ComparisonResult",
-    "Diagnoser",
-    "DiagnosisResult",
-    "DiscoveryResult",
-    "Effect",
-    "EquationDiscoverer",
-    "IdentificationResult",
-    "InputError",
-    "LinearIdentifier",
-    "Model",
-    "Record",
-    "Rig",
-    "RigsightError",
-    "SimulationError",
-    "compare_models",
-    "example_campaign",
-    "make_campaign",
-    "make_model",
-    "own_effects",
-    "read_campaign",
-    "read_model",
-    "read_record",
-    "simulate_model",
-]
+__all__ = sorted(_HOMES)
 
 # Type checkers read the imports above, so that they report a name that does not exist.
 if not TYPE_CHECKING:

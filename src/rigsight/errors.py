@@ -15,7 +15,7 @@ _UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 class RigsightError(Exception):
-    """Root of all errors that are told to the user as one message, without a traceback."""
+    """Root of all errors that are reported to the user as one message, without a traceback."""
 
     def __str__(self) -> str:
         text = super().__str__()

@@ -16,8 +16,7 @@ from pathlib import Path
 import pytest
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.workflow.run.progress import Stage
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import Stage, listening
 from rigsight.workflow.run.results import write_together
 
 RIGSIGHT = Path(sys.executable).with_name("rigsight")
@@ -254,7 +253,10 @@ def test_a_bench_that_is_interrupted_goes_on_and_its_settings_are_no_results(
         write_together(tmp_path / "bench" / "keys", {"settings.json": "{}"})
         raise KeyboardInterrupt
 
-    with pytest.raises(SystemExit), report_errors(debug=False, left="the same command continues from here"):
+    with (
+        pytest.raises(SystemExit),
+        report_errors(debug=False, outcome="the same command continues from here"),
+    ):
         interrupted()
     assert capsys.readouterr().err == "rigsight: interrupted; the same command continues from here.\n"
 

@@ -15,7 +15,7 @@ from rigsight.errors import InputError, SimulationError
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records.record import Record
-from rigsight.report.discovery import discovery_rows
+from rigsight.report.terminal import discovery_rows
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report.drawing.charts import (
+from rigsight.report.figures import (
     ChartPanel,
     Curve,
     chart_data,

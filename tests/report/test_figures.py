@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from rigsight.plot.drawing import new_figure
-from rigsight.report.drawing.figures import page_figure
+from rigsight.report.figures import page_figure
 
 
 def drawn(key: str = "figure-a") -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report.drawing.loop_figures import loop_figures
+from rigsight.report.figures import loop_figures
 
 
 def sine_trace(n_periods: int, worst: int) -> Trace:

@@ -9,8 +9,7 @@ import pytest
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.report import responses
-from rigsight.report.drawing.response_charts import amplitude_figures
-from rigsight.report.responses import record_responses
+from rigsight.report.responses import amplitude_figures, record_responses
 
 
 def test_measured_and_simulated_go_through_one_estimator(diagnosis: Diagnosis) -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report.drawing.rig_figure import rig_figure, suspected_places
+from rigsight.report.figures import rig_figure, suspected_places
 from rigsight.rigs import RIGS
 
 

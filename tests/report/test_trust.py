@@ -13,7 +13,7 @@ from rigsight.diagnose.trust.result import GroupValue, ParameterTrust, Trust
 from rigsight.diagnose.trust.statement import statement
 from rigsight.errors import InputError
 from rigsight.report import render_report
-from rigsight.report.trust import trust_line
+from rigsight.report.sections import trust_line
 
 BY_AMPLITUDE = tuple(GroupValue(f"{a} A", value, 0.05) for a, value in ((0.5, 2.1), (1.0, 1.7), (2.0, 1.4)))
 FALLING = ParameterTrust(

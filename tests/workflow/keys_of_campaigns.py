@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.compare.comparison_files import comparison_json
+from rigsight.compare.comparison import comparison_json
 from rigsight.records import Record
 from rigsight.rigs import rig_file_text
 from rigsight.workflow.campaign.in_memory import make_model

@@ -19,15 +19,14 @@ from rigsight.workflow.campaign.campaign_file import (
     CampaignTable,
     FileTable,
     RecordTable,
+    Where,
     checked_file,
     read_campaign_table,
 )
-from rigsight.workflow.campaign.model_file import model_of, named_model, read_model
+from rigsight.workflow.campaign.model_file import json_object, model_of, named_model, read_model
 from rigsight.workflow.campaign.read_campaign import file_inside
-from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.own_effects import own_effects
-from rigsight.workflow.run.json_file import json_object
 from rigsight_bench.running.external import KeyTable
 from rigsight_bench.running.files import read_json
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.compare.comparison_files import comparison_json
+from rigsight.compare.comparison import comparison_json
 from rigsight.effects import effect_named
 from rigsight.errors import RigsightError
 from rigsight.workflow.campaign.campaign_file import CampaignTable, ColumnTable, RecordTable, RigTable

@@ -12,7 +12,7 @@ from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.errors import InputError
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 
 def blind(

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from rigsight.api.estimator import campaign_of
-from rigsight.api.results import data_frame, named
+from rigsight.api.base import Result, campaign_of
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor
-from rigsight.report.drawing.comparison_figures import overall_figure, record_figures
+from rigsight.report.comparison import overall_figure, record_figures
 from rigsight.report.notebook import comparison_html
 from rigsight.simulate.model import Model
 from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig, write_comparison
 from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,8 +84,8 @@ def compare_models(
 
 
 @dataclass(frozen=True, eq=False)
-class ComparisonResult(Comparison):
-    """The result of a comparison, as it is in ``comparison.json``, with plots, tables and files.
+class ComparisonResult(Result, Comparison):
+    """The result of a comparison, as it is in ``comparison.json``; saved with ``.csv``, ``.html`` and the figures.
 
     Attributes
     ----------
@@ -135,9 +134,9 @@ class ComparisonResult(Comparison):
         """
         if record is None:
             return overall_figure(self).drawing
-        index = named("record", record, {own.record.name: i for i, own in enumerate(self.records)})
+        index = self._chosen("record", record, {own.record.name: i for i, own in enumerate(self.records)})
         drawings = {f"picture of '{record}'": figure.drawing for figure in record_figures(self, index)}
-        return named(f"picture of '{record}'", None, drawings)
+        return self._chosen(f"picture of '{record}'", None, drawings)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return every error as a row: model, record, quantity, signal, unit, value, noise floor, lines or samples.
@@ -148,34 +147,8 @@ class ComparisonResult(Comparison):
             If pandas is not installed.
         """
         columns = ("model", "record", "quantity", "signal", "unit", "value", "noise_floor", "n_values")
-        return data_frame(
-            (
-                {
-                    column: getattr(
-                        score.column if column in ("quantity", "signal", "unit") else score, column
-                    )
-                    for column in columns
-                }
-                for score in self.scores
-            ),
-            columns,
-        )
+        rows = ({**vars(score.column), **vars(score)} for score in self.scores)
+        return self._frame(({name: row[name] for name in columns} for row in rows), columns)
 
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``comparison.json``, ``.csv``, ``.html`` and the figures into a folder, all or none.
-
-        Parameters
-        ----------
-        folder
-            Made if it does not exist; files of these names are replaced.
-
-        Returns
-        -------
-        The files written.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        return write_comparison(self, Path(folder), self.made_by)
+    def _write(self, folder: Path) -> tuple[Path, ...]:
+        return write_comparison(self, folder, self.made_by)

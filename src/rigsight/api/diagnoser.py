@@ -7,25 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, get_args
 
-from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.results import check_unused, data_frame, named
+from rigsight.api.base import CampaignEstimator, Result
 from rigsight.campaign import Campaign
 from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.location.trace import STAGES
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import check_option
-from rigsight.records import Record
 from rigsight.report.notebook import diagnosis_html
 from rigsight.report.record_views import record_drawing
-from rigsight.report.sections import budget_drawing, ranking_drawing
-from rigsight.report.trust import TRUST_COLUMNS, trust_drawing, trust_rows
+from rigsight.report.sections import TRUST_COLUMNS, budget_drawing, ranking_drawing, trust_drawing, trust_rows
 from rigsight.report.wording import named_candidate
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
-from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.diagnose import diagnose_campaign, write_diagnosis
-from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import Listener
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -99,42 +94,23 @@ class Diagnoser(CampaignEstimator):
         self.verbose = verbose
         self.rig = rig
 
-    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
-        """Diagnose the gap between the simulation that a campaign gives and its records.
+    def _effects(self) -> Sequence[Effect]:
+        return CATALOGUE if self.effects is None else effects_of(self.effects)
 
-        Parameters
-        ----------
-        campaign
-            A campaign, the toml file or the folder that contains one, or records of `rig`.
-
-        Returns
-        -------
-        The estimator itself.
-
-        Raises
-        ------
-        InputError
-            If the campaign cannot be used or a candidate is unknown.
-        SimulationError
-            If the given simulation cannot be run.
-        """
-        effects = CATALOGUE if self.effects is None else effects_of(self.effects)
-        own = [effect for effect in effects if effect not in CATALOGUE]
-        jobs = checked_jobs(self.n_jobs)
-        read = campaign_of(campaign, own, rig=self.rig)
-        known = (*own, *read.modelled)
-        with listening(quiet=not self.verbose) as listener:
-            found = diagnose_campaign(read, effects, self.seed, jobs, listener)
+    def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> DiagnosisResult:
+        effects = self._effects()
+        found = diagnose_campaign(campaign, effects, self.seed, n_jobs, listener)
         tried = None if self.effects is None else [effect.name for effect in effects]
         made_by = f"rigsight.Diagnoser(effects={tried}, seed={self.seed}).fit(...)"
-        self.diagnosis_ = DiagnosisResult.of(found, made_by, self.seed, known)
-        self.model_ = model_of(found.model, known)
-        return self
+        self.diagnosis_ = DiagnosisResult.of(
+            found, made_by, self.seed, (*self._own_effects(), *campaign.modelled)
+        )
+        return self.diagnosis_
 
 
 @dataclass(frozen=True)
-class DiagnosisResult(Diagnosis):
-    """The result of a diagnosis, as it is in ``diagnosis.json``, with plots, tables and files.
+class DiagnosisResult(Result, Diagnosis):
+    """The result of a diagnosis, as it is in ``diagnosis.json``; saved with ``model.json`` and ``report.html``.
 
     Attributes
     ----------
@@ -198,15 +174,15 @@ class DiagnosisResult(Diagnosis):
             If there is no such picture, record or output, or no parameter was estimated by record.
         """
         check_option("The picture", picture, get_args(Picture))
-        check_unused("record", picture, record=record, output=output)
+        self._check_unused("record", picture, record=record, output=output)
         if picture == "gap":
             return budget_drawing(self)
         if picture == "candidates":
             return ranking_drawing(self)
         if picture == "trust":
             return trust_drawing(self)
-        trace = named("record", record, {trace.record: trace for trace in self.traces})
-        name = named("output", output, {name: name for name in trace.measured})
+        trace = self._chosen("record", record, {trace.record: trace for trace in self.traces})
+        name = self._chosen("output", output, {name: name for name in trace.measured})
         return record_drawing(self, trace, name)
 
     def to_dataframe(self, table: Table = "candidates") -> pd.DataFrame:
@@ -228,7 +204,7 @@ class DiagnosisResult(Diagnosis):
         check_option("The table", table, get_args(Table))
         if table == "gap":
             columns = (*STAGES, "noise_floor", "closed")
-            return data_frame(
+            return self._frame(
                 (
                     {"output": output, **{column: getattr(gap, column) for column in columns}}
                     for output, gap in self.gap.items()
@@ -236,17 +212,17 @@ class DiagnosisResult(Diagnosis):
                 ("output", *columns),
             )
         if table == "trust":
-            return data_frame(trust_rows(self), tuple(TRUST_COLUMNS))
+            return self._frame(trust_rows(self), tuple(TRUST_COLUMNS))
         if table == "parameters":
             best = named_candidate(self)
-            return data_frame(
+            return self._frame(
                 (
                     {"parameter": name, "value": number.value, "std": number.std, "unit": number.unit}
                     for name, number in (best.parameters if best is not None else {}).items()
                 ),
                 ("parameter", "value", "std", "unit"),
             )
-        return data_frame(
+        return self._frame(
             (
                 {
                     "effects": ", ".join(candidate.effects),
@@ -260,21 +236,5 @@ class DiagnosisResult(Diagnosis):
             ("effects", "probability", "error_over_noise"),
         )
 
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``diagnosis.json``, ``model.json`` and ``report.html`` into a folder, all or none.
-
-        Parameters
-        ----------
-        folder
-            Made if it does not exist; files of these names are replaced.
-
-        Returns
-        -------
-        The files written.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        return write_diagnosis(self, Path(folder), self.made_by, self.seed, self.own_effects)
+    def _write(self, folder: Path) -> tuple[Path, ...]:
+        return write_diagnosis(self, folder, self.made_by, self.seed, self.own_effects)

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.results import data_frame
+from rigsight.api.base import CampaignEstimator, Result
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery
 from rigsight.errors import check_option
 from rigsight.plot.discovery import discovery_figure
-from rigsight.records import Record
 from rigsight.report.notebook import discovery_html
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.discover import discover_campaign, write_discovery
-from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import Listener
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,55 +89,22 @@ class EquationDiscoverer(CampaignEstimator):
         self.verbose = verbose
         self.rig = rig
 
-    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
-        """Discover the equations behind the records of a campaign.
-
-        Parameters
-        ----------
-        campaign
-            A campaign, the toml file or the folder that contains one, or records of `rig`.
-
-        Returns
-        -------
-        The estimator itself.
-
-        Raises
-        ------
-        InputError
-            If the campaign cannot be used or the method is unknown.
-        SimulationError
-            If the rig's own equations cannot be simulated near the records.
-        """
-        jobs = checked_jobs(self.n_jobs)
-        read = campaign_of(campaign, rig=self.rig)
-        with listening(quiet=not self.verbose) as listener:
-            found = discover_campaign(
-                read,
-                self.method,
-                pointwise=self.pointwise,
-                one_by_one=self.one_by_one,
-                seed=self.seed,
-                n_jobs=jobs,
-                listener=listener,
-            )
+    def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> DiscoveryResult:
+        found = discover_campaign(
+            campaign,
+            self.method,
+            pointwise=self.pointwise,
+            one_by_one=self.one_by_one,
+            seed=self.seed,
+            n_jobs=n_jobs,
+            listener=listener,
+        )
         self.discovery_ = DiscoveryResult.of(found)
-        self.model_ = model_of(found.model)
-        return self
+        return self.discovery_
 
 
-class DiscoveryResult(Discovery):
-    """The result of a discovery, as it is in ``discovery.json``, with plots, tables and files."""
-
-    @classmethod
-    def of(cls, found: Discovery) -> Self:
-        """Return a discovery of any origin, for instance of `run_discover`, with plots, tables and files.
-
-        Parameters
-        ----------
-        found
-            The discovery.
-        """
-        return cls(**vars(found))
+class DiscoveryResult(Result, Discovery):
+    """The result of a discovery, as it is in ``discovery.json``; saved with ``model.json`` and ``discovery.svg``."""
 
     def __repr__(self) -> str:
         return f"DiscoveryResult({self.title!r}, equations={self.equations!r})"
@@ -175,7 +138,7 @@ class DiscoveryResult(Discovery):
         """
         check_option("The table", table, get_args(Table))
         if table == "terms":
-            return data_frame(
+            return self._frame(
                 (
                     {"term": t.name, "kept": t.kept, "inclusion": t.inclusion, "doubt": t.doubt}
                     for t in self.terms
@@ -184,7 +147,7 @@ class DiscoveryResult(Discovery):
             )
         if table == "alternatives":
             columns = ("n_parameters", "held_out", "aic", "bic")
-            return data_frame(
+            return self._frame(
                 (
                     {
                         "terms": ", ".join(other.terms),
@@ -194,7 +157,7 @@ class DiscoveryResult(Discovery):
                 ),
                 ("terms", *columns),
             )
-        return data_frame(self._coefficient_rows(), ("coefficient", "value", "std", "unit"))
+        return self._frame(self._coefficient_rows(), ("coefficient", "value", "std", "unit"))
 
     def _coefficient_rows(self) -> Iterator[dict[str, Any]]:
         found = dict(self.rig_parameters)
@@ -203,21 +166,5 @@ class DiscoveryResult(Discovery):
         for name, number in found.items():
             yield {"coefficient": name, "value": number.value, "std": number.std, "unit": number.unit}
 
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``discovery.json``, ``model.json`` and ``discovery.svg`` into a folder, all or none.
-
-        Parameters
-        ----------
-        folder
-            Made if it does not exist; files of these names are replaced.
-
-        Returns
-        -------
-        The files written.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        return write_discovery(self, Path(folder))
+    def _write(self, folder: Path) -> tuple[Path, ...]:
+        return write_discovery(self, folder)

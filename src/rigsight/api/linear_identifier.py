@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.api.results import check_unused, data_frame, named
+from rigsight.api.base import CampaignEstimator, Result
 from rigsight.campaign import Campaign
-from rigsight.effects import CATALOGUE, Effect
+from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
-from rigsight.records import Record
 from rigsight.report.notebook import identification_html
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
-from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.identification.figures import amplitudes_figure, bode_figure, responses_figure
 from rigsight.workflow.identify import checked_options, identify_campaign, write_identification
-from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import Listener
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,49 +91,22 @@ class LinearIdentifier(CampaignEstimator):
         self.effects = effects
         self.seed = seed
 
-    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
-        """Identify the estimation records of a campaign; its validation records are only scored.
+    def _check_settings(self) -> None:
+        checked_options(self.method, self.resolution)
 
-        Parameters
-        ----------
-        campaign
-            A campaign, the toml file or the folder that contains one, or records of `rig`.
+    def _effects(self) -> Sequence[Effect]:
+        return effects_of(self.effects)
 
-        Returns
-        -------
-        The estimator itself.
-
-        Raises
-        ------
-        InputError
-            If the campaign cannot be used, the method is unknown, a record is too short for the requested resolution, no record
-            shows the motion, or an effect is unknown or cannot be calibrated on the rig.
-        """
+    def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> IdentificationResult:
         options = checked_options(self.method, self.resolution)
-        jobs = checked_jobs(self.n_jobs)
-        effects = effects_of(self.effects)
-        own = [effect for effect in effects if effect not in CATALOGUE]
-        read = campaign_of(campaign, own, rig=self.rig)
-        with listening(quiet=not self.verbose) as listener:
-            found = identify_campaign(read, options, jobs, listener, effects=effects, seed=self.seed)
+        effects = self._effects()
+        found = identify_campaign(campaign, options, n_jobs, listener, effects=effects, seed=self.seed)
         self.identification_ = IdentificationResult.of(found)
-        self.model_ = model_of(found.model, (*own, *read.modelled))
-        return self
+        return self.identification_
 
 
-class IdentificationResult(Identification):
-    """The result of an identification, as it is in ``identification.json``, with plots, tables and files."""
-
-    @classmethod
-    def of(cls, found: Identification) -> Self:
-        """Return an identification of any origin, for instance of `run_identify`, with plots, tables and files.
-
-        Parameters
-        ----------
-        found
-            The identification.
-        """
-        return cls(**vars(found))
+class IdentificationResult(Result, Identification):
+    """The result of an identification, as it is in ``identification.json``; saved with ``model.json`` and the figures."""
 
     def __repr__(self) -> str:
         return (
@@ -168,13 +137,15 @@ class IdentificationResult(Identification):
             If there is no such picture or record, or the records do not show what is to be drawn.
         """
         check_option("The picture", picture, get_args(Picture))
-        check_unused("bode", picture, record=record)
+        self._check_unused("bode", picture, record=record)
         if picture == "amplitudes":
             drawing = amplitudes_figure(self)
         elif picture == "responses":
             drawing = responses_figure(self)
         else:
-            drawing = bode_figure(named("record", record, {r.record.name: r for r in self.records}), self)
+            drawing = bode_figure(
+                self._chosen("record", record, {r.record.name: r for r in self.records}), self
+            )
         if drawing is None:
             raise InputError(
                 f"The picture '{picture}' would be empty: no sweep or multisine gave a response, or no fit succeeded. See the "
@@ -198,8 +169,8 @@ class IdentificationResult(Identification):
         check_option("The table", table, get_args(Table))
         columns = ("parameter", "value", "std", "unit")
         if table == "joint":
-            return data_frame(self._joint_rows(), columns)
-        return data_frame(self._record_rows(), ("record", "amplitude", *columns))
+            return self._frame(self._joint_rows(), columns)
+        return self._frame(self._record_rows(), ("record", "amplitude", *columns))
 
     def _record_rows(self) -> Iterator[dict[str, Any]]:
         for record in self.records:
@@ -218,21 +189,5 @@ class IdentificationResult(Identification):
         for name, (value, std) in found.items():
             yield {"parameter": name, "value": value, "std": std, "unit": self.units.get(name, "")}
 
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write ``identification.json``, ``model.json`` and the figures into a folder, all or none.
-
-        Parameters
-        ----------
-        folder
-            Made if it does not exist; files of these names are replaced.
-
-        Returns
-        -------
-        The files written.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        return write_identification(self, Path(folder))
+    def _write(self, folder: Path) -> tuple[Path, ...]:
+        return write_identification(self, folder)

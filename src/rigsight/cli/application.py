@@ -4,26 +4,52 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Annotated
 
 import typer
 
-from rigsight.cli.blind import REFUSES, blind_command, not_installed
 from rigsight.cli.compare import compare
 from rigsight.cli.demo import demo
 from rigsight.cli.diagnose import diagnose
 from rigsight.cli.discover import discover
 from rigsight.cli.effects import list_effects
-from rigsight.cli.exit_codes import report_output_errors
+from rigsight.cli.exit_codes import ended_by_signals, report_errors, report_output_errors
 from rigsight.cli.export import export
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
 from rigsight.cli.power import power
 from rigsight.cli.rigs import list_rigs
-from rigsight.cli.signals import ended_by_signals
 from rigsight.cli.simulate import simulate
 from rigsight.cli.vary import vary
+from rigsight.errors import InputError
+
+_BENCH = "rigsight_bench"
+REFUSES = {"allow_extra_args": True, "ignore_unknown_options": True}
+"""Settings of a command that ends with the same message whatever its options are."""
+
+
+def blind_command() -> Callable[..., None]:
+    """Return the command of the bench, or `not_installed`."""
+    if find_spec(_BENCH) is None:
+        return not_installed
+    command: Callable[..., None] = import_module(f"{_BENCH}.command").blind
+    return command
+
+
+def not_installed() -> None:
+    """Diagnose trials whose true effect is withheld, and score the verdicts: needs 'pip install ./bench'.
+
+    The blind bench is a package of its own, rigsight-bench, in the folder bench/ of rigsight's repository.
+    """
+    with report_errors(debug=False):
+        raise InputError(
+            "The blind bench is a package of its own, rigsight-bench, which is not installed. "
+            "In a copy of rigsight's repository: pip install ./bench"
+        )
+
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": demo,

@@ -11,7 +11,7 @@ import typer
 from rigsight.cli.exit_codes import GOES_ON, report_errors
 from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
 from rigsight.cli.terminal import command_line, show, show_files, show_json
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 
 def demo(

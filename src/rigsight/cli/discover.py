@@ -10,7 +10,7 @@ import typer
 from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Campaign, Debug, Jobs, Json, OwnRigs, Quiet, ResultsFolder, Seed, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 
 def discover(
@@ -61,7 +61,7 @@ def discover(
     if json:
         show_json(out / "discovery.json")
     elif not quiet:
-        from rigsight.report.discovery import discovery_summary
+        from rigsight.report.terminal import discovery_summary
 
         show(discovery_summary(found))
         show_files({"Results": out / "discovery.json", "Model": out / "model.json"})

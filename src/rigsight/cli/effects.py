@@ -10,7 +10,7 @@ import typer
 from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
 from rigsight.cli.terminal import show_as_json
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     from rigsight.effects import Effect

@@ -1,4 +1,4 @@
-"""Errors become one message on stderr and an exit code.
+"""Errors and termination signals become one message on stderr and an exit code.
 
 Exit codes: 0 success; 1 a defect of rigsight; 2 unusable input, or results that cannot be written; 130 Ctrl-C; 143 ended by kill;
 129 the terminal was closed; 141 the output is no longer read.
@@ -9,17 +9,19 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from types import FrameType
 from typing import NoReturn
 
 import typer
 
-from rigsight.cli.signals import exit_code
 from rigsight.errors import MachineError, RigsightError, shown
-from rigsight.workflow.run.results import noting_folders
+from rigsight.workflow.run.results import ENDING_SIGNALS, noting_folders
 
 DEFECT, BAD_INPUT, UNREAD = 1, 2, 141
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES, errno.EPERM)
@@ -33,7 +35,7 @@ GOES_ON = f"{_NOTHING}; the same command continues from there"
 
 
 @contextlib.contextmanager
-def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
+def report_errors(debug: bool, outcome: str = _NOTHING) -> Iterator[None]:
     """Map errors of a command to one message on stderr and an exit code."""
     if debug:
         yield
@@ -47,15 +49,16 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
         except RigsightError as error:
             leave(str(error), BAD_INPUT, isinstance(error, MachineError))
         except KeyboardInterrupt as error:
-            if written and left.startswith(_NOTHING):
-                left = f"the results in {_named(written)} are complete"
-            leave(f"interrupted; {left}.", exit_code(error))
+            if written and outcome.startswith(_NOTHING):
+                outcome = f"the results in {_named(written)} are complete"
+            leave(f"interrupted; {outcome}.", exit_code(error))
         except BrokenPipeError:
             raise
         except OSError as error:
             if error.errno in _OF_THE_SESSION:
                 leave(
-                    f"a resource limit of this session was reached: {error.strerror}. Raise it (ulimit -a lists them); {left}.",
+                    f"a resource limit of this session was reached: {error.strerror}. Raise it (ulimit -a lists them); "
+                    f"{outcome}.",
                     BAD_INPUT,
                     is_of_the_machine=True,
                 )
@@ -68,13 +71,13 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
             # Result files have messages of their own; here remain input files and temporary files.
             if error.errno in (errno.EACCES, errno.EPERM) and error.filename:
                 leave(
-                    f"no permission to read or write {error.filename}. Change its permissions; {left}.",
+                    f"no permission to read or write {error.filename}. Change its permissions; {outcome}.",
                     BAD_INPUT,
                 )
             place = f" ({error.filename})" if error.filename else ""
             leave(
                 f"a temporary file or the output cannot be written{place}: {error.strerror}. Free disk space, or set TMPDIR to a "
-                f"writable folder; {left}.",
+                f"writable folder; {outcome}.",
                 BAD_INPUT,
                 is_of_the_machine=True,
             )
@@ -86,13 +89,7 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
 
 
 class CommandExit(SystemExit):
-    """The process ends after its message was printed.
-
-    Attributes
-    ----------
-    is_of_the_machine
-        True if disk, memory or limits of this machine are the cause, so that the same command may succeed elsewhere or later.
-    """
+    """The process ends after its message was printed."""
 
     def __init__(self, code: int, is_of_the_machine: bool = False) -> None:
         super().__init__(code)
@@ -164,3 +161,39 @@ def leave(message: str, code: int, is_of_the_machine: bool = False) -> NoReturn:
     with contextlib.suppress(OSError):
         typer.echo(f"rigsight: {message}", err=True)
     raise CommandExit(code, is_of_the_machine)
+
+
+class Ended(KeyboardInterrupt):
+    """The process was asked to end, by kill or because its terminal was closed; it cleans up as after Ctrl-C."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+@contextlib.contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Raise `Ended` on termination signals and Ctrl-C, except on signals that are ignored, as under nohup."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    # A program that runs the command line inside itself may have handlers of its own.
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    before = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
+    mine = {number: handler for number, handler in before.items() if handler in usual}
+    for number in mine:
+        signal.signal(number, _end)
+    try:
+        yield
+    finally:
+        for number, handler in mine.items():
+            signal.signal(number, handler)
+
+
+def exit_code(error: BaseException | None) -> int:
+    """Return the exit code after an interruption: 128 plus the number of its signal, 130 for Ctrl-C."""
+    return 128 + (error.number if isinstance(error, Ended) else int(signal.SIGINT))
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    raise Ended(number)

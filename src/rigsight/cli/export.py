@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet
+from rigsight.cli.options import Debug, Json, Model, OwnEffects, OwnRigs, Quiet
 from rigsight.cli.terminal import show_as_json
 
 if TYPE_CHECKING:
@@ -16,13 +16,7 @@ if TYPE_CHECKING:
 
 
 def export(
-    model: Annotated[
-        Path,
-        typer.Argument(
-            metavar="MODEL",
-            help="A model.json, the folder that contains one, or a published set such as hysteresis_r.",
-        ),
-    ],
+    model: Model,
     to: Annotated[
         str,
         typer.Option(

@@ -22,7 +22,7 @@ from rigsight.cli.options import (
     effect_names,
 )
 from rigsight.cli.terminal import command_line, show, show_files, show_json
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 
 def identify(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
+
+if TYPE_CHECKING:
+    from rigsight.workflow.init import Draft, ModelDraft
 
 
 def init(
@@ -70,136 +72,111 @@ def init(
     Signals, units, kinds, amplitudes and roles are guessed; comments in the file mark each guess. An existing campaign is not
     overwritten. With --mjcf, the rig file of a robot model is written as well and checked against MuJoCo.
     """
-    if mjcf is not None:
-        named = {"--model": model, "--rigs": rigs, "--simulator": simulator}
-        _init_from_mjcf(
-            folder or Path(),
-            mjcf,
-            gear,
-            [option for option, given in named.items() if given],
-            as_it_is=as_it_is,
-            json=json,
-            quiet=quiet,
-            debug=debug,
-        )
-        return
-    with report_errors(debug):
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.errors import InputError
-
-        if gear or as_it_is:
-            option = "--gear" if gear else "--as-it-is"
-            raise InputError(f"{option} applies only to the model of a robot; name the model with --mjcf.")
-        if folder is None:
-            raise InputError("Name the FOLDER of the measured files, or the model of a robot with --mjcf.")
-        from rigsight.workflow.init import run_init
+        from rigsight.workflow.init import run_init, run_init_from_mjcf
         from rigsight.workflow.own.own_rigs import own_simulators
 
-        own_simulators(simulator or [])
-        draft = run_init(folder, model=model, rig_files=rigs or [])
+        if mjcf is not None:
+            named = {"--model": model, "--rigs": rigs, "--simulator": simulator}
+            if others := [option for option, given in named.items() if given]:
+                raise InputError(f"--mjcf already defines the rig; leave out {' and '.join(others)}.")
+            folder = folder or Path()
+            gears = dict(map(_gear, gear or []))
+            written = run_init_from_mjcf(folder, mjcf, gears=gears, as_it_is=as_it_is, listener=listener)
+            content, lines = _of_robot(written, folder, as_it_is)
+        else:
+            if gear or as_it_is:
+                option = "--gear" if gear else "--as-it-is"
+                raise InputError(
+                    f"{option} applies only to the model of a robot; name the model with --mjcf."
+                )
+            if folder is None:
+                raise InputError(
+                    "Name the FOLDER of the measured files, or the model of a robot with --mjcf."
+                )
+            own_simulators(simulator or [])
+            content, lines = _of_campaign(run_init(folder, model=model, rig_files=rigs or []), folder)
     if json:
-        show_as_json(
-            {
-                "file": str(draft.path),
-                "model": draft.model,
-                "records": list(draft.records),
-                "left_out": [{"file": name, "reason": reason} for name, reason in draft.left_out],
-                "n_blanks": draft.n_blanks,
-            }
-        )
-        return
-    if quiet:
-        return
+        show_as_json(content)
+    elif not quiet:
+        for line in lines:
+            typer.echo(line)
+
+
+def _of_campaign(draft: Draft, folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """Return what was written, for JSON and in words."""
     count = len(draft.records)
-    typer.echo(f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})")
+    lines = [f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})"]
     if draft.others:
-        typer.echo(
+        lines.append(
             f"The rig was guessed from the channels. If it is wrong, remove the file and run init again with --model "
             f"({', '.join(draft.others)}), or with --rigs FILE --model NAME for a rig file of your own (rigsight rigs NAME "
             "prints one to start from)."
         )
-    for name, reason in draft.left_out:
-        typer.echo(f"Not used: {name}: {reason}")
-    _say_what_is_next(draft.n_blanks, folder)
+    lines += [f"Not used: {name}: {reason}" for name, reason in draft.left_out]
+    content = {
+        "file": str(draft.path),
+        "model": draft.model,
+        "records": list(draft.records),
+        "left_out": [{"file": name, "reason": reason} for name, reason in draft.left_out],
+        "n_blanks": draft.n_blanks,
+    }
+    return content, [*lines, _what_is_next(draft.n_blanks, folder)]
 
 
-def _say_what_is_next(n_blanks: int, folder: Path) -> None:
+def _what_is_next(n_blanks: int, folder: Path) -> str:
     remedy = f'Replace each "FILL IN" ({n_blanks} times) in it.' if n_blanks else "Check the comments in it."
-    typer.echo(f"{remedy} Then: rigsight diagnose {folder}")
+    return f"{remedy} Then: rigsight diagnose {folder}"
 
 
-def _init_from_mjcf(
-    folder: Path,
-    file: Path,
-    gears: list[str] | None,
-    other_rigs: Sequence[str],
-    *,
-    as_it_is: bool,
-    json: bool,
-    quiet: bool,
-    debug: bool,
-) -> None:
-    with report_errors(debug), listening(quiet) as listener:
-        from rigsight.errors import InputError
-        from rigsight.workflow.init import run_init_from_mjcf
-
-        if other_rigs:
-            raise InputError(f"--mjcf already defines the rig; leave out {' and '.join(other_rigs)}.")
-        written = run_init_from_mjcf(
-            folder, file, gears=dict(map(_gear, gears or [])), as_it_is=as_it_is, listener=listener
+def _of_robot(written: ModelDraft, folder: Path, as_it_is: bool) -> tuple[dict[str, Any], list[str]]:
+    """Return what was written, for JSON and in words, and warn where the rig moves differently than MuJoCo's."""
+    draft, run, campaign = written.draft, written.run, written.campaign
+    count = len(draft.joints)
+    lines = [f"Written: {written.path} ({count} joint{'' if count == 1 else 's'})"]
+    if run.agrees:
+        beside = f", without {' and '.join(run.left_out)}" if run.left_out else ""
+        lines.append(
+            f"A free run of {run.duration:.1f} s agrees with MuJoCo{beside}; largest relative difference {run.worst:.1g}."
         )
-    draft, run = written.draft, written.run
-    if not run.agrees:
+    else:
         typer.echo(
             f"rigsight: the free run of the rig differs from MuJoCo: the largest relative difference is {run.worst:.1g}, allowed "
             f"is {run.allowed:g}. The head of {written.path} lists what was not taken over.",
             err=True,
         )
-    if json:
-        show_as_json(
-            {
-                "file": str(written.path),
-                "campaign": None if written.campaign is None else str(written.campaign.path),
-                "left_out": list(draft.left_out),
-                "notes": list(draft.notes),
-                "free_run": {
-                    "duration_s": run.duration,
-                    "relative_difference": run.differences,
-                    "agrees": run.agrees,
-                },
-            }
-        )
-        return
-    if quiet:
-        return
-    count = len(draft.joints)
-    typer.echo(f"Written: {written.path} ({count} joint{'' if count == 1 else 's'})")
-    beside = f", without {' and '.join(run.left_out)}" if run.left_out else ""
-    if run.agrees:
-        typer.echo(
-            f"A free run of {run.duration:.1f} s agrees with MuJoCo{beside}; largest relative difference {run.worst:.1g}."
-        )
     if as_it_is:
-        typer.echo(
+        lines.append(
             "MuJoCo computes the bodies, so a diagnosis takes several times as long as with equations. Contacts, tendons and "
             "equalities need it; a tree of joints does not."
         )
-    for note in draft.notes:
-        typer.echo(note)
+    lines += draft.notes
     if not as_it_is:
-        typer.echo(
+        lines.append(
             f"Gains, filter times and masses are constants. To identify one, rename its table in {written.path} from "
             "[constants.NAME] to [parameters.NAME]."
         )
-    for what in draft.left_out:
-        typer.echo(f"Not taken over: {what}")
-    if written.campaign is None:
-        typer.echo(
-            f"Put the measured files into {folder}, with columns t, {', '.join((*draft.controls, *draft.sensors))}. "
-            "Then run the same command again."
+    lines += [f"Not taken over: {what}" for what in draft.left_out]
+    if campaign is None:
+        columns = ", ".join((*draft.controls, *draft.sensors))
+        lines.append(
+            f"Put the measured files into {folder}, with columns t, {columns}. Then run the same command again."
         )
     else:
-        typer.echo(f"Written: {written.campaign.path}")
-        _say_what_is_next(written.campaign.n_blanks, folder)
+        lines += [f"Written: {campaign.path}", _what_is_next(campaign.n_blanks, folder)]
+    content = {
+        "file": str(written.path),
+        "campaign": None if campaign is None else str(campaign.path),
+        "left_out": list(draft.left_out),
+        "notes": list(draft.notes),
+        "free_run": {
+            "duration_s": run.duration,
+            "relative_difference": run.differences,
+            "agrees": run.agrees,
+        },
+    }
+    return content, lines
 
 
 def _gear(text: str) -> tuple[str, float]:

@@ -18,6 +18,13 @@ def effect_names(begun: str) -> list[str]:
 Campaign = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that contains it.")
 ]
+Model = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help="A model.json, the folder that contains one, or a published set such as hysteresis_r.",
+    ),
+]
 ResultsFolder = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
 OwnEffects = Annotated[
     list[Path] | None,

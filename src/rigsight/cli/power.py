@@ -20,7 +20,7 @@ from rigsight.cli.options import (
     effect_names,
 )
 from rigsight.cli.terminal import show, show_files, show_json
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Simulators
 from rigsight.cli.terminal import show_as_json
-from rigsight.errors import check_option
-from rigsight.plot import rig_picture, style, svg_text
-from rigsight.rigs import Rig
+from rigsight.errors import InputError, check_option
 from rigsight.workflow.run.results import check_target, write_together
+
+if TYPE_CHECKING:
+    from rigsight.rigs import Rig
 
 _DPI = 200
 
@@ -38,7 +38,6 @@ def list_rigs(
     If a file of --rigs cannot be used, the error and its place in the file are printed and the exit code is 2.
     """
     with report_errors(debug):
-        from rigsight.errors import InputError, check_option
         from rigsight.rigs import rig_file_text
         from rigsight.workflow.own.own_rigs import known_rigs, own_rigs, own_simulators
 
@@ -83,15 +82,10 @@ def list_rigs(
 
 def write_rig_picture(rig: Rig, file: Path) -> Path:
     """Draw a rig into a PNG or SVG file."""
+    from rigsight.plot import png_bytes, rig_picture, svg_text
+
     ending = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
     check_target(file)
     figure = rig_picture(rig)
-    content: str | bytes
-    if ending == ".svg":
-        content = svg_text(figure, rig.name)
-    else:
-        stream = io.BytesIO()
-        with style():
-            figure.savefig(stream, format="png", dpi=_DPI)
-        content = stream.getvalue()
+    content = svg_text(figure, rig.name) if ending == ".svg" else png_bytes(figure, _DPI)
     return write_together(file.parent, {file.name: content})[0]

@@ -9,23 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet, Simulators
+from rigsight.cli.options import Debug, Json, Model, OwnEffects, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     from rigsight.records import ColumnMapping
 
 
 def simulate(
-    model: Annotated[
-        Path,
-        typer.Argument(
-            metavar="MODEL",
-            help="A model.json, the folder that contains it, or a published set such as hysteresis_r.",
-        ),
-    ],
+    model: Model,
     record: Annotated[
         Path,
         typer.Argument(

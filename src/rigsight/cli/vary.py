@@ -11,7 +11,7 @@ from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import show_json
 from rigsight.errors import InputError
-from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.progress import listening
 
 
 def vary(

@@ -4,7 +4,6 @@ from rigsight.compare.comparison import Comparison as Comparison
 from rigsight.compare.comparison import Competitor as Competitor
 from rigsight.compare.comparison import Failure as Failure
 from rigsight.compare.comparison import RecordComparison as RecordComparison
-from rigsight.compare.floor import Floor as Floor
 from rigsight.compare.on_one_record import Yardstick as Yardstick
 from rigsight.compare.on_one_record import compare_on_record as compare_on_record
 from rigsight.compare.response_error import ResponseError as ResponseError
@@ -14,6 +13,7 @@ from rigsight.compare.response_error import response_floor as response_floor
 from rigsight.compare.response_error import signal_paths as signal_paths
 from rigsight.compare.score import QUANTITIES as QUANTITIES
 from rigsight.compare.score import Column as Column
+from rigsight.compare.score import Floor as Floor
 from rigsight.compare.score import Score as Score
 from rigsight.compare.step_error import StepWindow as StepWindow
 from rigsight.compare.step_error import step_window as step_window

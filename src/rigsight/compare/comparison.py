@@ -1,23 +1,31 @@
-"""Result of a comparison of many models on many records."""
+"""Result of a comparison of many models on many records, as an object, as JSON and as a table with a row per score."""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.compare.floor import Floor
-from rigsight.compare.score import QUANTITIES, Column, Score
+from rigsight.compare.score import QUANTITIES, Column, Floor, Score
 from rigsight.compare.step_error import StepWindow
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method
+from rigsight.json_data import json_data
 from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.simulate.model import Model
 
+SCHEMA_VERSION = 1
+_HEAD = (
+    "model", "record", "role", "kind", "amplitude", "signal", "quantity", "unit", "value",
+    "noise_floor", "n_values", "best", "problem",
+)  # fmt: skip
 _EQUAL = 5e-4
 """Relative difference below which two errors are the same: they read alike in three digits."""
 
@@ -43,34 +51,19 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class RecordComparison:
-    """All models on one record.
+    """All models on one record."""
 
-    Attributes
-    ----------
-    record
-        The measured record.
-    measured
-        Path -> measured frequency response.
-    simulated
-        Model -> path -> response of its simulation.
-    step
-        Where a step is compared, None for other records.
-    moved
-        Output -> model -> samples inside the step window, offset removed, shape (n_inside,).
-    scores, failures
-        What was found, and what was not.
-    notes
-        What is to be known about the record here.
-    """
-
-    record: Record
-    measured: dict[str, FrequencyResponse]
+    record: Record  # the measured record
+    measured: dict[str, FrequencyResponse]  # path -> measured frequency response
+    # Model -> path -> response of its simulation.
     simulated: dict[str, dict[str, FrequencyResponse]] = field(default_factory=dict)
-    step: StepWindow | None = None
+    step: StepWindow | None = None  # where a step is compared, None for other records
+    # Output -> model -> samples inside the step window, offset removed, shape (n_inside,).
     moved: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
+    # What was found, and what was not.
     scores: tuple[Score, ...] = ()
     failures: tuple[Failure, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what is to be known about the record here
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,3 +186,86 @@ def best(rows: Mapping[str, Mapping[Column, float]], column: Column) -> frozense
         return frozenset()
     smallest = min(values.values())
     return frozenset(model for model, value in values.items() if value <= smallest * (1.0 + _EQUAL))
+
+
+def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[str, Any]:
+    """Return the content of ``comparison.json``."""
+    overall = comparison.overall()
+    content = {
+        "schema_version": SCHEMA_VERSION,
+        "title": comparison.title,
+        "rig": comparison.rig,
+        "method": comparison.method,
+        "step_seconds": comparison.step_seconds,
+        "window_length": comparison.window_length,
+        "quantities": QUANTITIES,
+        "models": [
+            {"name": c.name, "source": c.source, "model": c.model.to_json()} for c in comparison.competitors
+        ],
+        "records": [
+            {
+                "name": r.record.name,
+                "role": r.record.role,
+                "kind": r.record.kind,
+                "amplitude": r.record.amplitude,
+                "notes": r.notes,
+            }
+            for r in comparison.records
+        ],
+        "noise_floors": [
+            {key: getattr(floor, key) for key in ("output", "unit", "std", "method", "lower_bound")}
+            for floor in comparison.floors
+        ],
+        "scores": [_score(s) for s in comparison.scores],
+        "overall": [
+            {
+                "model": model,
+                **_column(column),
+                "value": row[column],
+                "noise_floor": comparison.floor(column),
+                "best": model in best(overall, column),
+            }
+            for model, row in overall.items()
+            for column in row
+        ],
+        "failures": [
+            {"model": f.model, "record": f.record, **_column(f.column), "reason": f.reason}
+            for f in comparison.failures
+        ],
+        "notes": comparison.notes,
+        "figures": figures,
+    }
+    return json_data(content)
+
+
+def comparison_csv(comparison: Comparison) -> str:
+    """Return the content of ``comparison.csv``: SI units, an empty value with its problem where a model failed."""
+    file = io.StringIO()
+    table = csv.writer(file, lineterminator="\n")
+    table.writerow(_HEAD)
+    for own in comparison.records:
+        record = own.record
+        facts = (record.name, record.role, record.kind, "" if record.amplitude is None else record.amplitude)
+        rows = comparison.table(record.name)
+        winners = {column: best(rows, column) for column in comparison.columns(record.name)}
+        for s in own.scores:
+            floor = "" if s.noise_floor is None else f"{s.noise_floor:.9g}"
+            first = "yes" if s.model in winners[s.column] else "no"
+            reported = (f"{s.value:.9g}", floor, s.n_values, first, "")
+            table.writerow((s.model, *facts, s.column.signal, s.column.quantity, s.column.unit, *reported))
+        for f in own.failures:
+            missing = [f.column] if f.column else comparison.columns(record.name)
+            for column in missing or (None,):
+                named = ("", "", "") if column is None else (column.signal, column.quantity, column.unit)
+                table.writerow((f.model, *facts, *named, "", "", "", "no", " ".join(f.reason.split())))
+    return file.getvalue()
+
+
+def _column(column: Column | None) -> dict[str, str]:
+    keys = () if column is None else ("signal", "quantity", "unit")
+    return {key: getattr(column, key) for key in keys}
+
+
+def _score(score: Score) -> dict[str, Any]:
+    facts = {key: value for key, value in vars(score).items() if key != "column"}
+    return {"model": facts.pop("model"), "record": facts.pop("record"), **_column(score.column), **facts}

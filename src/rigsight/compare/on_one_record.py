@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.compare.comparison import Competitor, Failure, RecordComparison
-from rigsight.compare.floor import Floor
 from rigsight.compare.response_error import (
     ResponseError,
     SignalPath,
@@ -21,7 +20,7 @@ from rigsight.compare.response_error import (
     simulated_response,
     without_shares,
 )
-from rigsight.compare.score import Column, Score
+from rigsight.compare.score import Column, Floor, Score
 from rigsight.compare.step_error import DEFAULT_SECONDS, StepWindow, step_window, stepping_input
 from rigsight.errors import InputError, SimulationError
 from rigsight.frequency import FrequencyResponse
@@ -49,24 +48,14 @@ _FEWER = 0.95
 
 @dataclass(frozen=True)
 class Yardstick:
-    """What all models are measured by.
+    """What all models are measured by."""
 
-    Attributes
-    ----------
-    rig
-        The rig.
-    floors
-        Noise floor of each output that was measured. They belong to the records, not to the models, and are handed in.
-    method
-        Estimator of frequency responses.
-    step_seconds
-        Length of the step window [s].
-    """
-
-    rig: Rig
+    rig: Rig  # the rig
+    # Noise floor of each output that was measured. They belong to the records, not to the models, and are
+    # handed in.
     floors: tuple[Floor, ...]
-    method: Method = "local_rational"
-    step_seconds: float = DEFAULT_SECONDS
+    method: Method = "local_rational"  # estimator of frequency responses
+    step_seconds: float = DEFAULT_SECONDS  # length of the step window [s]
 
 
 def compare_on_record(
@@ -74,19 +63,6 @@ def compare_on_record(
 ) -> RecordComparison:
     """Score all models on one record.
 
-    Parameters
-    ----------
-    competitors
-        Models of the same rig.
-    record
-        A measured record.
-    windows
-        Its parts with their own initial states in free run; the record alone where it is run as a whole.
-    yardstick
-        How errors are counted.
-
-    Notes
-    -----
     A model that cannot be simulated on the record, or whose response cannot be read, becomes a `Failure`; the others go on.
     """
     paths = signal_paths(yardstick.rig)
@@ -190,18 +166,14 @@ def _trial(
     for floor in yardstick.floors:
         if floor.output not in record:
             continue
-        spread = float(np.std(record[floor.output]))
-        column = Column("free_run_nrmse", floor.output, "1")
-        own = floor.std / spread if spread > 0.0 else None
-        trial.add(column, run.nrmse[floor.output], own, record.n_samples)
+        output, spread = floor.output, float(np.std(record[floor.output]))
+        least_nrmse = floor.std / spread if spread > 0.0 else None
+        trial.add(Column("free_run_nrmse", output, "1"), run.nrmse[output], least_nrmse, record.n_samples)
         if step is not None:
-            simulated = run.simulated[floor.output]
-            trial.moved[floor.output] = step.moved(simulated)
-            remainder = step.error(record[floor.output], simulated)
-            n_inside = step.inside.stop - step.inside.start
-            trial.add(
-                Column("step_rmse", floor.output, floor.unit), remainder, step.floor(floor.std), n_inside
-            )
+            simulated = run.simulated[output]
+            trial.moved[output] = step.moved(simulated)
+            deviation, n_inside = step.error(record[output], simulated), step.inside.stop - step.inside.start
+            trial.add(Column("step_rmse", output, floor.unit), deviation, step.floor(floor.std), n_inside)
     return trial
 
 

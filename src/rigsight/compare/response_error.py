@@ -37,31 +37,19 @@ _PER_NEPER = 20.0 / math.log(10.0)
 
 @dataclass(frozen=True)
 class SignalPath:
-    """A source and the signal that answers it.
+    """A source and the signal that responds to it."""
 
-    Attributes
-    ----------
-    source, response
-        Names of the signals.
-    order
-        What the response is believed to be; only the thesis's pipeline reads it.
-    upper_cut
-        Angular frequency beyond which lines are not compared [rad/s].
-    is_commanded
-        True if the source is an input of the rig, whose hold the record knows; False if it was measured.
-    inputs
-        All inputs of a rig with several motions, of which any may move in a record; empty where one source says it all.
-    drive
-        The input that moves the source; empty where the source is an input.
-    """
-
+    # Names of the signals.
     source: str
     response: str
-    order: Order
-    upper_cut: float
+    order: Order  # what the response is believed to be; only the thesis's pipeline reads it
+    upper_cut: float  # angular frequency beyond which lines are not compared [rad/s]
+    # True if the source is an input of the rig, whose hold the record knows; False if it was measured.
     is_commanded: bool
+    # All inputs of a rig with several motions, of which any may move in a record; empty where one source says
+    # it all.
     inputs: tuple[str, ...] = ()
-    drive: str = ""
+    drive: str = ""  # the input that moves the source; empty where the source is an input
 
     @property
     def name(self) -> str:
@@ -71,24 +59,12 @@ class SignalPath:
 
 @dataclass(frozen=True)
 class ResponseError:
-    """Errors of one path.
+    """Errors of one path."""
 
-    Attributes
-    ----------
-    magnitude
-        RMSE of the magnitude in the unit of the response.
-    phase
-        RMSE of the phase [rad].
-    decibel
-        RMS of the ratio of the magnitudes [dB].
-    n_lines
-        Lines that both have.
-    """
-
-    magnitude: float
-    phase: float
-    decibel: float
-    n_lines: int
+    magnitude: float  # RMSE of the magnitude in the unit of the response
+    phase: float  # RMSE of the phase [rad]
+    decibel: float  # RMS of the ratio of the magnitudes [dB]
+    n_lines: int  # lines that both have
 
 
 def signal_paths(rig: Rig) -> tuple[SignalPath, ...]:
@@ -239,11 +215,6 @@ def response_error(measured: FrequencyResponse, simulated: FrequencyResponse) ->
 
     The phases of the thesis's method are compared as they are, unwrapped and rescaled; those of other methods by the
     shorter way round, so that a turn that noise made does not count.
-
-    Raises
-    ------
-    InputError
-        If they have no line in common.
     """
     one = measured.at(among(measured.omega, simulated.omega), "in common with the simulation")
     other = simulated.at(among(simulated.omega, measured.omega), "in common with the measurement")
@@ -262,19 +233,6 @@ def response_floor(
     The response of the record with as much noise again is compared with the measured one. The variance that an estimator gives
     would be too high for this: in a sweep of a nonlinear rig it holds the distortion, which a model with the nonlinearity
     repeats.
-
-    Parameters
-    ----------
-    disturbed
-        Copies of the measured record, each with noise of the size and the spectrum of its noise floor added to the outputs.
-    path, method
-        Path and estimator of the measured response.
-    measured
-        The measured response.
-
-    Returns
-    -------
-    Root mean squares over the copies.
     """
     try:
         errors = [

@@ -32,14 +32,9 @@ _CHANCE = 1e-3
 
 @dataclass(frozen=True)
 class StepWindow:
-    """Where a step is compared.
+    """Where a step is compared."""
 
-    Attributes
-    ----------
-    before, inside
-        Samples of which the offset is the mean, and samples that are compared.
-    """
-
+    # Samples of which the offset is the mean, and samples that are compared.
     before: slice
     inside: slice
 
@@ -79,22 +74,7 @@ def _exceeds_noise(samples: NDArray[np.float64]) -> bool:
 
 
 def step_window(record: Record, source: str, seconds: float = DEFAULT_SECONDS) -> StepWindow:
-    """Return where the first step of a record is compared.
-
-    Parameters
-    ----------
-    record
-        A record whose input steps.
-    source
-        Name of the input.
-    seconds
-        Length from the step [s]; a record that ends before is compared up to its end.
-
-    Raises
-    ------
-    InputError
-        If the input does not change, or nothing was recorded before the step.
-    """
+    """Return where the first step of a record is compared."""
     start = _first_jump(record[source])
     if start == 0:
         raise InputError(

@@ -17,12 +17,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigsight.errors import InputError, check_option
-from rigsight.excitation.measures import crest_factor
 
 Lines = Literal["full", "odd", "odd_random"]
 
 _CLIP = 0.9
 """Share of the peak that an iteration clips at: lower converges faster, and to a higher crest factor."""
+
+
+def crest_factor(signal: NDArray[np.float64]) -> float:
+    """Return the peak over the root mean square of a signal of shape (n_samples,); a sine has the square root of 2.
+
+    Raises
+    ------
+    InputError
+        If the signal is zero everywhere.
+    """
+    effective = math.sqrt(float(np.mean(np.square(signal))))
+    if effective == 0.0:
+        raise InputError("A signal that is zero everywhere has no crest factor.")
+    return float(np.max(np.abs(signal))) / effective
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,6 +126,15 @@ def stepped_sine(
     return np.where(tau < ends[-1], amplitude * np.sin(phase), 0.0)
 
 
+def time_bandwidth_product(duration: float, omega_start: float, omega_stop: float) -> float:
+    """Return duration [s] times the swept band, ``T |f_1 - f_0|``, from angular frequencies [rad/s].
+
+    Above some 100 the magnitude of a linear sweep's spectrum is nearly flat within the band and falls off sharply beside it
+    (thesis, section 2.1.3).
+    """
+    return duration * abs(omega_stop - omega_start) / (2.0 * math.pi)
+
+
 def _elapsed(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     if t.ndim != 1 or t.size < 2:
         raise InputError(

@@ -38,7 +38,7 @@ SPARE = 6
 _CHUNK = 4096
 _RANK = 1e-11
 """Relative singular value below which two terms of a local model are the same."""
-_ANSWERS = 10.0
+_RESPONDS = 10.0
 """Power over variance (10 dB) required of the source's response to an instrument, at lines with half of the instrument's power;
 by chance one line in 500 reaches it."""
 
@@ -104,18 +104,7 @@ def local_polynomial_response(
     well, ``transient=False`` is better still; without rest it is biased, and its variance does not show the bias.
     """
     return _local_response(
-        record,
-        source,
-        response,
-        order=order,
-        poles=0,
-        bandwidth=bandwidth,
-        transient=transient,
-        hold=hold,
-        band=band,
-        wanted=wanted,
-        instrument=instrument,
-        method="local polynomial",
+        record, source, response, order, 0, bandwidth, transient, hold, band, wanted, instrument
     )
 
 
@@ -161,18 +150,7 @@ def local_rational_response(
     distinguished, the variance may be several times too small.
     """
     return _local_response(
-        record,
-        source,
-        response,
-        order=order,
-        poles=order,
-        bandwidth=bandwidth,
-        transient=transient,
-        hold=hold,
-        band=band,
-        wanted=wanted,
-        instrument=instrument,
-        method="local rational",
+        record, source, response, order, order, bandwidth, transient, hold, band, wanted, instrument
     )
 
 
@@ -194,7 +172,6 @@ def _local_response(
     record: Record,
     source: str,
     response: str,
-    *,
     order: int,
     poles: int,
     bandwidth: float | None,
@@ -203,8 +180,8 @@ def _local_response(
     band: tuple[float, float] | None,
     wanted: NDArray[np.float64] | None,
     instrument: str | None,
-    method: str,
 ) -> FrequencyResponse:
+    method = "local rational" if poles else "local polynomial"
     if order < 0:
         raise InputError(f"The order of a local model must be 0 or more, got {order}.")
     what = f"Record '{record.name}'"
@@ -239,9 +216,9 @@ def _local_response(
         parts = [_solve(U, Y, chunk, model) for chunk in chunks]
     else:
         ratios = [_solve_ratio(R, U, Y, chunk, model) for chunk in chunks]
-        answers = np.concatenate([clearness for *_, clearness in ratios]) >= _ANSWERS
+        responds = np.concatenate([clearness for *_, clearness in ratios]) >= _RESPONDS
         power = np.abs(R[lines]) ** 2
-        if power @ answers < 0.5 * np.sum(power):
+        if power @ responds < 0.5 * np.sum(power):
             raise InputError(
                 f"{what}: the source '{source}' is not correlated with the instrument '{instrument}'."
             )

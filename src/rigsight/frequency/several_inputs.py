@@ -316,22 +316,22 @@ class _LocalModels:
             r = (s.omega[picked] - omega[:, None]) / reach
             powers = r[..., None] ** np.arange(max(n_terms, self._poles + 1))
             # A record has no information beyond its last line.
-            heard = (omega <= s.omega[-1])[:, None, None]
+            has_line = (omega <= s.omega[-1])[:, None, None]
             near_inputs = np.moveaxis(s.inputs[self._moving][:, picked], 0, 2)
-            near = np.where(heard, lines[picked][..., None], 0.0)
+            near = np.where(has_line, lines[picked][..., None], 0.0)
             terms = near_inputs[..., None] * powers[..., None, :n_terms]
             own = [
-                np.where(heard, terms.reshape(*picked.shape, -1), 0.0),
+                np.where(has_line, terms.reshape(*picked.shape, -1), 0.0),
                 -powers[..., 1 : self._poles + 1] * near,
                 near,
             ]
-            absorbed += np.where(heard[:, 0, 0], n_terms * s.has_transient, width)
+            absorbed += np.where(has_line[:, 0, 0], n_terms * s.has_transient, width)
             if s.has_transient:
                 own = _without(powers[..., :n_terms], own)
             for parts, part in zip(collected, own, strict=True):
                 parts.append(part)
-        inputs, past, answers = (np.concatenate(parts, axis=1) for parts in collected)
-        fit = LocalFit(np.concatenate([inputs, past], axis=2), answers[..., 0], absorbed)
+        inputs, past, responses = (np.concatenate(parts, axis=1) for parts in collected)
+        fit = LocalFit(np.concatenate([inputs, past], axis=2), responses[..., 0], absorbed)
         first = [n_terms * i for i in range(n_inputs)]
         values = np.stack([fit.coefficient(term) for term in first], axis=1)
         shares = np.stack([np.sum(np.abs(fit.shares(term)) ** 2, axis=1) for term in first], axis=1)

@@ -106,11 +106,11 @@ def excited(
     strongest, per_octave = power.max(initial=0.0), omega * power
     if strongest <= 0.0:
         raise InputError(f"{what} is constant: without excitation there is no frequency response.")
-    heard = np.asarray(
+    is_excited = np.asarray(
         (power >= _UNEXCITED * strongest) | (per_octave >= _UNEXCITED * per_octave.max()), dtype=np.bool_
     )
     if band is None:
-        return heard
+        return is_excited
     lower, upper = band
     if not 0.0 <= lower < upper:
         raise InputError(
@@ -122,9 +122,9 @@ def excited(
             f"{what} has no frequency from {lower:g} to {upper:g} rad/s; it reaches from {omega[0]:.4g} to "
             f"{omega[-1]:.4g} rad/s in steps of {omega[1] - omega[0] if omega.size > 1 else omega[0]:.4g} rad/s."
         )
-    silent = wished & ~heard
+    silent = wished & ~is_excited
     if silent.any():
-        excited_omega = omega[heard]
+        excited_omega = omega[is_excited]
         raise InputError(
             f"{what} does not excite {omega[silent][0]:.4g} to {omega[silent][-1]:.4g} rad/s of the requested band, "
             f"{lower:g} to {upper:g} rad/s. It excites {excited_omega[0]:.4g} to {excited_omega[-1]:.4g} rad/s: choose a band "

@@ -2,31 +2,37 @@
 
 from typing import TYPE_CHECKING
 
-from rigsight.plot.amplitude_dependence import AmplitudePanel as AmplitudePanel
-from rigsight.plot.amplitude_dependence import AmplitudePoint as AmplitudePoint
-from rigsight.plot.amplitude_dependence import amplitude_dependence as amplitude_dependence
+from rigsight.plot.diagnosis import ForceLoop as ForceLoop
 from rigsight.plot.diagnosis import comparison as comparison
 from rigsight.plot.diagnosis import detail_window as detail_window
+from rigsight.plot.diagnosis import force_loops as force_loops
 from rigsight.plot.diagnosis import gap_budget as gap_budget
 from rigsight.plot.diagnosis import ranking as ranking
 from rigsight.plot.diagnosis import step_window as step_window
 from rigsight.plot.drawing import DisplayScale as DisplayScale
 from rigsight.plot.drawing import display_scale as display_scale
 from rigsight.plot.drawing import envelope as envelope
+from rigsight.plot.drawing import png_bytes as png_bytes
 from rigsight.plot.drawing import style as style
 from rigsight.plot.drawing import svg_text as svg_text
-from rigsight.plot.force_loops import ForceLoop as ForceLoop
-from rigsight.plot.force_loops import force_loops as force_loops
+from rigsight.plot.drawing import with_unit as with_unit
+from rigsight.plot.estimates import AmplitudePanel as AmplitudePanel
+from rigsight.plot.estimates import AmplitudePoint as AmplitudePoint
+from rigsight.plot.estimates import GroupPanel as GroupPanel
+from rigsight.plot.estimates import amplitude_dependence as amplitude_dependence
+from rigsight.plot.estimates import parameters_by_group as parameters_by_group
 from rigsight.plot.frequency_responses import FittedCurve as FittedCurve
 from rigsight.plot.frequency_responses import Panel as Panel
+from rigsight.plot.frequency_responses import ResponseCell as ResponseCell
 from rigsight.plot.frequency_responses import bode as bode
 from rigsight.plot.frequency_responses import overlaid_responses as overlaid_responses
+from rigsight.plot.frequency_responses import response_grid as response_grid
 from rigsight.plot.gap_maps import gap_amplitudes as gap_amplitudes
 from rigsight.plot.gap_maps import gap_bands as gap_bands
 from rigsight.plot.gap_maps import gap_records as gap_records
 from rigsight.plot.gap_maps import gap_states as gap_states
 from rigsight.plot.gap_maps import gap_times as gap_times
-from rigsight.plot.missing_force import missing_force as missing_force
+from rigsight.plot.gap_maps import missing_force as missing_force
 from rigsight.plot.model_comparison import ErrorPanel as ErrorPanel
 from rigsight.plot.model_comparison import ResponsesPanel as ResponsesPanel
 from rigsight.plot.model_comparison import StepPanel as StepPanel
@@ -34,54 +40,9 @@ from rigsight.plot.model_comparison import model_errors as model_errors
 from rigsight.plot.model_comparison import model_responses as model_responses
 from rigsight.plot.model_comparison import model_steps as model_steps
 from rigsight.plot.model_comparison import model_styles as model_styles
-from rigsight.plot.parameters_by_group import GroupPanel as GroupPanel
-from rigsight.plot.parameters_by_group import parameters_by_group as parameters_by_group
-from rigsight.plot.response_grid import ResponseCell as ResponseCell
-from rigsight.plot.response_grid import response_grid as response_grid
 from rigsight.plot.rig_picture import PlaceMark as PlaceMark
 from rigsight.plot.rig_picture import rig_picture as rig_picture
 
 if TYPE_CHECKING:
     # For packages that pass figures on and must not import matplotlib.
     from matplotlib.figure import Figure as Figure
-
-__all__ = [
-    "AmplitudePanel",
-    "AmplitudePoint",
-    "DisplayScale",
-    "ErrorPanel",
-    "FittedCurve",
-    "ForceLoop",
-    "GroupPanel",
-    "Panel",
-    "PlaceMark",
-    "ResponseCell",
-    "ResponsesPanel",
-    "StepPanel",
-    "amplitude_dependence",
-    "bode",
-    "comparison",
-    "detail_window",
-    "display_scale",
-    "envelope",
-    "force_loops",
-    "gap_amplitudes",
-    "gap_bands",
-    "gap_budget",
-    "gap_records",
-    "gap_states",
-    "gap_times",
-    "missing_force",
-    "model_errors",
-    "model_responses",
-    "model_steps",
-    "model_styles",
-    "overlaid_responses",
-    "parameters_by_group",
-    "ranking",
-    "response_grid",
-    "rig_picture",
-    "step_window",
-    "style",
-    "svg_text",
-]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,10 @@ from rigsight.plot.drawing import (
     GIVEN,
     MEASURED,
     OTHER,
+    PAGE_WIDTH,
     REIDENTIFIED,
     STAGE_STYLES,
     WITH_EFFECT,
-    envelope,
     in_style,
     line,
     new_figure,
@@ -27,6 +28,7 @@ from rigsight.plot.drawing import (
     set_margins,
     shown_in,
     text_width,
+    with_unit,
 )
 from rigsight.records.stamps import time_label, time_origin
 
@@ -34,8 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WIDTH = 5.4
-"""Inch; on a phone, where it is scaled to the screen, letters stay readable."""
 _NAMES = 9.0
 """Size of letters beside bars [points]."""
 _LONGEST_NAME = 42
@@ -51,6 +51,7 @@ _RINGING = 5.0
 """Multiple of the measured settling time up to which the ringing of a simulation is shown."""
 _NOISE_REACHES = 5.0
 """Standard deviations that noise does not exceed in some thousand samples."""
+_FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
 _BINS = 250
 """Bins of a line in print, where the axis of a whole record is some 110 mm wide."""
 
@@ -116,21 +117,9 @@ def _largest(residual: NDArray[np.float64], length: int) -> slice:
 def gap_budget(
     diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | None = None, is_given: bool = True
 ) -> Figure:
-    """Draw the gap of each output as a waterfall: given, explained by parameters and by the effect, remaining, noise floor.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    after_label
-        What the last step adds, e.g. ``"Adding cubic stiffness"``.
-    labels
-        Panel title by output; default is its name.
-    is_given
-        False where no simulation was given: the waterfall then starts at the identified equations.
-    """
+    """Draw the gap of each output as a waterfall: given, explained by parameters and by the effect, remaining, noise floor."""
     outputs = list(diagnosis.gap)
-    figure = new_figure(_WIDTH, 0.45 + 1.75 * max(1, len(outputs)), layout=None)
+    figure = new_figure(PAGE_WIDTH, 0.45 + 1.75 * max(1, len(outputs)), layout=None)
     axes = figure.subplots(max(1, len(outputs)), 1, squeeze=False)[:, 0]
     for ax, output in zip(axes, outputs, strict=False):
         gap = diagnosis.gap[output]
@@ -150,7 +139,7 @@ def gap_budget(
             is_total = row == 0 or name == "Left over"
             _waterfall_step(ax, row, 100.0 * start, 100.0 * stop, color, right, is_total)
         if np.isfinite(gap.noise_floor):
-            ax.axvline(100.0 * gap.noise_floor, color=FLOOR, linestyle=(0, (4, 2)), linewidth=1.2)
+            ax.axvline(100.0 * gap.noise_floor, **_FLOOR_LINE)
             ax.annotate(
                 f"noise floor {100.0 * gap.noise_floor:.2g} %",
                 (100.0 * gap.noise_floor, 1.0), (3, 1), xycoords=("data", "axes fraction"), textcoords="offset points",
@@ -162,7 +151,6 @@ def gap_budget(
         ax.tick_params(axis="y", length=0)
         ax.set_title((labels or {}).get(output, output), pad=14)
         ax.grid(axis="x")
-        ax.set_axisbelow(True)
     axes[-1].set_xlabel("gap [% of the measured RMS]")
     names = ["Given simulation", "Re-identified", after_label]
     set_margins(figure, 0.14 + text_width(names, _NAMES), 0.1, 0.48, 0.42, between=(0.0, 0.66))
@@ -183,23 +171,13 @@ def _waterfall_step(
 
 @in_style
 def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figure:
-    """Draw the error of each candidate on the validation records, in units of the noise floor on a logarithmic axis.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    names
-        Label of each candidate, in their order.
-    limit
-        Candidates drawn, best first.
-    """
+    """Draw the error of each candidate on the validation records, in units of the noise floor on a logarithmic axis."""
     candidates = diagnosis.candidates[:limit]
     shown = [fill(name, _LONGEST_NAME) for name in names[: len(candidates)]]
     # A name of several lines needs a higher row; rows are counted from the top edge of the first.
     heights = [1.0 + _FURTHER_LINE * name.count("\n") for name in shown] or [1.0]
     rows = np.cumsum(heights) - 0.5 * np.array(heights)
-    figure = new_figure(_WIDTH, 0.85 + 0.27 * sum(heights), layout=None)
+    figure = new_figure(PAGE_WIDTH, 0.85 + 0.27 * sum(heights), layout=None)
     ax = figure.subplots()
     finite = [
         c.error_over_noise for c in candidates if np.isfinite(c.error_over_noise) and c.error_over_noise > 0.0
@@ -214,26 +192,18 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
         is_named = bool(diagnosis.effects) and candidate.effects == diagnosis.effects
         color = WITH_EFFECT if is_named else OTHER
         hatch = "////" if candidate.effects in tied else None
-        ax.barh(
-            row,
-            candidate.error_over_noise - left,
-            left=left,
-            height=0.62,
-            color=color,
-            hatch=hatch,
-            edgecolor="white",
-        )
-        ax.annotate(f"{candidate.error_over_noise:.3g} ×", (max(candidate.error_over_noise, left), row), (4, 0),
+        error = candidate.error_over_noise
+        ax.barh(row, error - left, left=left, height=0.62, color=color, hatch=hatch, edgecolor="white")
+        ax.annotate(f"{error:.3g} ×", (max(error, left), row), (4, 0),
                     textcoords="offset points", va="center", fontsize=8.5, color=FLOOR)  # fmt: skip
     ax.set_xscale("log")
     ax.set_xlim(left, right * (right / left) ** 0.12)
     plain_log_ticks(ax, left, right)
-    ax.axvline(1.0, color=FLOOR, linestyle=(0, (4, 2)), linewidth=1.2)
+    ax.axvline(1.0, **_FLOOR_LINE)
     ax.set_yticks(rows[: len(shown)], shown)
     ax.set_ylim(sum(heights) + 0.05, -0.05)
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="x")
-    ax.set_axisbelow(True)
     ax.set_xlabel("residual RMS / noise floor (dashed: 1, perfect)")
     lines = [line for name in shown for line in name.split("\n")]
     set_margins(figure, 0.14 + text_width(lines, _NAMES), 0.1, 0.48, 0.08)
@@ -249,23 +219,7 @@ def comparison(
     after_label: str = "after",
     stages: Mapping[Stage, str] | None = None,
 ) -> Figure:
-    """Draw measured against simulated, by default given and after, with the residuals below.
-
-    Parameters
-    ----------
-    diagnosis
-        The result; gives units and noise floor.
-    trace
-        One record.
-    output
-        Name of the output.
-    window
-        Samples to draw; all where None.
-    after_label
-        What the simulation after the diagnosis is called in the legend.
-    stages
-        What is drawn instead of given and after, with its name in the legend.
-    """
+    """Draw measured against simulated, by default given and after, with the residuals below."""
     from matplotlib.ticker import MaxNLocator
 
     shown = window or slice(None)
@@ -282,16 +236,15 @@ def comparison(
     figure = new_figure(width, height, layout=None)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     set_margins(figure, 0.66, 0.14, 0.46, 0.34, between=(0.0, 0.15))
-    line(top, *printed(t, measured * factor), MEASURED, "measured", linewidth=2.6, alpha=0.55)
+    line(top, t, measured * factor, _BINS, color=MEASURED, label="measured", linewidth=2.6, alpha=0.55)
     for stage, error in errors.items():
         look = STAGE_STYLES[stage]
-        line(top, *printed(t, (measured + error) * factor), label=names[stage], linewidth=1.0, **look)
-        line(bottom, *printed(t, error * error_factor), color=look["color"], linewidth=0.8)
+        line(top, t, (measured + error) * factor, _BINS, label=names[stage], linewidth=1.0, **look)
+        line(bottom, t, error * error_factor, _BINS, color=look["color"], linewidth=0.8)
     floor = next((f.std for f in diagnosis.noise_floors if f.output == output), None)
     if floor is not None and np.isfinite(floor):
-        bottom.axhspan(
-            -2 * floor * error_factor, 2 * floor * error_factor, color=FLOOR, alpha=0.12, linewidth=0
-        )
+        reach = 2 * floor * error_factor
+        bottom.axhspan(-reach, reach, color=FLOOR, alpha=0.12, linewidth=0)
     top.set_ylabel(f"{output} [{unit}]")
     bottom.set_ylabel(f"error [{error_unit}]")
     bottom.set_xlabel(time_label(trace.t))
@@ -305,8 +258,57 @@ def comparison(
     return figure
 
 
-def printed(
-    t: NDArray[np.float64], values: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a line over time with as many points as paper shows; where it is not finite, there is a gap."""
-    return envelope(t, np.where(np.isfinite(values), values, np.nan), _BINS)
+@dataclass(frozen=True, eq=False)
+class ForceLoop:
+    """A stretch of motion and the force over it."""
+
+    # Names of the signals.
+    motion: str
+    force: str
+    # SI units.
+    motion_unit: str
+    force_unit: str
+    # Shape (n_samples,).
+    displacement: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    simulated: Mapping[Stage, NDArray[np.float64]]  # stage -> its force, shape (n_samples,)
+
+
+@in_style
+def force_loops(loop: ForceLoop, stages: Mapping[Stage, str]) -> Figure:
+    """Draw the force over displacement and, beside it, over velocity: measured, and each stage."""
+    from matplotlib.ticker import MaxNLocator
+
+    figure = new_figure(PAGE_WIDTH, 2.9, layout=None)
+    axes = figure.subplots(1, 2, sharey=True)
+    set_margins(figure, 0.75, 0.15, 0.46, 0.36, between=(0.18, 0.0))
+    factor, unit = shown_in(loop.force_unit, loop.measured)
+    # A diverging simulation leaves the axes, so that the other curves stay readable.
+    low, high = factor * float(np.nanmin(loop.measured)), factor * float(np.nanmax(loop.measured))
+    reach = 0.3 * (high - low) or 1.0
+    simulated = [factor * force[np.isfinite(force)] for force in loop.simulated.values()]
+    bottom = max(low - reach, min([low, *(float(np.min(own, initial=low)) for own in simulated)]))
+    top = min(high + reach, max([high, *(float(np.max(own, initial=high)) for own in simulated)]))
+    measured: dict[str, Any] = {"color": MEASURED, "linewidth": 2.6, "alpha": 0.55}
+    across = (
+        (loop.displacement, loop.motion, loop.motion_unit),
+        (loop.velocity, f"rate of {loop.motion}", f"{loop.motion_unit}/s"),
+    )
+    for ax, (places, name, places_unit) in zip(axes, across, strict=True):
+        scale, shown = shown_in(places_unit, places)
+        ax.plot(scale * places, factor * loop.measured, label="measured", **measured)
+        for stage, label in stages.items():
+            # Points that are not finite leave a gap.
+            force = np.where(np.isfinite(loop.simulated[stage]), loop.simulated[stage], np.nan)
+            ax.plot(scale * places, factor * force, linewidth=1.1, label=label, **STAGE_STYLES[stage])
+        ax.set_xlabel(with_unit(name, shown))
+        ax.xaxis.set_major_locator(MaxNLocator(4))
+        ax.grid()
+    axes[0].set_ylim(bottom - 0.05 * (top - bottom), top + 0.05 * (top - bottom))
+    axes[0].set_ylabel(with_unit(loop.force, unit))
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="upper left", ncols=4, fontsize=8.5, handlelength=2.2, columnspacing=1.4
+    )
+    return figure

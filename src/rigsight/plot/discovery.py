@@ -10,7 +10,16 @@ import numpy as np
 
 from rigsight.discover import JointForce
 from rigsight.discover.result import Discovery, Run, Term
-from rigsight.plot.drawing import MEASURED, OTHER, WITH_EFFECT, in_style, line, new_figure, shown_in
+from rigsight.plot.drawing import (
+    MEASURED,
+    OTHER,
+    TWO_SIDED,
+    WITH_EFFECT,
+    in_style,
+    line,
+    new_figure,
+    shown_in,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,12 +66,10 @@ def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
     motions = ((x, joint.x_unit, "x"), (v, "1/s" if joint.x_unit == "1" else f"{joint.x_unit}/s", "v"))
     for ax, (motion, motion_unit, symbol) in zip(axes, motions, strict=True):
         scale, shown_unit = shown_in(motion_unit, motion)
-        ax.plot(
-            scale * motion[some], factor * force[some], ".", color=MEASURED, markersize=1.0, label="missing"
-        )
-        if joint.law.terms:
+        drawn = [(force, MEASURED, "missing"), (law, WITH_EFFECT, "law")][: 2 if joint.law.terms else 1]
+        for values, color, label in drawn:
             ax.plot(
-                scale * motion[some], factor * law[some], ".", color=WITH_EFFECT, markersize=1.0, label="law"
+                scale * motion[some], factor * values[some], ".", color=color, markersize=1.0, label=label
             )
         ax.set_xlabel(f"{symbol} of {_spoken(joint.joint)} [{shown_unit}]")
         ax.grid()
@@ -106,10 +113,10 @@ def _numbers(found: Discovery) -> list[tuple[str, float]]:
 def _draw_coefficients(ax: Axes, numbers: list[tuple[str, float]]) -> None:
     """Draw 95 % intervals relative to the values; an interval that contains zero is replaced by a note."""
     places = list(range(len(numbers)))
-    known = [1.96 * error for _, error in numbers if 1.96 * error < 1.0]
+    known = [TWO_SIDED * error for _, error in numbers if TWO_SIDED * error < 1.0]
     reach = max([*known, 1e-4]) * 1.2
     for place, (_, error) in zip(places, numbers, strict=True):
-        width = 1.96 * error
+        width = TWO_SIDED * error
         if not width < 1.0:
             words = "not distinguishable from zero" if math.isfinite(width) else "not determined"
             ax.text(0.02 * reach * 100, place, words, va="center", fontsize=8, color=MEASURED)
@@ -126,19 +133,16 @@ def _draw_coefficients(ax: Axes, numbers: list[tuple[str, float]]) -> None:
 
 def _draw_run(upper: Axes, lower: Axes, run: Run) -> None:
     factor, unit = shown_in(run.unit, run.measured)
-    line(upper, run.t, factor * run.measured, MEASURED, "measured", linewidth=1.6)
-    line(upper, run.t, factor * run.simulated, WITH_EFFECT, "free run", linewidth=0.9)
-    upper.set_ylabel(f"{run.output} [{unit}]")
-    upper.set_title(
-        f"Free run on {run.record} (held out)" if run.role == "validation" else f"Free run on {run.record}"
-    )
+    line(upper, run.t, factor * run.measured, color=MEASURED, label="measured", linewidth=1.6)
+    line(upper, run.t, factor * run.simulated, color=WITH_EFFECT, label="free run", linewidth=0.9)
+    held_out = " (held out)" if run.role == "validation" else ""
+    upper.set(title=f"Free run on {run.record}{held_out}", ylabel=f"{run.output} [{unit}]")
     upper.legend(loc="upper right", ncols=2, fontsize=8)
     upper.tick_params(labelbottom=False)
     error = run.measured - run.simulated
     error_factor, error_unit = shown_in(run.unit, error)
-    line(lower, run.t, error_factor * error, WITH_EFFECT, linewidth=0.7)
-    lower.set_ylabel(f"error [{error_unit}]")
-    lower.set_xlabel("time [s]")
+    line(lower, run.t, error_factor * error, color=WITH_EFFECT, linewidth=0.7)
+    lower.set(xlabel="time [s]", ylabel=f"error [{error_unit}]")
     for ax in (upper, lower):
         ax.set_xlim(float(run.t[0]), float(run.t[-1]))
         ax.grid()

@@ -54,6 +54,7 @@ STYLE: dict[Any, Any] = {
     "xtick.color": "#3b434b",
     "ytick.color": "#3b434b",
     "grid.color": "#e3e7ea",
+    "axes.axisbelow": True,
     "legend.frameon": False,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
@@ -63,6 +64,10 @@ STYLE: dict[Any, Any] = {
     "text.parse_math": False,
 }
 
+TWO_SIDED = 1.96
+"""Standard deviations of a 95 % interval."""
+PAGE_WIDTH = 5.4
+"""Of a figure in a page [inch]; on a phone, where it is scaled to the screen, letters stay readable."""
 _PREFIXES = {6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}
 _PREFIXED = ("rad", "m", "N", "N m", "A", "V", "Pa", "W", "K")
 _ENVELOPE_BINS = 600
@@ -104,15 +109,7 @@ class DisplayScale:
 
 
 def display_scale(unit: str, size: float) -> DisplayScale:
-    """Return the scale by which a quantity of typical `size` is shown, e.g. mrad for 0.01 rad.
-
-    Parameters
-    ----------
-    unit
-        SI unit; units that take no prefix (``"m/s"``, ``"1"``) are left alone.
-    size
-        Largest absolute value to be shown.
-    """
+    """Return the scale by which a quantity of typical `size` is shown, e.g. mrad for 0.01 rad."""
     if unit not in _PREFIXED or not np.isfinite(size) or size <= 0.0:
         return DisplayScale(1.0, unit)
     exponent = int(np.clip(3 * np.floor(np.log10(size) / 3.0), -9, 6))
@@ -125,20 +122,7 @@ def display_scale(unit: str, size: float) -> DisplayScale:
 def envelope(
     t: NDArray[np.float64], values: NDArray[np.float64], n_bins: int = _ENVELOPE_BINS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a shorter line with the same picture: lowest and highest finite sample of each bin, in their order in time.
-
-    Parameters
-    ----------
-    t, values
-        Shape (n_samples,).
-    n_bins
-        Bins; a line of at most ``2 * n_bins`` samples is returned unchanged.
-
-    Returns
-    -------
-    t, values
-        Shape (at most 2 * n_bins,).
-    """
+    """Return a shorter line with the same picture: lowest and highest finite sample of each bin, in their order in time."""
     if values.size <= 2 * n_bins:
         return t, values
     size = -(-values.size // n_bins)
@@ -169,16 +153,10 @@ def plain_log_ticks(ax: Axes, left: float, right: float) -> None:
 
 
 def line(
-    ax: Axes,
-    t: NDArray[np.float64],
-    values: NDArray[np.float64],
-    color: str,
-    label: str | None = None,
-    **style: Any,
+    ax: Axes, t: NDArray[np.float64], values: NDArray[np.float64], n_bins: int = _ENVELOPE_BINS, **style: Any
 ) -> None:
     """Draw a line over time with all its peaks; where it is not finite, there is a gap."""
-    finite = np.where(np.isfinite(values), values, np.nan)
-    ax.plot(*envelope(t, finite), color=color, label=label, **style)
+    ax.plot(*envelope(t, np.where(np.isfinite(values), values, np.nan), n_bins), **style)
 
 
 def shown_in(unit: str, *series: NDArray[np.float64]) -> tuple[float, str]:
@@ -186,6 +164,11 @@ def shown_in(unit: str, *series: NDArray[np.float64]) -> tuple[float, str]:
     peaks = [float(np.max(np.abs(s[np.isfinite(s)]), initial=0.0)) for s in series]
     scale = display_scale(unit, max(peaks))
     return scale.factor, scale.unit
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit in brackets, if it has one."""
+    return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
 def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
@@ -196,6 +179,14 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
     figure = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
+
+
+def panel_grid(figure: Figure, count: int, columns: int, **options: Any) -> list[Axes]:
+    """Return the axes of so many panels, row by row; the places that remain in the last row stay empty."""
+    axes = list(figure.subplots(-(-count // columns), columns, squeeze=False, **options).flat)
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    return axes[:count]
 
 
 def set_margins(
@@ -252,4 +243,12 @@ def svg_text(figure: Figure, key: str) -> str:
             figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
         finally:
             figure.set_layout_engine(engine)
+    return stream.getvalue()
+
+
+def png_bytes(figure: Figure, dpi: int) -> bytes:
+    """Return a figure as PNG."""
+    stream = io.BytesIO()
+    with style():
+        figure.savefig(stream, format="png", dpi=dpi)
     return stream.getvalue()

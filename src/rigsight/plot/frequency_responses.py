@@ -1,10 +1,10 @@
-"""Figures of frequency responses: measured and fitted, and several amplitudes in one plot."""
+"""Figures of frequency responses: measured and fitted, several amplitudes in one plot, grids of inputs and sensors, variants."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.plot.drawing import (
     FLOOR,
     MEASURED,
+    TWO_SIDED,
     WITH_EFFECT,
     in_style,
     new_figure,
@@ -24,83 +25,71 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TWO_SIDED = 1.96
-"""Standard deviations of a 95 % interval."""
-_MOST_LINES = 800
+_MOST_LINES, _MOST_OF_CELL = 800, 250
+"""As many points as a panel of a record, and a small one of a grid, can show."""
 _LEGEND_COLUMNS = 6
+_OMEGA = "angular frequency [rad/s]"
 _FACES = ("#440154", "#3b528b", "#21918c", "#5ec962", "#d8b40a", "#d55e00")
 """Viridis, its yellow darkened for white paper: in order also in gray, and for color-blind readers."""
+_VARIED = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))
+_LIGHTEST = 0.84
+"""Share of the color map that is still seen on white."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedCurve:
-    """A fitted frequency response.
+    """A fitted frequency response."""
 
-    Attributes
-    ----------
-    omega
-        Angular frequencies [rad/s], shape (n,).
-    values
-        Complex response, shape (n,).
-    std
-        ``sqrt(E |error|^2)``, shape (n,).
-    label
-        What it is called.
-    """
-
-    omega: NDArray[np.float64]
-    values: NDArray[np.complex128]
-    std: NDArray[np.float64]
-    label: str
+    omega: NDArray[np.float64]  # angular frequencies [rad/s], shape (n,)
+    values: NDArray[np.complex128]  # complex response, shape (n,)
+    std: NDArray[np.float64]  # ``sqrt(E |error|^2)``, shape (n,)
+    label: str  # what it is called
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One signal path of a Bode plot.
+    """One signal path of a Bode plot."""
 
-    Attributes
-    ----------
-    title
-        Which path.
-    measured
-        The frequency response.
-    fitted
-        The fit, None where there is none.
-    label
-        Name in a plot of several, e.g. the amplitude.
-    """
+    title: str  # which path
+    measured: FrequencyResponse  # the frequency response
+    fitted: FittedCurve | None = None  # the fit, None where there is none
+    label: str = ""  # name in a plot of several, e.g. the amplitude
 
-    title: str
-    measured: FrequencyResponse
-    fitted: FittedCurve | None = None
-    label: str = ""
+
+@dataclass(frozen=True, eq=False)
+class ResponseCell:
+    """One path of a grid of inputs and sensors."""
+
+    # Input, sensor, and the unit of their ratio.
+    source: str
+    response: str
+    unit: str
+    measured: FrequencyResponse | None  # None where the records do not show it
+    model: FittedCurve | None  # None where there is none
+    remark: str = ""  # stands in an empty panel
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The frequency response of a variant of a model."""
+
+    label: str  # for the legend
+    values: NDArray[np.complex128]  # complex, shape (n_frequencies,)
+    is_base: bool = False  # true for the model as it is; drawn black and wider
 
 
 @in_style
 def bode(panels: Sequence[Panel]) -> Figure:
-    """Draw measured against fitted as magnitude and phase, one column per path, with 95 % bands.
-
-    Parameters
-    ----------
-    panels
-        One or two paths of a record.
-    """
+    """Draw measured against fitted as magnitude and phase, one column per path, with 95 % bands."""
     figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 4.9)
     axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", height_ratios=[3, 2])
-    for column, whole in enumerate(panels):
-        panel = replace(whole, measured=thinned(whole.measured))
-        top, bottom = axes[0, column], axes[1, column]
-        draw_magnitude(top, panel)
-        draw_phase(bottom, panel)
-        top.set_title(panel.title)
-        top.set_ylabel(f"magnitude [dB re 1 {panel.measured.unit}]")
-        bottom.set_ylabel("phase [deg]")
-        bottom.set_xlabel("angular frequency [rad/s]")
-        log_axis(bottom, [panel.measured])
-        for ax in (top, bottom):
-            ax.grid()
-            ax.set_axisbelow(True)
-        rises = panel.measured.magnitude[-1] > panel.measured.magnitude[0]
+    for panel, (top, bottom) in zip(panels, axes.T, strict=True):
+        measured = thinned(panel.measured)
+        _draw_magnitude(top, measured, panel.fitted)
+        _draw_phase(bottom, measured, panel.fitted)
+        label_bode(top, bottom, panel.title, measured.unit)
+        span(bottom, [measured.omega])
+        rises = measured.magnitude[-1] > measured.magnitude[0]
         top.legend(loc="upper left" if rises else "lower left", fontsize=8.5)
     figure.align_ylabels(axes)
     return figure
@@ -108,15 +97,7 @@ def bode(panels: Sequence[Panel]) -> Figure:
 
 @in_style
 def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "fitted") -> Figure:
-    """Draw the magnitudes of several records over each other: measured as lines, fitted dashed in the same color.
-
-    Parameters
-    ----------
-    columns
-        One sequence of panels per path, in the order of the amplitudes; their titles name the path, their labels the record.
-    fitted_label
-        What the dashed lines are called.
-    """
+    """Draw the magnitudes of several records over each other: measured as lines, fitted dashed in the same color."""
     labels = list(dict.fromkeys(panel.label for panels in columns for panel in panels))
     legend_rows = -(-(len(labels) + 1) // _LEGEND_COLUMNS)
     width, height = 4.6 * len(columns) + (1.4 if len(columns) == 1 else 0.0), 3.8 + 0.2 * legend_rows
@@ -124,35 +105,22 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "
     axes = figure.subplots(1, len(columns), squeeze=False)[0]
     set_margins(figure, 0.72, 0.12, 0.48, 0.35 + 0.2 * legend_rows, between=(0.75, 0.0))
     colors = dict(zip(labels, amplitude_colors(len(labels)), strict=True))
+    dashed: dict[str, Any] = {"linewidth": 1.4, "linestyle": (0, (4, 2))}
     for ax, panels in zip(axes, columns, strict=True):
         values = []
         for panel in panels:
             color = colors[panel.label]
-            ax.plot(
-                panel.measured.omega,
-                panel.measured.magnitude_db,
-                color=color,
-                linewidth=1.1,
-                alpha=0.7,
-                label=panel.label,
-            )
-            values.append(panel.measured.magnitude_db)
-            if panel.fitted is not None:
-                values.append(decibel(np.abs(panel.fitted.values)))
-                ax.plot(
-                    panel.fitted.omega,
-                    values[-1],
-                    color=color,
-                    linewidth=1.4,
-                    linestyle=(0, (4, 2)),
-                )
+            measured, fitted = panel.measured, panel.fitted
+            values.append(measured.magnitude_db)
+            ax.plot(measured.omega, values[-1], color=color, linewidth=1.1, alpha=0.7, label=panel.label)
+            if fitted is not None:
+                values.append(decibel(np.abs(fitted.values)))
+                ax.plot(fitted.omega, values[-1], color=color, **dashed)
         limit(ax, np.concatenate(values))
-        log_axis(ax, [panel.measured for panel in panels])
-        ax.set_title(panels[0].title)
-        ax.set_ylabel(f"magnitude [dB re 1 {panels[0].measured.unit}]")
-        ax.set_xlabel("angular frequency [rad/s]")
+        span(ax, [panel.measured.omega for panel in panels])
+        ax.set(title=panels[0].title, xlabel=_OMEGA, ylabel=f"magnitude [dB re 1 {panels[0].measured.unit}]")
         ax.grid()
-    axes[0].plot([], [], color=FLOOR, linewidth=1.4, linestyle=(0, (4, 2)), label=fitted_label)
+    axes[0].plot([], [], color=FLOOR, label=fitted_label, **dashed)
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="upper left", ncols=min(len(names), _LEGEND_COLUMNS), fontsize=8.5)
     return figure
@@ -181,29 +149,21 @@ def decibel(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(20.0 * np.log10(np.maximum(values, 1e-300)))
 
 
-def draw_magnitude(ax: Axes, panel: Panel) -> None:
+def _draw_magnitude(ax: Axes, measured: FrequencyResponse, fitted: FittedCurve | None) -> None:
     """Draw the magnitude of a path [dB] with its bands."""
-    measured = panel.measured
-    size = measured.magnitude
-    shown = measured.magnitude_db
+    values = [measured.magnitude_db]
     if measured.variance is not None:
         # A component of the complex error has half of its variance.
         reach = TWO_SIDED * np.sqrt(0.5 * measured.variance)
-        ax.fill_between(
-            measured.omega, decibel(size - reach), decibel(size + reach), color=MEASURED, alpha=0.25, linewidth=0
-        )  # fmt: skip
-    ax.plot(
-        measured.omega, shown, color=MEASURED, linestyle="none", marker=".", markersize=3.5, label=measured_label(measured)
-    )  # fmt: skip
-    values = [shown]
-    if panel.fitted is not None:
-        fitted = panel.fitted
+        low, high = decibel(measured.magnitude - reach), decibel(measured.magnitude + reach)
+        ax.fill_between(measured.omega, low, high, color=MEASURED, alpha=0.25, linewidth=0)
+    ax.plot(measured.omega, values[0], ".", color=MEASURED, markersize=3.5, label=measured_label(measured))
+    if fitted is not None:
         size, reach = np.abs(fitted.values), TWO_SIDED * np.sqrt(0.5) * fitted.std
-        ax.fill_between(
-            fitted.omega, decibel(size - reach), decibel(size + reach), color=WITH_EFFECT, alpha=0.3, linewidth=0
-        )  # fmt: skip
-        ax.plot(fitted.omega, decibel(size), color=WITH_EFFECT, linewidth=1.3, label=fitted.label)
+        low, high = decibel(size - reach), decibel(size + reach)
+        ax.fill_between(fitted.omega, low, high, color=WITH_EFFECT, alpha=0.3, linewidth=0)
         values.append(decibel(size))
+        ax.plot(fitted.omega, values[1], color=WITH_EFFECT, linewidth=1.3, label=fitted.label)
     limit(ax, np.concatenate(values))
 
 
@@ -212,14 +172,12 @@ def measured_label(measured: FrequencyResponse) -> str:
     return "measured, 95 % band" if measured.variance is not None else "measured"
 
 
-def draw_phase(ax: Axes, panel: Panel) -> None:
+def _draw_phase(ax: Axes, measured: FrequencyResponse, fitted: FittedCurve | None) -> None:
     """Draw the phase of a path [deg] with its bands."""
     from matplotlib.ticker import MultipleLocator
 
-    measured = panel.measured
     phase = np.degrees(measured.phase)
-    if panel.fitted is not None:
-        fitted = panel.fitted
+    if fitted is not None:
         branch = np.unwrap(np.angle(fitted.values))
         own = np.degrees(branch)
         # A noisy line cannot turn all that follow by 360 degrees.
@@ -230,7 +188,7 @@ def draw_phase(ax: Axes, panel: Panel) -> None:
     if measured.variance is not None:
         reach = np.degrees(TWO_SIDED * np.sqrt(0.5 * measured.variance) / measured.magnitude)
         ax.fill_between(measured.omega, phase - reach, phase + reach, color=MEASURED, alpha=0.25, linewidth=0)
-    ax.plot(measured.omega, phase, color=MEASURED, linestyle="none", marker=".", markersize=3.5)
+    ax.plot(measured.omega, phase, ".", color=MEASURED, markersize=3.5)
     low, high = np.percentile(phase, [1.0, 99.0])
     ax.set_ylim(45.0 * np.floor(low / 45.0) - 10.0, 45.0 * np.ceil(high / 45.0) + 10.0)
     ax.yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
@@ -243,15 +201,91 @@ def limit(ax: Axes, values: NDArray[np.float64]) -> None:
     ax.set_ylim(float(low - margin), float(high + margin))
 
 
-def log_axis(ax: Axes, responses: Sequence[FrequencyResponse]) -> None:
-    """Let the frequency axis span these responses."""
-    left = min(float(response.omega[0]) for response in responses)
-    right = max(float(response.omega[-1]) for response in responses)
-    log_axis_over(ax, left, right)
-
-
-def log_axis_over(ax: Axes, left: float, right: float) -> None:
-    """Let the frequency axis span these limits [rad/s]."""
+def span(ax: Axes, omegas: Sequence[NDArray[np.float64]]) -> None:
+    """Let the logarithmic frequency axis span these frequencies [rad/s], each ascending."""
+    left, right = min(float(omega[0]) for omega in omegas), max(float(omega[-1]) for omega in omegas)
     ax.set_xscale("log")
     ax.set_xlim(left, right)
     plain_log_ticks(ax, left, right)
+
+
+def label_bode(top: Axes, bottom: Axes, title: str, unit: str) -> None:
+    """Label magnitude above phase."""
+    top.set(title=title, ylabel=f"magnitude [dB re 1 {unit}]")
+    bottom.set(xlabel=_OMEGA, ylabel="phase [deg]")
+    for ax in (top, bottom):
+        ax.grid()
+
+
+@in_style
+def response_grid(cells: Sequence[Sequence[ResponseCell]]) -> Figure:
+    """Draw magnitude over phase of every path, with 95 % bands: sensors are rows, inputs columns."""
+    n_rows, n_columns = len(cells), len(cells[0])
+    figure = new_figure(max(3.9 * n_columns, 6.0), 3.9 * n_rows + 0.3)
+    axes = figure.subplots(2 * n_rows, n_columns, squeeze=False, height_ratios=[3, 2] * n_rows)
+    curves = [own for row in cells for cell in row for own in (cell.measured, cell.model) if own is not None]
+    omegas = [curve.omega for curve in curves] or [np.array([0.1, 10.0])]
+    has_legend = False
+    for i, row in enumerate(cells):
+        for j, cell in enumerate(row):
+            top, bottom = axes[2 * i, j], axes[2 * i + 1, j]
+            _draw_cell(top, bottom, cell)
+            top.set_title(f"{cell.source} \u2192 {cell.response}")
+            for ax in (top, bottom):
+                span(ax, omegas)
+                ax.grid()
+            top.tick_params(labelbottom=False)
+            if j == 0:
+                bottom.set_ylabel("phase [deg]")
+            top.set_ylabel(f"magnitude [dB re 1 {cell.unit}]" if cell.unit != "1" else "magnitude [dB]")
+            if i == n_rows - 1:
+                bottom.set_xlabel(_OMEGA)
+            if cell.measured is not None and not has_legend:
+                top.legend(loc="lower left", fontsize=8.0)
+                has_legend = True
+    figure.align_ylabels(axes)
+    return figure
+
+
+def _draw_cell(top: Axes, bottom: Axes, cell: ResponseCell) -> None:
+    if cell.measured is not None:
+        measured = thinned(cell.measured, _MOST_OF_CELL)
+        _draw_magnitude(top, measured, cell.model)
+        _draw_phase(bottom, measured, cell.model)
+        return
+    if cell.model is not None:
+        size = decibel(np.abs(cell.model.values))
+        top.plot(cell.model.omega, size, color=WITH_EFFECT, linewidth=1.3)
+        limit(top, size)
+        phase = np.degrees(np.unwrap(np.angle(cell.model.values)))
+        bottom.plot(cell.model.omega, phase, color=WITH_EFFECT, linewidth=1.3)
+    top.text(0.03, 0.05, cell.remark, transform=top.transAxes, fontsize=8.0)
+
+
+@in_style
+def varied_responses(
+    omega: NDArray[np.float64], curves: Sequence[Curve], pair: str, unit: str, title: str
+) -> Figure:
+    """Draw magnitude [dB] and phase [deg] over angular frequency, one color and line style per curve."""
+    import matplotlib as mpl
+
+    figure = new_figure(7.4, 5.0)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    colors = mpl.colormaps["cividis"](np.linspace(0.0, _LIGHTEST, max(len(curves), 2)))
+    for i, curve in enumerate(curves):
+        style = {"color": colors[i], "linewidth": 1.4, "linestyle": _VARIED[i % len(_VARIED)], "zorder": 2}
+        if curve.is_base:
+            style = {"color": "black", "linewidth": 2.2, "linestyle": "-", "zorder": 3}
+        with np.errstate(divide="ignore"):
+            top.plot(omega, 20.0 * np.log10(np.abs(curve.values)), label=curve.label, **style)
+        bottom.plot(omega, np.degrees(np.unwrap(np.angle(curve.values))), **style)
+    label_bode(top, bottom, title, unit)
+    top.set_ylabel(f"magnitude {pair} [dB of 1 {unit}]")
+    bottom.set_ylabel("phase [\u00b0]")
+    span(bottom, [omega])
+    low = float(np.floor(min(line.get_ydata().min() for line in bottom.lines) / 45.0)) * 45.0
+    high = float(np.ceil(max(line.get_ydata().max() for line in bottom.lines) / 45.0)) * 45.0
+    bottom.set_yticks(np.arange(low, high + 1.0, 45.0 if high - low <= 360.0 else 90.0))
+    figure.align_ylabels()
+    figure.legend(loc="outside right upper", fontsize=8.5)
+    return figure

@@ -1,9 +1,9 @@
-"""Figures of the gap over frequency, amplitude, records, time and the plane of states."""
+"""Figures of the gap over frequency, amplitude, records, time and the plane of states, and of the force that is missing."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,35 +16,48 @@ from rigsight.diagnose.location.gap_parts import (
     TimePart,
 )
 from rigsight.diagnose.location.trace import Stage
+from rigsight.inverse import MissingForce
 from rigsight.plot.drawing import (
     FLOOR,
     MEASURED,
+    PAGE_WIDTH,
     STAGE_STYLES,
+    WITH_EFFECT,
     in_style,
     new_figure,
     set_margins,
     shown_in,
+    with_unit,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WIDTH = 5.4
 _LEFT, _RIGHT, _LEGEND = 0.78, 0.1, 0.35
 """Room for labels and ticks, and for a line of a legend [inch]."""
 _STATES_HEIGHT = 3.0
 _BAR_ROOM = 0.84
 """Room beside a map for its color bar with ticks and label [inch]."""
-_DASHES = (0, (4, 2))
+_FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
 _PERCENT = 100.0
 _SHADES = 15
 """Few enough to be drawn as areas; a smooth scale would become an image of its own. Odd, so that zero has a shade."""
+_BAND = 2.0
+_MOST_POINTS = 1500
+_USUAL, _ROOM = (1.0, 99.0), 0.3
+"""Percentiles of the force that are shown, with this part of their distance beyond: ends of records spoil single samples."""
 _FLOOR_LABEL = "noise floor"
 
 
-def _bars(ax: Axes, parts: Sequence[GapPart], stages: Mapping[Stage, str]) -> None:
+def _bars(
+    parts: Sequence[GapPart], stages: Mapping[Stage, str], labels: Sequence[str], xlabel: str, ylabel: str
+) -> Figure:
     """Draw the stages of each part beside each other on a logarithmic axis, the noise floor as a line over each group."""
+    figure = new_figure(PAGE_WIDTH, 2.9, layout=None)
+    ax = figure.subplots()
+    lines = 1 + max(label.count("\n") for label in labels)
+    set_margins(figure, _LEFT, _RIGHT, 0.34 + 0.14 * lines, _LEGEND)
     width = 0.8 / len(stages)
     values = [
         getattr(part, name) for part in parts for name in ("before", "reidentified", "after", "noise_floor")
@@ -57,41 +70,23 @@ def _bars(ax: Axes, parts: Sequence[GapPart], stages: Mapping[Stage, str]) -> No
     for i, (stage, label) in enumerate(stages.items()):
         heights = [_PERCENT * getattr(part, stage) for part in parts]
         shown = [max(h, bottom) - bottom if np.isfinite(h) else 0.0 for h in heights]
-        ax.bar(
-            index + (i - (len(stages) - 1) / 2.0) * width,
-            shown,
-            width,
-            bottom=bottom,
-            color=STAGE_STYLES[stage]["color"],
-            label=label,
-        )
+        places, color = index + (i - (len(stages) - 1) / 2.0) * width, STAGE_STYLES[stage]["color"]
+        ax.bar(places, shown, width, bottom=bottom, color=color, label=label)
     for i, part in enumerate(parts):
         if np.isfinite(part.noise_floor):
             level = max(_PERCENT * part.noise_floor, bottom)
             named = _FLOOR_LABEL if i == 0 else None
-            ax.plot(
-                [i - 0.44, i + 0.44],
-                [level, level],
-                color=FLOOR,
-                linestyle=_DASHES,
-                linewidth=1.3,
-                label=named,
-            )
+            ax.plot([i - 0.44, i + 0.44], [level, level], **{**_FLOOR_LINE, "linewidth": 1.3}, label=named)
     ax.set_yscale("log")
     ax.set_ylim(bottom, 1.5 * top)
     ax.set_xlim(-0.6, len(parts) - 0.4)
     _percent_ticks(ax, bottom, top)
     ax.tick_params(axis="x", length=0)
     ax.grid(axis="y")
-    ax.set_axisbelow(True)
-
-
-def _bar_figure(lines: int = 2) -> tuple[Figure, Axes]:
-    """Return a figure for bars whose labels have this many lines."""
-    figure = new_figure(_WIDTH, 2.9, layout=None)
-    ax = figure.subplots()
-    set_margins(figure, _LEFT, _RIGHT, 0.34 + 0.14 * lines, _LEGEND)
-    return figure, ax
+    ax.set_xticks(index, labels, fontsize=8)
+    ax.set(xlabel=xlabel, ylabel=ylabel)
+    _legend(figure, ax)
+    return figure
 
 
 def _percent_ticks(ax: Axes, bottom: float, top: float) -> None:
@@ -116,23 +111,10 @@ def _legend(figure: Figure, ax: Axes) -> None:
 
 @in_style
 def gap_bands(parts: Sequence[BandPart], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage in each frequency band; squares add up to that of the whole gap.
-
-    Parameters
-    ----------
-    parts
-        Bands of one output.
-    stages
-        What is drawn, with its name for people.
-    """
-    figure, ax = _bar_figure()
-    _bars(ax, parts, stages)
-    labels = [_band_label(part) for part in parts]
-    ax.set_xticks(range(len(parts)), labels, fontsize=8)
-    ax.set_xlabel("frequency [rad/s]")
-    ax.set_ylabel("gap in the band [%]")
-    _legend(figure, ax)
-    return figure
+    """Draw the error of each stage in each frequency band; squares add up to that of the whole gap."""
+    return _bars(
+        parts, stages, [_band_label(part) for part in parts], "frequency [rad/s]", "gap in the band [%]"
+    )
 
 
 def _band_label(part: BandPart) -> str:
@@ -144,63 +126,23 @@ def _band_label(part: BandPart) -> str:
 
 @in_style
 def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage on each record, relative to the record's own motion.
-
-    Parameters
-    ----------
-    parts
-        Records of one output.
-    labels
-        What each is called.
-    stages
-        What is drawn, with its name for people.
-    """
-    figure, ax = _bar_figure(lines=1)
-    _bars(ax, parts, stages)
-    ax.set_xticks(range(len(parts)), list(labels), fontsize=8)
-    ax.set_xlabel("record")
-    ax.set_ylabel("gap [%]")
-    _legend(figure, ax)
-    return figure
+    """Draw the error of each stage on each record, relative to the record's own motion."""
+    return _bars(parts, stages, labels, "record", "gap [%]")
 
 
 @in_style
 def gap_amplitudes(
     parts: Sequence[AmplitudePart], labels: Sequence[str], stages: Mapping[Stage, str]
 ) -> Figure:
-    """Draw the error of each stage at each amplitude of the input, relative to the motion there.
-
-    Parameters
-    ----------
-    parts
-        Amplitudes of one output, in ascending order.
-    labels
-        What each is called.
-    stages
-        What is drawn, with its name for people.
-    """
-    figure, ax = _bar_figure()
-    _bars(ax, parts, stages)
-    ax.set_xticks(range(len(parts)), list(labels), fontsize=8)
-    ax.set_xlabel("amplitude of the input")
-    ax.set_ylabel("gap [%]")
-    _legend(figure, ax)
-    return figure
+    """Draw the error of each stage at each amplitude of the input, ascending, relative to the motion there."""
+    return _bars(parts, stages, labels, "amplitude of the input", "gap [%]")
 
 
 @in_style
 def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage over time, one panel per scored record, with the noise floor.
-
-    Parameters
-    ----------
-    parts
-        Stretches of one output, record by record.
-    stages
-        What is drawn, with its name for people.
-    """
+    """Draw the error of each stage over time, one panel per scored record, with the noise floor."""
     records = list(dict.fromkeys(part.record for part in parts))
-    figure = new_figure(_WIDTH, 0.5 + 1.6 * len(records), layout=None)
+    figure = new_figure(PAGE_WIDTH, 0.5 + 1.6 * len(records), layout=None)
     axes = figure.subplots(len(records), 1, squeeze=False)[:, 0]
     set_margins(figure, _LEFT, _RIGHT, 0.45, 0.55, between=(0.0, 0.5))
     for ax, record in zip(axes, records, strict=True):
@@ -209,9 +151,7 @@ def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
         for stage, label in stages.items():
             levels = [_PERCENT * getattr(part, stage) for part in own]
             ax.stairs(levels, edges, label=label, linewidth=1.4, baseline=None, **STAGE_STYLES[stage])
-        ax.axhline(
-            _PERCENT * own[0].noise_floor, color=FLOOR, linestyle=_DASHES, linewidth=1.2, label=_FLOOR_LABEL
-        )
+        ax.axhline(_PERCENT * own[0].noise_floor, label=_FLOOR_LABEL, **_FLOOR_LINE)
         ax.set_yscale("log")
         ax.set_title(record, fontsize=8.5)
         ax.set_ylabel("gap [%]")
@@ -227,19 +167,9 @@ def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
 
 @in_style
 def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
-    """Draw the error over the plane of displacement and velocity and, where it is known, the missing force.
-
-    Parameters
-    ----------
-    parts
-        Cells of one output.
-    output
-        What the error is of.
-    motion
-        Symbol of the displacement.
-    """
+    """Draw the error over the plane of displacement and velocity and, where it is known, the missing force."""
     with_force = any(np.isfinite(part.force_mean) for part in parts)
-    figure = new_figure(_WIDTH, _STATES_HEIGHT, layout=None)
+    figure = new_figure(PAGE_WIDTH, _STATES_HEIGHT, layout=None)
     axes = figure.subplots(1, 2 if with_force else 1, squeeze=False, sharey=True)[0]
     set_margins(figure, 0.7, _BAR_ROOM, 0.46, 0.3, between=(_BAR_ROOM + 0.12, 0.0))
     _plane(axes[0], parts, [_PERCENT * part.reidentified for part in parts], "viridis", False, "error [%]")
@@ -248,17 +178,10 @@ def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
         force_unit = parts[0].units["force_mean"]
         forces = np.array([part.force_mean for part in parts])
         factor, shown = shown_in(force_unit, forces)
-        _plane(
-            axes[1],
-            parts,
-            list(forces * factor),
-            "RdBu_r",
-            True,
-            f"mean force [{shown}]" if shown != "1" else "mean force",
-        )
+        _plane(axes[1], parts, list(forces * factor), "RdBu_r", True, with_unit("mean force", shown))
         axes[1].set_title("force missing in the equations")
     x_unit, v_unit = parts[0].units["x_low"], parts[0].units["v_low"]
-    factor, shown = _axis_scale(parts, x_unit)
+    factor, shown = shown_in(x_unit, np.array([edge for part in parts for edge in (part.x_low, part.x_high)]))
     for ax in axes:
         ax.set_xlabel(f"{motion} [{shown}]")
         ticks = [
@@ -267,10 +190,6 @@ def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
         ax.set_xticks(ticks, [f"{t * factor:.3g}" for t in ticks])
     axes[0].set_ylabel(f"rate of {motion} [{v_unit}]")
     return figure
-
-
-def _axis_scale(parts: Sequence[StatePart], unit: str) -> tuple[float, str]:
-    return shown_in(unit, np.array([edge for part in parts for edge in (part.x_low, part.x_high)]))
 
 
 def _plane(
@@ -297,8 +216,39 @@ def _plane(
     ax.locator_params(nbins=5)
     ax.set_facecolor("#f1f3f4")
     box = ax.get_position()
-    beside = ax.figure.add_axes((box.x1 + 0.07 / _WIDTH, box.y0, 0.11 / _WIDTH, box.height))
+    beside = ax.figure.add_axes((box.x1 + 0.07 / PAGE_WIDTH, box.y0, 0.11 / PAGE_WIDTH, box.height))
     bar = ax.figure.colorbar(collection, cax=beside)
     bar.set_label(label)
     bar.outline.set_visible(False)
     bar.ax.tick_params(color=MEASURED)
+
+
+@in_style
+def missing_force(force: MissingForce) -> Figure:
+    """Draw a missing force over velocity and displacement, each with its mean and two standard errors, and over time."""
+    figure = new_figure(8.4, 2.5, layout=None)
+    over_v, over_x, over_t = figure.subplots(1, 3, sharey=True)
+    set_margins(figure, 0.75, 0.12, 0.5, 0.12, between=(0.18, 0.0))
+    factor, unit = shown_in(force.unit, force.force)
+    every = max(1, force.force.size // _MOST_POINTS)
+    for ax, signal, name, signal_unit in (
+        (over_v, force.velocity, "velocity", f"{force.motion_unit}/s"),
+        (over_x, force.displacement, "displacement", force.motion_unit),
+    ):
+        x_factor, x_unit = shown_in(signal_unit, signal)
+        points = {"color": MEASURED, "markersize": 2.0, "alpha": 0.35}
+        ax.plot(x_factor * signal[::every], factor * force.force[::every], ".", **points)
+        mean = force.over(signal)
+        at, line, band = (np.array(own) for own in (mean.signal, mean.force, mean.std))
+        low, high = factor * (line - _BAND * band), factor * (line + _BAND * band)
+        ax.fill_between(x_factor * at, low, high, color=WITH_EFFECT, alpha=0.3, linewidth=0.0)
+        ax.plot(x_factor * at, factor * line, color=WITH_EFFECT, linewidth=1.4)
+        ax.set_xlabel(f"{name} [{x_unit}]")
+    low, high = factor * np.percentile(force.force, _USUAL)
+    if high > low:
+        over_v.set_ylim(low - _ROOM * (high - low), high + _ROOM * (high - low))
+    first = np.array(force.records) == force.records[0]
+    over_t.plot(force.time[first], factor * force.force[first], color=MEASURED, linewidth=0.8)
+    over_t.set_xlabel(f"time in {force.records[0]} [s]")
+    over_v.set_ylabel(f"missing force [{unit}]")
+    return figure

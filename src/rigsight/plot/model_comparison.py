@@ -14,19 +14,21 @@ from rigsight.plot.drawing import (
     FLOOR,
     MEASURED,
     OTHER,
+    TWO_SIDED,
     WITH_EFFECT,
     in_style,
     new_figure,
+    panel_grid,
     plain_log_ticks,
     set_margins,
     shown_in,
 )
 from rigsight.plot.frequency_responses import (
-    TWO_SIDED,
     decibel,
+    label_bode,
     limit,
-    log_axis,
     measured_label,
+    span,
     thinned,
 )
 
@@ -47,69 +49,35 @@ _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.2, 1, 1.2
 
 @dataclass(frozen=True, eq=False)
 class ResponsesPanel:
-    """One signal path: measured, and as each model has it.
+    """One signal path: measured, and as each model has it."""
 
-    Attributes
-    ----------
-    title
-        Which path.
-    measured
-        The measured response.
-    simulated
-        Model -> its response at lines of the measured one.
-    """
-
-    title: str
-    measured: FrequencyResponse
-    simulated: Mapping[str, FrequencyResponse]
+    title: str  # which path
+    measured: FrequencyResponse  # the measured response
+    simulated: Mapping[str, FrequencyResponse]  # model -> its response at lines of the measured one
 
 
 @dataclass(frozen=True, eq=False)
 class StepPanel:
-    """One output after a step, offsets removed.
+    """One output after a step, offsets removed."""
 
-    Attributes
-    ----------
-    title, unit
-        Which output.
-    t
-        Time from the step [s], shape (n_samples,).
-    measured
-        Shape (n_samples,).
-    simulated
-        Model -> shape (n_samples,).
-    """
-
+    # Which output.
     title: str
     unit: str
-    t: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    simulated: Mapping[str, NDArray[np.float64]]
+    t: NDArray[np.float64]  # time from the step [s], shape (n_samples,)
+    measured: NDArray[np.float64]  # shape (n_samples,)
+    simulated: Mapping[str, NDArray[np.float64]]  # model -> shape (n_samples,)
 
 
 @dataclass(frozen=True)
 class ErrorPanel:
-    """One column of a comparison.
+    """One column of a comparison."""
 
-    Attributes
-    ----------
-    title
-        What was compared, with the unit.
-    overall
-        Model -> root mean square over records; a model without one is said to lack it.
-    single
-        Model -> error on each record.
-    best
-        Models with the smallest root mean square.
-    floor
-        Noise floor over all records, None if unknown.
-    """
-
-    title: str
+    title: str  # what was compared, with the unit
+    # Model -> root mean square over records; a model without one is said to lack it.
     overall: Mapping[str, float]
-    single: Mapping[str, Sequence[float]]
-    best: frozenset[str]
-    floor: float | None
+    single: Mapping[str, Sequence[float]]  # model -> error on each record
+    best: frozenset[str]  # models with the smallest root mean square
+    floor: float | None  # noise floor over all records, None if unknown
 
 
 def model_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -122,16 +90,9 @@ def model_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
 
 @in_style
 def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Draw magnitude above phase, one column per path: measured as points with its 95 % band, each model as a line.
-
-    Parameters
-    ----------
-    panels
-        Paths of one record.
-    styles
-        Line style by model, see `model_styles`.
-    """
+    """Draw magnitude above phase, one column per path: measured as points with its 95 % band, each model as a line."""
     figure, axes = _responses_grid(2, len(panels), len(styles), 5.2)
+    points: dict[str, Any] = {"color": MEASURED, "markersize": 4.0}
     for place, panel in enumerate(panels):
         row, column = divmod(place, axes.shape[1])
         top, bottom = axes[2 * row : 2 * row + 2, column]
@@ -140,8 +101,8 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
         measured = thinned(panel.measured)
         reach = None if measured.variance is None else TWO_SIDED * np.sqrt(0.5 * measured.variance)
         phase = np.degrees(measured.phase)
-        _measured(top, measured.omega, measured.magnitude_db, measured_label(measured))
-        _measured(bottom, measured.omega, phase, None)
+        top.plot(measured.omega, measured.magnitude_db, ".", label=measured_label(measured), **points)
+        bottom.plot(measured.omega, phase, ".", **points)
         if reach is not None:
             size, turn = measured.magnitude, np.degrees(reach / measured.magnitude)
             band = {"color": MEASURED, "alpha": 0.25, "linewidth": 0}
@@ -158,14 +119,8 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
         limit(top, np.concatenate(shown))
         low, high = np.percentile(np.concatenate(turns), [1.0, 99.0])
         bottom.set_ylim(45.0 * np.floor(low / 45.0) - 20.0, 45.0 * np.ceil(high / 45.0) + 20.0)
-        log_axis(bottom, [measured])
-        top.set_title(panel.title)
-        top.set_ylabel(f"magnitude [dB re 1 {measured.unit}]")
-        bottom.set_ylabel("phase [deg]")
-        bottom.set_xlabel("angular frequency [rad/s]")
-        for ax in (top, bottom):
-            ax.grid()
-            ax.set_axisbelow(True)
+        span(bottom, [measured.omega])
+        label_bode(top, bottom, panel.title, measured.unit)
     _legend(figure, list(axes.flat))
     return figure
 
@@ -195,15 +150,7 @@ def _responses_grid(rows: int, panels: int, n_models: int, height: float) -> tup
 
 @in_style
 def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Draw each output after a step, offsets removed: measured as a wide gray line, each model over it.
-
-    Parameters
-    ----------
-    panels
-        Outputs of one record.
-    styles
-        Line style by model, see `model_styles`.
-    """
+    """Draw each output after a step, offsets removed: measured as a wide gray line, each model over it."""
     figure, axes = _responses_grid(1, len(panels), len(styles), 3.4)
     for ax, panel in zip(axes.flat, panels, strict=False):
         factor, unit = shown_in(panel.unit, panel.measured)
@@ -214,33 +161,19 @@ def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, A
         # A model with large errors leaves the axes, so that the other curves stay readable.
         ax.set_ylim(low - 0.7 * (high - low), high + 0.7 * (high - low))
         ax.set_xlim(float(panel.t[0]), float(panel.t[-1]))
-        ax.set_title(panel.title)
-        ax.set_xlabel("time from the step [s]")
-        ax.set_ylabel(f"change of {panel.title} [{unit}]")
+        title = panel.title
+        ax.set(title=title, xlabel="time from the step [s]", ylabel=f"change of {title} [{unit}]")
         ax.grid()
-        ax.set_axisbelow(True)
     _legend(figure, list(axes.flat))
     return figure
 
 
 @in_style
 def model_errors(panels: Sequence[ErrorPanel], names: Sequence[str]) -> Figure:
-    """Draw the errors of all models as bars on logarithmic axes, each record as a point, the noise floor as a dashed line.
-
-    Parameters
-    ----------
-    panels
-        What was compared.
-    names
-        Models, the first on top.
-    """
+    """Draw the errors of all models as bars on logarithmic axes, each record as a point, the noise floor as a dashed line."""
     columns = min(3, len(panels))
-    rows = -(-len(panels) // columns)
-    figure = new_figure(2.0 + 2.9 * columns, rows * (0.9 + 0.24 * len(names)))
-    axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
-    for ax in axes.flat[len(panels) :]:
-        ax.set_visible(False)
-    for ax, panel in zip(axes.flat, panels, strict=False):
+    figure = new_figure(2.0 + 2.9 * columns, -(-len(panels) // columns) * (0.9 + 0.24 * len(names)))
+    for ax, panel in zip(panel_grid(figure, len(panels), columns, sharey=True), panels, strict=True):
         values = [v for single in panel.single.values() for v in single if v > 0.0]
         values += [v for v in (*panel.overall.values(), panel.floor) if v is not None and v > 0.0]
         left, right = 0.6 * min(values, default=1.0), 1.6 * max(values, default=1.0)
@@ -262,7 +195,6 @@ def model_errors(panels: Sequence[ErrorPanel], names: Sequence[str]) -> Figure:
         ax.tick_params(axis="y", length=0)
         ax.set_title(panel.title)
         ax.grid(axis="x")
-        ax.set_axisbelow(True)
     return figure
 
 
@@ -277,10 +209,6 @@ def _decade_ticks(ax: Axes, left: float, right: float) -> None:
     shown = 10.0 ** decades[:: -(-decades.size // _MOST_TICKS)]
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_xticks(shown, [f"{tick:g}" for tick in shown])
-
-
-def _measured(ax: Axes, omega: NDArray[np.float64], values: NDArray[np.float64], label: str | None) -> None:
-    ax.plot(omega, values, color=MEASURED, linestyle="none", marker=".", markersize=4.0, label=label)
 
 
 def _legend(figure: Figure, axes: Sequence[Axes]) -> None:

@@ -34,27 +34,17 @@ class Body:
 
 @dataclass(frozen=True)
 class Place:
-    """A joint, drive or sensor: its name, its lines of text and the indices of the bodies that it belongs to.
-
-    Attributes
-    ----------
-    name, title, lines, bodies
-        As said; the title is what the picture calls it.
-    spring, damper
-        For a joint, what resists in it.
-    grounded
-        For a joint, True if it stands between one body and the ground.
-    inputs, sensors
-        For a drive, the inputs and the sensors that its signal reads, through other signals and states too.
-    """
+    """A joint, drive or sensor: its name, its lines of text and the indices of the bodies that it belongs to."""
 
     name: str
     title: str
     lines: tuple[str, ...]
     bodies: tuple[int, ...]
+    # For a joint, what resists in it.
     spring: bool = False
     damper: bool = False
-    grounded: bool = False
+    grounded: bool = False  # for a joint, True if it stands between one body and the ground
+    # For a drive, the inputs and the sensors that its signal reads, through other signals and states too.
     inputs: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
 

@@ -40,34 +40,16 @@ _SURE = 0.5
 
 @dataclass(frozen=True)
 class PlaceMark:
-    """A suspected place.
+    """A suspected place."""
 
-    Attributes
-    ----------
-    strength
-        From 0 to 1.
-    label
-        What it is suspected of.
-    is_state
-        True for a state, which may be called as a sensor is.
-    """
-
-    strength: float
-    label: str = ""
-    is_state: bool = False
+    strength: float  # from 0 to 1
+    label: str = ""  # what it is suspected of
+    is_state: bool = False  # true for a state, which may be called as a sensor is
 
 
 @in_style
 def rig_picture(rig: Rig, marks: Mapping[str, PlaceMark] | None = None) -> Figure:
-    """Return a schematic of a rig.
-
-    Parameters
-    ----------
-    rig
-        Any rig.
-    marks
-        Suspected joints, drives, sensors and states by name.
-    """
+    """Return a schematic of a rig."""
     return _Sheet(rig_content(rig), marks or {}).figure()
 
 
@@ -77,21 +59,12 @@ class _Sheet:
     def __init__(self, content: RigContent, marks: Mapping[str, PlaceMark]) -> None:
         self._content = content
         self._marks = marks
-        self._of_row = {row: self._left_places(row) for row in range(len(content.bodies))}
-        self._grounded = {
-            row: [j for j in content.joints if j.grounded and j.bodies == (row,)]
-            for row in range(len(content.bodies))
-        }
-        self._between = {
-            row: [j for j in content.joints if not j.grounded and j.bodies[0] == row]
-            for row in range(len(content.bodies))
-        }
+        rows, joints, left = range(len(content.bodies)), content.joints, (*content.drives, *content.sensors)
+        self._of_row = {row: [p for p in left if (p.bodies or (0,))[0] == row] for row in rows}
+        self._grounded = {row: [j for j in joints if j.grounded and j.bodies == (row,)] for row in rows}
+        self._between = {row: [j for j in joints if not j.grounded and j.bodies[0] == row] for row in rows}
         self._place_columns()
         self._place_rows()
-
-    def _left_places(self, row: int) -> list[Place]:
-        content = self._content
-        return [p for p in (*content.drives, *content.sensors) if (p.bodies or (0,))[0] == row]
 
     def _mark(self, place: Place | Body) -> PlaceMark | None:
         mark = self._marks.get(place.name)
@@ -126,12 +99,8 @@ class _Sheet:
             for row, joints in self._between.items()
         ]  # fmt: skip
         self._body_end = self._body + max(1.1, body_width, *between)
-        self._long = [
-            joint
-            for joints in self._between.values()
-            for joint in joints
-            if joint.bodies[-1] - joint.bodies[0] > 1 or len(joint.bodies) > 2
-        ]
+        joints = [joint for own in self._between.values() for joint in own]
+        self._long = [j for j in joints if j.bodies[-1] - j.bodies[0] > 1 or len(j.bodies) > 2]
         self._lanes: list[float] = []
         self._lane_end = self._body_end
         for joint in self._long:
@@ -161,9 +130,8 @@ class _Sheet:
             if row + 1 < len(content.bodies):
                 y -= max([_GAP, _GAP_COUPLED * coupled, *(max(_GAP_JOINT, h) for h in joined)])
         self._height = -y + _MARGIN
-        self._shift = self._height
-        self._top = {row: value + self._shift for row, value in self._top.items()}
-        self._bottom = {row: value + self._shift for row, value in self._bottom.items()}
+        self._top = {row: value + self._height for row, value in self._top.items()}
+        self._bottom = {row: value + self._height for row, value in self._bottom.items()}
 
     def figure(self) -> Figure:
         margin = max(0.0, (_NARROWEST - self._width) / 2.0)
@@ -207,15 +175,7 @@ class _Sheet:
             ends = (self._bottom[upper], self._top[lower])
             ax.plot([x, x], ends, color="#aebccb", linewidth=5.0, solid_capstyle="butt")
             if not self._between[upper]:
-                ax.text(
-                    x + 0.1,
-                    sum(ends) / 2.0,
-                    what,
-                    size=TEXT,
-                    color=FAINT,
-                    va="center_baseline",
-                    style="italic",
-                )
+                symbols.write(ax, x + 0.1, sum(ends) / 2.0, what, FAINT, style="italic")
 
     def _draw_grounded(self, ax: Axes, row: int) -> None:
         joints = self._grounded[row]
@@ -287,15 +247,7 @@ class _Sheet:
             )
             y = (self._top[row] + self._bottom[row] + used) / 2.0
             if body.input is not None:
-                ax.text(
-                    self._left_end - 0.3,
-                    y - 0.1,
-                    body.input,
-                    size=TEXT,
-                    color=INK,
-                    ha="right",
-                    va="center_baseline",
-                )
+                symbols.write(ax, self._left_end - 0.3, y - 0.1, body.input, ha="right")
                 symbols.arrow(ax, [(self._left_end - 0.24, y - 0.1), (self._body, y - 0.1)], INK)
                 y -= 0.2 + _BETWEEN
             for place, height in zip(places, heights, strict=True):
@@ -346,9 +298,7 @@ class _Sheet:
         for drive in self._content.drives:
             slots = _slots(middles[drive.name], len(drive.inputs) + len(drive.sensors))
             for name, level in zip(drive.inputs, slots, strict=False):
-                ax.text(
-                    self._input_right, level, name, size=TEXT, color=INK, ha="right", va="center_baseline"
-                )
+                symbols.write(ax, self._input_right, level, name, ha="right")
                 symbols.arrow(ax, [(self._input_right + 0.05, level), (self._left, level)], INK)
             for name, level in zip(drive.sensors, slots[len(drive.inputs) :], strict=True):
                 way = [(self._left, middles[name]), (lane, middles[name]), (lane, level), (self._left, level)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,7 @@ _SYMBOL = 0.44
 """Length of a spring's coils or a damper's pot."""
 
 Point = tuple[float, float]
+_Draw = Callable[[Sequence[np.ndarray]], None]
 
 
 def block_size(title: str, lines: Sequence[str], marked: str | None = None) -> tuple[float, float]:
@@ -36,19 +37,24 @@ def block_size(title: str, lines: Sequence[str], marked: str | None = None) -> t
     return max(widths) + 2.0 * PAD, TITLE_HEIGHT + LINE_HEIGHT * (len(lines) + len(bold)) + 2.0 * PAD
 
 
+def write(ax: Axes, x: float, y: float, words: str, color: str = INK, **style: Any) -> None:
+    """Write words of the usual size about a height, by default from the left."""
+    ax.text(x, y, words, **{"size": TEXT, "color": color, "va": "center_baseline", **style})
+
+
 def write_block(
     ax: Axes, left: float, middle: float, title: str, lines: Sequence[str], marked: str | None = None
 ) -> None:
     """Write a title and lines, with what a place is suspected of as the last line, from the left about a height."""
     height = TITLE_HEIGHT + LINE_HEIGHT * (len(lines) + (marked is not None))
     y = middle + height / 2.0 - TITLE_HEIGHT / 2.0
-    ax.text(left, y, title, size=TITLE, weight="bold", color=INK, va="center_baseline")
+    write(ax, left, y, title, size=TITLE, weight="bold")
     y -= (TITLE_HEIGHT + LINE_HEIGHT) / 2.0
     for line in lines:
-        ax.text(left, y, line, size=TEXT, color=FAINT, va="center_baseline")
+        write(ax, left, y, line, FAINT)
         y -= LINE_HEIGHT
     if marked is not None:
-        ax.text(left, y, marked, size=TEXT, weight="bold", color=SUSPECTED, va="center_baseline")
+        write(ax, left, y, marked, SUSPECTED, weight="bold")
 
 
 def box(ax: Axes, corner: Point, size: Point, fill: str, edge: str = INK, **style: Any) -> None:
@@ -67,13 +73,8 @@ def flag(ax: Axes, corner: Point, size: Point, edge: str) -> None:
 
     (x, y), (width, height) = corner, size
     notch = min(0.07, height / 4.0)
-    outline = [
-        (x, y),
-        (x + width, y),
-        (x + width, y + height),
-        (x, y + height),
-        (x + notch, y + height / 2.0),
-    ]
+    right, top = x + width, y + height
+    outline = [(x, y), (right, y), (right, top), (x, top), (x + notch, y + height / 2.0)]
     ax.add_patch(Polygon(outline, closed=True, facecolor="#eef6ee", edgecolor=edge, linewidth=0.9))
 
 
@@ -115,15 +116,13 @@ def joint(ax: Axes, start: Point, end: Point, spring: bool, damper: bool, color:
         ax.plot(*middle, marker="o", markersize=5.0, markerfacecolor="white", markeredgecolor=color)
 
 
-def _spring(draw: object, head: np.ndarray, tail: np.ndarray, across: np.ndarray) -> None:
-    assert callable(draw)
+def _spring(draw: _Draw, head: np.ndarray, tail: np.ndarray, across: np.ndarray) -> None:
     steps = np.linspace(0.0, 1.0, 12)[:, None]
     swing = np.array([0, 0, 1, -1, 1, -1, 1, -1, 1, -1, 0, 0])[:, None]
     draw(list(head + steps * (tail - head) + 0.05 * swing * across))
 
 
-def _damper(draw: object, head: np.ndarray, tail: np.ndarray, across: np.ndarray) -> None:
-    assert callable(draw)
+def _damper(draw: _Draw, head: np.ndarray, tail: np.ndarray, across: np.ndarray) -> None:
     way = tail - head
     piston, bottom = head + 0.55 * way, head + 0.35 * way
     draw([head, bottom])
@@ -142,17 +141,10 @@ def wall(ax: Axes, x: float, bottom: float, top: float) -> None:
 
 def arrow(ax: Axes, points: Sequence[Point], color: str, dashed: bool = False, width: float = 1.2) -> None:
     """Draw a line through points with a head at its end."""
-    *way, last = points
     style = (0, (3, 2)) if dashed else "-"
-    ax.plot(
-        *np.transpose([*way, last])[:, :],
-        color=color,
-        linewidth=width,
-        linestyle=style,
-        solid_capstyle="butt",
-    )
-    (x, y), (x_0, y_0) = last, way[-1]
+    ax.plot(*np.transpose(points), color=color, linewidth=width, linestyle=style, solid_capstyle="butt")
+    (x_0, y_0), (x, y) = points[-2:]
     length = float(np.hypot(x - x_0, y - y_0)) or 1.0
     head = {"arrowstyle": "-|>,head_length=0.35,head_width=0.17", "color": color, "linewidth": width}
     start = (x - 0.02 * (x - x_0) / length, y - 0.02 * (y - y_0) / length)
-    ax.annotate("", xy=last, xytext=start, arrowprops={**head, "shrinkA": 0, "shrinkB": 0})
+    ax.annotate("", xy=(x, y), xytext=start, arrowprops={**head, "shrinkA": 0, "shrinkB": 0})

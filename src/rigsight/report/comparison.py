@@ -1,27 +1,42 @@
-"""Report of a comparison of models: tables on a terminal, and one self-contained HTML page with figures."""
+"""A comparison of models: tables on a terminal, its figures, and one self-contained HTML page with them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
-from rich.console import Console, ConsoleOptions, RenderResult
+import numpy as np
+from rich.console import RenderableType
 from rich.table import Table
-from rich.text import Text
 
-from rigsight.compare import Column, Comparison
+from rigsight.compare import Column, Comparison, RecordComparison
 from rigsight.compare.comparison import best
-from rigsight.report.drawing.comparison_figures import ComparisonFigure
-from rigsight.report.drawing.figures import PageFigure, page_figure
+from rigsight.plot import (
+    ErrorPanel,
+    ResponsesPanel,
+    StepPanel,
+    model_errors,
+    model_responses,
+    model_steps,
+    model_styles,
+)
+from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import column_label, error_text
-from rigsight.report.render import environment
-from rigsight.report.terminal import plain_text
+from rigsight.report.render import rendered
+from rigsight.report.terminal import Summary, Writer, worth_knowing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _ALL = "all records, root mean square"
 _FLOOR = "noise floor"
 _NAME_WIDTH, _CELL_WIDTH = 24, 13
 _MOST_FAILURES = 12
+_MOST_CURVES = 10
+"""Models that an eye can follow in one picture."""
+_OVERALL_FILE = "errors.svg"
 
 
 @dataclass(frozen=True)
@@ -50,73 +65,34 @@ class View:
 def render_comparison(
     comparison: Comparison, figures: Sequence[ComparisonFigure], command: str, versions: Mapping[str, str]
 ) -> str:
-    """Return the comparison as one HTML page: no script, no network, nothing beside the file.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    figures
-        Its figures.
-    command
-        The command line that made it.
-    versions
-        Package -> version.
-    """
+    """Return the comparison as one HTML page: no script, no network, nothing beside the file."""
     overall, *records = _views(comparison, figures)
-    return environment().get_template("comparison.html.jinja").render(
-        comparison=comparison,
-        overall=overall,
-        records=records,
-        sentences=_sentences(comparison),
-        command=command,
-        versions=versions,
-        seed=None,
-        made=datetime.now(UTC),
+    sentences = _sentences(comparison)
+    return rendered(
+        "comparison.html.jinja", command, versions, comparison=comparison, overall=overall, records=records, sentences=sentences
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ComparisonSummary:
-    """A rich renderable of a comparison: the best of each column in bold green, with a star where there is no color."""
+def comparison_summary(comparison: Comparison) -> Summary:
+    """Return the tables of a comparison: the best of each column in bold green, with a star where there is no color."""
 
-    comparison: Comparison
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the lines, in characters that the terminal's encoding has."""
-
-        def text(words: str, style: str = "") -> Text:
-            return plain_text(words, options.encoding, style)
-
-        overall, *records = _views(self.comparison, ())
-        yield text(f"Compared: {self.comparison.title}", "bold green")
+    def lines(text: Writer, width: int) -> Iterator[RenderableType]:
+        overall, *records = _views(comparison, ())
+        yield text(f"Compared: {comparison.title}", "bold green")
         for view in (*records, overall):
             yield text("")
             yield text(f"{view.title}{f' ({view.facts})' if view.facts else ''}", "bold")
-            yield from _tables(view, text, options.max_width)
+            yield from _tables(view, text, width)
             for note in view.notes:
                 yield text(f"- {note}", "dim")
         yield text("")
         yield text("* smallest of its column")
-        failures = self.comparison.failures
-        if failures or self.comparison.notes:
+        failures = _failures(comparison)
+        if notes := [*comparison.notes, *failures[:_MOST_FAILURES]]:
             yield text("")
-            yield text("Worth knowing", "bold yellow")
-            for words in [*self.comparison.notes, *_failures(self.comparison)[:_MOST_FAILURES]]:
-                yield text(f"- {words}")
-            if len(failures) > _MOST_FAILURES:
-                yield text(f"- and {len(failures) - _MOST_FAILURES} more in comparison.json.", "dim")
+            yield from worth_knowing(notes, text, len(failures) - _MOST_FAILURES, "comparison.json")
 
-
-def comparison_summary(comparison: Comparison) -> ComparisonSummary:
-    """Return the comparison as a rich renderable.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    """
-    return ComparisonSummary(comparison)
+    return Summary(lines)
 
 
 def _views(comparison: Comparison, figures: Sequence[ComparisonFigure]) -> Iterator[View]:
@@ -160,7 +136,7 @@ def _cell(row: Mapping[Column, float], column: Column, is_best: bool) -> Cell:
     return Cell(error_text(row.get(column), column.quantity), is_best)
 
 
-def _tables(view: View, text: Callable[..., Text], width: int) -> Iterator[Table]:
+def _tables(view: View, text: Writer, width: int) -> Iterator[Table]:
     """Yield the columns in as many tables as the terminal's width asks for."""
     at_once = max(1, (width - _NAME_WIDTH) // _CELL_WIDTH)
     for first in range(0, len(view.heads), at_once):
@@ -208,4 +184,109 @@ def _sentences(comparison: Comparison) -> list[str]:
         *floors,
         *comparison.notes,
         *_failures(comparison),
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class ComparisonFigure:
+    """A figure with the file it goes into, what it shows, and the record it is of (None for all)."""
+
+    file: str
+    caption: str
+    drawing: Figure
+    record: str | None = None
+
+
+def comparison_figures(comparison: Comparison) -> list[ComparisonFigure]:
+    """Return the figures: errors over all records first, then responses or steps, record by record.
+
+    Parameters
+    ----------
+    comparison
+        The result.
+    """
+    found = [overall_figure(comparison)]
+    for number in range(len(comparison.records)):
+        found += record_figures(comparison, number)
+    return found
+
+
+def record_figures(comparison: Comparison, index: int) -> list[ComparisonFigure]:
+    """Return the figures of one record: its responses or its step, or none."""
+    record = comparison.records[index]
+    styles = model_styles([c.name for c in comparison.competitors])
+    stem = f"{index + 1:02d}_{re.sub(r'[^A-Za-z0-9.-]+', '_', record.record.name)}"
+    found = []
+    if record.measured:
+        names, which = _drawn(comparison, record, tuple(record.measured))
+        panels = [
+            ResponsesPanel(
+                path.replace("->", "\u2192"),
+                measured,
+                {name: own[path] for name in names if path in (own := record.simulated[name])},
+            )
+            for path, measured in record.measured.items()
+        ]
+        caption = f"Frequency responses on '{record.record.name}', measured against simulated, by one estimator.{which}"
+        drawing = model_responses(panels, styles)
+        found.append(ComparisonFigure(f"responses_{stem}.svg", caption, drawing, record.record.name))
+    if record.step is not None and record.moved:
+        names, which = _drawn(comparison, record, tuple(record.moved))
+        caption = f"Step on '{record.record.name}', offsets before it removed.{which}"
+        drawing = model_steps(_step_panels(comparison, record, names), styles)
+        found.append(ComparisonFigure(f"step_{stem}.svg", caption, drawing, record.record.name))
+    return found
+
+
+def overall_figure(comparison: Comparison) -> ComparisonFigure:
+    """Return the errors of all models over all records."""
+    overall = comparison.overall()
+    panels = []
+    for column in comparison.columns():
+        single: dict[str, list[float]] = {c.name: [] for c in comparison.competitors}
+        for score in comparison.scores:
+            if score.column == column:
+                single[score.model].append(score.value)
+        values = {name: row[column] for name, row in overall.items() if column in row}
+        panels.append(
+            ErrorPanel(column_label(column), values, single, best(overall, column), comparison.floor(column))
+        )
+    caption = (
+        "Errors of all models: bars are root mean squares over the records, points the single records, the best is blue. "
+        "Dashed: noise floor."
+    )
+    return ComparisonFigure(
+        _OVERALL_FILE, caption, model_errors(panels, [c.name for c in comparison.competitors])
+    )
+
+
+def _drawn(
+    comparison: Comparison, record: RecordComparison, signals: tuple[str, ...]
+) -> tuple[list[str], str]:
+    """Return the models that are drawn, and a sentence where these are not all: the best by the first signal."""
+    rows = comparison.table(record.record.name)
+    shapes = [
+        c for c in comparison.columns(record.record.name) if c.quantity in ("magnitude_db", "step_rmse")
+    ]
+    first = next((column for column in shapes if column.signal in signals), None)
+    names = [name for name, row in rows.items() if first in row]
+    if first is None or len(names) <= _MOST_CURVES:
+        return names, ""
+    kept = set(sorted(names, key=lambda name: rows[name][first])[:_MOST_CURVES])
+    drawn = [name for name in names if name in kept]
+    return drawn, f" The {_MOST_CURVES} best of {len(names)} models are drawn."
+
+
+def _step_panels(comparison: Comparison, record: RecordComparison, names: list[str]) -> list[StepPanel]:
+    assert record.step is not None
+    units = {floor.output: floor.unit for floor in comparison.floors}
+    return [
+        StepPanel(
+            title=output,
+            unit=units[output],
+            t=record.record.dt * np.arange(next(iter(moved.values())).size, dtype=np.float64),
+            measured=record.step.moved(record.record[output]),
+            simulated={name: moved[name] for name in names if name in moved},
+        )
+        for output, moved in record.moved.items()
     ]

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 
-from rich.console import Console, ConsoleOptions, RenderResult
+from rich.console import RenderableType
 from rich.padding import Padding
 from rich.table import Table
-from rich.text import Text
 
 from rigsight.diagnose.result import Estimate
 from rigsight.identify.hysteresis.derived import LEVEL, Derived
@@ -19,8 +17,17 @@ from rigsight.identify.identification import (
     RecordIdentification,
     RecordScore,
 )
-from rigsight.report.quantities import ERRORS_HOLD, UNDETERMINED, Written, estimate_text, gap_percent, written
-from rigsight.report.terminal import plain_text
+from rigsight.plot import with_unit
+from rigsight.report.quantities import (
+    ERRORS_HOLD,
+    UNDETERMINED,
+    behind,
+    estimate_text,
+    gap_percent,
+    plain,
+    written,
+)
+from rigsight.report.terminal import Summary, Writer, pairs, worth_knowing
 
 HEADING = "Hysteresis"
 _WIDTHS = 3.92
@@ -34,46 +41,26 @@ _WORSE = 1.05
 _NAME_WIDTH, _RECORD_WIDTH = 22, 20
 
 
-@dataclass(frozen=True)
-class IdentificationSummary:
-    """A rich renderable of an identification."""
+def identification_summary(found: Identification) -> Summary:
+    """Return a table over amplitudes, the joint set, the scores, and what must be known of an identification."""
 
-    identification: Identification
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the lines, in characters that the terminal's encoding has."""
-
-        def text(words: str, style: str = "") -> Text:
-            return plain_text(words, options.encoding, style)
-
-        found = self.identification
+    def lines(text: Writer, width: int) -> Iterator[RenderableType]:
         yield text(f"Identified: {found.title}", "bold green")
-        yield from _amplitude_tables(found, text, options.max_width)
+        yield from _amplitude_tables(found, text, width)
         yield text(ERRORS_HOLD, "dim")
         yield text(found.amplitude_statement, "bold yellow" if found.changing else "")
-        yield text("")
-        yield text("One set for all estimation records", "bold")
-        yield text(found.joint.statement)
-        table = Table.grid(padding=(0, 2))
-        for subject, words in joint_rows(found):
-            table.add_row(text(subject, "bold"), text(words))
-        yield Padding(table, (0, 0, 0, 2), expand=False)
+        parts = [("One set for all estimation records", found.joint.statement, joint_rows(found))]
         if found.identifiability is not None:
-            yield text("")
-            yield text("What these records determine", "bold")
-            yield text(found.identifiability.sentence)
-            rows = Table.grid(padding=(0, 2))
-            for subject, words in linear_rows(found):
-                rows.add_row(text(subject, "bold"), text(words))
-            yield Padding(rows, (0, 0, 0, 2), expand=False)
+            statement = found.identifiability.sentence
+            parts.append(("What these records determine", statement, linear_rows(found)))
         if found.hysteresis is not None:
+            parts.append((HEADING, found.hysteresis.statement, hysteresis_rows(found.hysteresis)))
+        for heading, statement, rows in parts:
             yield text("")
-            yield text(HEADING, "bold")
-            yield text(found.hysteresis.statement)
-            rows = Table.grid(padding=(0, 2))
-            for subject, words in hysteresis_rows(found.hysteresis):
-                rows.add_row(text(subject, "bold"), text(words))
-            yield Padding(rows, (0, 0, 0, 2), expand=False)
+            yield text(heading, "bold")
+            yield text(statement)
+            yield pairs(rows, text)
+        if found.hysteresis is not None:
             errors = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
             for head in ERROR_HEADS:
                 errors.add_column(text(head))
@@ -81,28 +68,14 @@ class IdentificationSummary:
                 errors.add_row(*map(text, row))
             yield Padding(errors, (0, 0, 0, 2), expand=False)
         if found.warnings:
+            n_more = len(found.warnings) - _MOST_WARNINGS
             yield text("")
-            yield text("Worth knowing", "bold yellow")
-            for warning in found.warnings[:_MOST_WARNINGS]:
-                yield text(f"- {warning}")
-            if len(found.warnings) > _MOST_WARNINGS:
-                yield text(
-                    f"- and {len(found.warnings) - _MOST_WARNINGS} more in identification.json.", "dim"
-                )
+            yield from worth_knowing(found.warnings[:_MOST_WARNINGS], text, n_more, "identification.json")
+
+    return Summary(lines)
 
 
-def identification_summary(identification: Identification) -> IdentificationSummary:
-    """Return the identification as a rich renderable.
-
-    Parameters
-    ----------
-    identification
-        The result.
-    """
-    return IdentificationSummary(identification)
-
-
-def _amplitude_tables(found: Identification, text: Callable[..., Text], width: int) -> Iterator[Table]:
+def _amplitude_tables(found: Identification, text: Writer, width: int) -> Iterator[Table]:
     """Yield a column per record in the order of amplitudes, in as many tables as the terminal's width asks for."""
     records = sorted(found.records, key=lambda r: r.amplitude)
     names = dict.fromkeys(name for record in records for name in record.estimates)
@@ -115,7 +88,7 @@ def _amplitude_tables(found: Identification, text: Callable[..., Text], width: i
             table.add_column(text(record.record.name), justify="right", overflow="fold")
         table.add_row(*map(text, amplitude_row(found, part)))
         for name in names:
-            head = text(f"{name}{unit_in_brackets(found.units.get(name, ''))}")
+            head = text(with_unit(name, found.units.get(name, "")))
             table.add_row(head, *(text(estimate_cell(record, name)) for record in part))
         if any(record.resonance is not None for record in records):
             seen = ("-" if r.resonance is None else f"{r.resonance:.3g}" for r in part)
@@ -124,19 +97,14 @@ def _amplitude_tables(found: Identification, text: Callable[..., Text], width: i
 
 
 def amplitude_row(found: Identification, records: Sequence[RecordIdentification]) -> list[str]:
-    """Return the head and the cells of the amplitudes of records; the unit stands once, or in each cell where sources differ."""
+    """Return head and cells of the amplitudes of records; the unit is in the head, or in each cell where sources differ."""
     units = [found.units.get(record.source, "") for record in records]
     if len({found.units.get(record.source, "") for record in found.records}) == 1:
-        return [f"amplitude{unit_in_brackets(units[0])}", *(f"{record.amplitude:.4g}" for record in records)]
+        return [with_unit("amplitude", units[0]), *(f"{record.amplitude:.4g}" for record in records)]
     return [
         "amplitude",
         *(f"{record.amplitude:.4g} {unit}".rstrip() for record, unit in zip(records, units, strict=True)),
     ]
-
-
-def unit_in_brackets(unit: str) -> str:
-    """Return a unit as it stands behind a name, nothing for a dimensionless one."""
-    return f" [{unit}]" if unit not in ("", "1") else ""
 
 
 def estimate_cell(record: RecordIdentification, name: str) -> str:
@@ -146,9 +114,7 @@ def estimate_cell(record: RecordIdentification, name: str) -> str:
     value, std = record.estimates[name]
     if not math.isfinite(std):
         return f"{value:.3g}"
-    number = written(value, std)
-    power = f"e{number.exponent:+d}" if number.exponent else ""
-    return f"({number.value} +/- {number.std}){power}" if power else f"{number.value} +/- {number.std}"
+    return plain(written(value, std))
 
 
 def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
@@ -198,19 +164,13 @@ def _score_text(score: RecordScore) -> str:
 
 
 def hysteresis_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]]:
-    """Yield subject and words: parameters, and what follows from them."""
-    yield from parameter_rows(found)
-    yield from derived_rows(found)
-
-
-def parameter_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]]:
-    """Yield name and value with standard error of each parameter."""
+    """Yield subject and words: parameters with their standard errors, and what follows from them."""
     fit = found.calibration.fit
     for name in fit.free:
         yield name, estimate_text(Estimate(fit.values[name], fit.standard_errors[name], found.units[name]))
     for name, value in found.held.items():
-        unit = found.units[name]
-        yield name, f"{value:.4g}{'' if unit in ('', '1') else f' {unit}'}, held"
+        yield name, f"{value:.4g}{behind(found.units[name])}, held"
+    yield from derived_rows(found)
 
 
 def derived_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]]:
@@ -238,11 +198,6 @@ def derived_text(one: Derived) -> str:
     """Return a value with its interval, e.g. ``"0.0318 J (95 %: 0.0316 to 0.0320)"``."""
     if not (math.isfinite(one.lower) and math.isfinite(one.upper)):
         return UNDETERMINED
-    unit = "" if one.unit in ("", "1") else f" {one.unit}"
     spread = (one.upper - one.lower) / _WIDTHS
-    value, lower, upper = (_plain(written(number, spread)) for number in (one.value, one.lower, one.upper))
-    return f"{value}{unit} ({100.0 * LEVEL:.0f} %: {lower} to {upper})"
-
-
-def _plain(number: Written) -> str:
-    return f"{number.value}e{number.exponent:+d}" if number.exponent else number.value
+    value, lower, upper = (plain(written(number, spread)) for number in (one.value, one.lower, one.upper))
+    return f"{value}{behind(one.unit)} ({100.0 * LEVEL:.0f} %: {lower} to {upper})"

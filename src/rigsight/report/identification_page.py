@@ -3,44 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.result import Estimate
+from rigsight.identify import FitResult
 from rigsight.identify.identification import HysteresisIdentification, Identification
 from rigsight.identify.linear_view import LinearView, Mode
-from rigsight.report.drawing.figures import PageFigure, page_figure
+from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.identification import derived_rows, error_rows
-from rigsight.report.quantities import ERRORS_HOLD, UNDETERMINED, Written, gap_percent, written
-from rigsight.report.render import environment
+from rigsight.report.quantities import ERRORS_HOLD, ParameterRow, parameter_row, written
+from rigsight.report.render import rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_TWO_SIDED = 1.96
-"""Standard deviations of a 95 % interval."""
 _STABLE = {
     "stable": "stable",
     "drifts": "stable except for free rigid-body motion",
     "undamped": "not damped in all of its motions",
     "unstable": "unstable",
 }
-
-
-@dataclass(frozen=True)
-class ParameterRow:
-    """One parameter, or combination of some, in the page; a remark stands where the records do not determine it."""
-
-    name: str
-    number: Written
-    interval: tuple[Written, ...]
-    unit: str
-    description: str
-    remark: str = ""
 
 
 def render_identification(
@@ -54,59 +40,53 @@ def render_identification(
     """Return the page of an identification."""
     reported = identification.identifiability
     assert reported is not None
-    names = identification.joint.names
-    return (
-        environment()
-        .get_template("identification.html.jinja")
-        .render(
-            identification=identification,
-            sentence=reported.sentence,
-            all_determined=len(reported.determined) == len(names) and identification.joint.fit.fit.success,
-            n_determined=len(reported.determined),
-            n_parameters=len(names),
-            views=_views(identification, drawings),
-            parameters=[_parameter(identification, name) for name in names],
-            combinations=[
-                _row(c.text, c.value, c.std, c.unit, f"of {', '.join(c.members)}")
-                for c in reported.combinations
-            ],
-            errors_hold=ERRORS_HOLD,
-            statements=reported.statements,
-            outputs=list(dict.fromkeys(name for s in identification.joint.scores for name in s.nrmse)),
-            scores=[
-                {
-                    "record": score.record,
-                    "role": score.role,
-                    "joint": {name: gap_percent(value) for name, value in score.nrmse.items()},
-                    "own": {name: gap_percent(value) for name, value in score.own_nrmse.items()},
-                }
-                for score in identification.joint.scores
-            ],
-            hysteresis=None if identification.hysteresis is None else _hysteresis(identification.hysteresis),
-            amplitudes=None
-            if amplitudes is None
-            else page_figure(
-                amplitudes,
-                "amplitudes-figure",
-                identification.amplitude_statement,
-                "Parameters fitted to each record alone, over its amplitude, with 95 % intervals; dashed: the common set.",
-            ),
-            command=command or "from Python",
-            versions=versions,
-            seed=seed,
-            made=datetime.now(UTC),
-        )
+    joint, names = identification.joint, identification.joint.names
+    fit, hysteresis = joint.fit.fit, identification.hysteresis
+    figure = None
+    if amplitudes is not None:
+        caption = "Parameters fitted to each record alone, over its amplitude, with 95 % intervals; dashed: the common set."
+        figure = page_figure(amplitudes, "amplitudes-figure", identification.amplitude_statement, caption)
+    return rendered(
+        "identification.html.jinja",
+        command or "from Python",
+        versions,
+        seed,
+        identification=identification,
+        sentence=reported.sentence,
+        all_determined=len(reported.determined) == len(names) and fit.success,
+        n_determined=len(reported.determined),
+        n_parameters=len(names),
+        views=_views(identification, drawings),
+        parameters=_parameters(names, fit, identification.units, identification.meanings),
+        combinations=[
+            parameter_row(c.text, Estimate(c.value, c.std, c.unit), description=f"of {', '.join(c.members)}")
+            for c in reported.combinations
+        ],
+        errors_hold=ERRORS_HOLD,
+        outputs=list(dict.fromkeys(name for score in joint.scores for name in score.nrmse)),
+        hysteresis=None if hysteresis is None else _hysteresis(hysteresis),
+        amplitudes=figure,
     )
+
+
+def _parameters(
+    names: Iterable[str], fit: FitResult, units: Mapping[str, str], meanings: Mapping[str, str]
+) -> list[ParameterRow]:
+    return [
+        parameter_row(
+            name,
+            Estimate(fit.values[name], fit.standard_errors[name], units.get(name, "")),
+            description=meanings.get(name, ""),
+        )
+        for name in names
+    ]
 
 
 def _hysteresis(found: HysteresisIdentification) -> dict[str, Any]:
     fit = found.calibration.fit
     return {
         "statement": found.statement,
-        "parameters": [
-            _row(name, fit.values[name], fit.standard_errors[name], found.units[name], found.meanings[name])
-            for name in fit.free
-        ],
+        "parameters": _parameters(fit.free, fit, found.units, found.meanings),
         "held": ", ".join(f"{name} = {value:.4g}" for name, value in found.held.items()),
         "derived": list(derived_rows(found)),
         "errors": list(error_rows(found)),
@@ -114,13 +94,18 @@ def _hysteresis(found: HysteresisIdentification) -> dict[str, Any]:
 
 
 def _views(identification: Identification, drawings: Sequence[Figure]) -> list[dict[str, Any]]:
-    found, left = [], list(drawings)
+    found, remaining = [], iter(drawings)
     for number, view in enumerate(identification.views, 1):
         found.append(
             {
                 "title": ", ".join(f"{name} = {value:g}" for name, value in view.constants.items()),
-                "figure": None if view.measured is None else _figure(view, left.pop(0), number),
-                "problems": [] if view.measured is None else _problems(view),
+                "figure": None if view.measured is None else _figure(view, next(remaining), number),
+                "problems": []
+                if view.measured is None
+                else [
+                    f"{source} \u2192 {response}: {problem}"
+                    for (source, response), problem in view.measured.problems.items()
+                ],
                 "modes": [_mode(mode) for mode in view.modes],
                 "stability": _STABLE[view.linearization.stability],
                 "at": _place(view),
@@ -147,14 +132,6 @@ def _figure(view: LinearView, drawing: Figure, number: int) -> PageFigure:
     return page_figure(
         drawing, f"responses-{number}", shown or "No frequency response was measured.", caption
     )
-
-
-def _problems(view: LinearView) -> list[str]:
-    assert view.measured is not None
-    return [
-        f"{source} \u2192 {response}: {problem}"
-        for (source, response), problem in view.measured.problems.items()
-    ]
 
 
 def _place(view: LinearView) -> str:
@@ -200,17 +177,3 @@ def _polynomial(coefficients: NDArray[np.float64]) -> str:
     signs = ["\u2212" if value < 0.0 else "+" for value, _ in parts]
     first = f"{signs[0].replace('+', '')}{parts[0][1]}"
     return first + "".join(f" {sign} {text}" for sign, (_, text) in zip(signs[1:], parts[1:], strict=True))
-
-
-def _parameter(identification: Identification, name: str) -> ParameterRow:
-    fit = identification.joint.fit.fit
-    unit, meaning = identification.units.get(name, ""), identification.meanings.get(name, "")
-    return _row(name, fit.values[name], fit.standard_errors[name], unit, meaning)
-
-
-def _row(name: str, value: float, std: float, unit: str, description: str) -> ParameterRow:
-    if not math.isfinite(std):
-        return ParameterRow(name, written(value), (), unit, description, UNDETERMINED)
-    ends = tuple(written(end, std) for end in (value - _TWO_SIDED * std, value + _TWO_SIDED * std))
-    interval = tuple(Written(end.value, "", end.exponent) for end in ends)
-    return ParameterRow(name, written(value, std), interval, unit, description)

@@ -11,7 +11,7 @@ from rigsight.diagnose.location.gap_parts import AmplitudePart, GapPart, StatePa
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import kind_of
 from rigsight.records.stamps import written_span
-from rigsight.report.drawing.figures import PageFigure, page_figure
+from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent, rig_of
 from rigsight.report.sections import output_label
 from rigsight.report.wording import (
@@ -43,11 +43,8 @@ def path_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """Return the legs of the signal path as text."""
     rows = []
     for part in diagnosis.localization.by_path:
-        shift = ""
-        if math.isfinite(part.shift):
-            shift = (
-                f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
-            )
+        delay = f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
+        shift = delay if math.isfinite(part.shift) else ""
         rows.append(
             {
                 "path": part.path.replace("->", "\u2192"),
@@ -60,14 +57,6 @@ def path_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
             }
         )
     return rows
-
-
-def share_rows(diagnosis: Diagnosis) -> list[tuple[str, list[str]]]:
-    """Return the share of the closed gap that each of several effects explains, by output."""
-    return [
-        (sentence_case(effect_label(effect)), [percent(shares[output]) for output in diagnosis.gap])
-        for effect, shares in diagnosis.effect_shares.items()
-    ]
 
 
 def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
@@ -103,18 +92,6 @@ def joint_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
         rest = stage_names(diagnosis)["reidentified"]
         figures.append(_states_figure(own, output, joint, f"where-joint-{number}", rest))
     return [OutputMaps("where-joints", "Joint by joint", figures)]
-
-
-def place_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return each place of a rig that has several, what share of the gap a push there takes away, and when it was looked at."""
-    return [
-        (
-            place.name,
-            percent(place.share),
-            "first" if place.examined else "only if the others explain too little of the gap",
-        )
-        for place in diagnosis.places
-    ]
 
 
 def force_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
@@ -167,24 +144,20 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     if bands:
         spread = (
             "spread over frequency as in the stretches that contain only noise"
-            if diagnosis.localization.noise_shape.get(output) == "measured"
+            if where.noise_shape.get(output) == "measured"
             else "assumed to be white"
         )
-        said = [
-            (
-                f"above {p.omega_low:.3g} rad/s"
-                if not p.excited
-                else f"{p.omega_low:.3g} to {p.omega_high:.3g} rad/s",
-                p,
-            )
+        limits = [
+            f"{p.omega_low:.3g} to {p.omega_high:.3g}" if p.excited else f"above {p.omega_low:.3g}"
             for p in bands
         ]
+        named = [(f"{limit} rad/s", part) for limit, part in zip(limits, bands, strict=True)]
         figures.append(
             page_figure(
                 plot.gap_bands(bands, stages),
                 f"{key}-bands",
-                f"Bars of the gap by band of frequency. {_reported(said, diagnosis)}",
-                f"By frequency. {_largest(said, rest)} The squares of the bars add up to the square of the gap; the "
+                f"Bars of the gap by band of frequency. {_reported(named, diagnosis)}",
+                f"By frequency. {_largest(named, rest)} The squares of the bars add up to the square of the gap; the "
                 f"noise floor is {spread}.",
             )
         )
@@ -192,19 +165,14 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         figures.append(_states_figure(states, output, _motion(diagnosis), key, rest))
     if len({p.amplitude for p in amplitudes}) > 1:
         labels = [_amplitude_label(p) for p in amplitudes]
-        said_of = list(zip((label.replace("\n", " ") for label in labels), amplitudes, strict=True))
+        spoken = list(zip((label.replace("\n", " ") for label in labels), amplitudes, strict=True))
+        which = "; ".join(f"{_size(p)} {p.records[0]}" for p in amplitudes)
         figures.append(
             page_figure(
                 plot.gap_amplitudes(amplitudes, labels, stages),
                 f"{key}-amplitudes",
-                f"Bars of the gap by amplitude of the input. {_reported(said_of, diagnosis)}",
-                "By amplitude of the input, each relative to the motion there"
-                + (
-                    ": " + "; ".join(f"{_size(p)} {p.records[0]}" for p in amplitudes)
-                    if one_record_each
-                    else ""
-                )
-                + ".",
+                f"Bars of the gap by amplitude of the input. {_reported(spoken, diagnosis)}",
+                f"By amplitude of the input, each relative to the motion there{f': {which}' if one_record_each else ''}.",
             )
         )
     # Where each amplitude is one record, the picture is the same.
@@ -259,12 +227,10 @@ def _states_figure(states: Sequence[StatePart], output: str, motion: str, key: s
 
 def _reported(parts: Sequence[tuple[str, GapPart]], diagnosis: Diagnosis) -> str:
     """Return the bars in words, for who cannot see them."""
-    sentences = []
-    for name, part in parts:
-        sentences.append(
-            f"{sentence_case(name)}: {stages_reported(diagnosis, part)}, noise floor {gap_percent(part.noise_floor)}."
-        )
-    return " ".join(sentences)
+    return " ".join(
+        f"{sentence_case(name)}: {stages_reported(diagnosis, part)}, noise floor {gap_percent(part.noise_floor)}."
+        for name, part in parts
+    )
 
 
 def _largest(parts: Sequence[tuple[str, GapPart]], rest: str) -> str:
@@ -291,11 +257,9 @@ def _lacking(states: Sequence[StatePart]) -> str:
 def _motion(diagnosis: Diagnosis) -> str:
     """Return the name of the signal that is the displacement."""
     rig = rig_of(diagnosis)
-    return (
-        "x"
-        if rig is None or not rig.has_one_motion
-        else (rig.outputs if rig.is_driven else rig.inputs)[0].name
-    )
+    if rig is None or not rig.has_one_motion:
+        return "x"
+    return (rig.outputs if rig.is_driven else rig.inputs)[0].name
 
 
 def _place(part: StatePart, motion: str) -> str:

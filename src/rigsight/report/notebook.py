@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from rigsight.compare import Comparison
 from rigsight.diagnose.result import Diagnosis
 from rigsight.discover import Discovery
 from rigsight.identify.identification import Identification
+from rigsight.plot import with_unit
+from rigsight.report import wording
 from rigsight.report.comparison import comparison_view
-from rigsight.report.discovery import discovery_rows
 from rigsight.report.identification import (
     ERROR_HEADS,
     HEADING,
@@ -19,82 +19,66 @@ from rigsight.report.identification import (
     estimate_cell,
     hysteresis_rows,
     joint_rows,
-    unit_in_brackets,
 )
 from rigsight.report.render import environment
-from rigsight.report.terminal import diagnosis_rows
-from rigsight.report.trust import trust_line
-from rigsight.report.wording import (
-    advice_sentences,
-    ambiguity_sentence,
-    basis_sentence,
-    fault_sentences,
-    missing_force_sentence,
-    remainder_sentence,
-    verdict_name,
-    verdict_sentence,
-)
+from rigsight.report.sections import trust_line
+from rigsight.report.terminal import diagnosis_rows, discovery_rows
 
-
-@dataclass(frozen=True)
-class NotebookTable:
-    """A table of texts; `heads` may be empty, the first cell of a row is its label."""
-
-    heads: Sequence[str]
-    rows: Sequence[Sequence[str]]
+_Table = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Heads, which may be none, and rows of texts; the first cell of a row is its label."""
 
 
 def diagnosis_html(diagnosis: Diagnosis) -> str:
     """Return verdict, gap, ranking and the numbers of the effect."""
     sentences = [
-        verdict_sentence(diagnosis),
-        *fault_sentences(diagnosis),
-        missing_force_sentence(diagnosis),
-        remainder_sentence(diagnosis),
+        wording.verdict_sentence(diagnosis),
+        *wording.fault_sentences(diagnosis),
+        wording.missing_force_sentence(diagnosis),
+        wording.remainder_sentence(diagnosis),
         trust_line(diagnosis),
-        ambiguity_sentence(diagnosis),
-        *advice_sentences(diagnosis),
-        basis_sentence(diagnosis),
+        wording.ambiguity_sentence(diagnosis),
+        *wording.advice_sentences(diagnosis),
+        wording.basis_sentence(diagnosis),
     ]
-    rows = NotebookTable((), list(diagnosis_rows(diagnosis)))
-    return _html(f"{verdict_name(diagnosis)}: {diagnosis.title}", sentences, [rows])
+    rows = ((), list(diagnosis_rows(diagnosis)))
+    return _html(f"{wording.verdict_name(diagnosis)}: {diagnosis.title}", sentences, [rows])
 
 
 def identification_html(identification: Identification) -> str:
     """Return the parameters of each record in the order of amplitudes, and those of all records together."""
     records = sorted(identification.records, key=lambda record: record.amplitude)
     names = dict.fromkeys(name for record in records for name in record.estimates)
-    alone = NotebookTable(
+    alone = (
         ("record", *(record.record.name for record in records)),
         [
             tuple(amplitude_row(identification, records)),
             *(
                 (
-                    f"{name}{unit_in_brackets(identification.units.get(name, ''))}",
+                    with_unit(name, identification.units.get(name, "")),
                     *(estimate_cell(record, name) for record in records),
                 )
                 for name in names
             ),
         ],
     )
-    together = NotebookTable(("all records", ""), list(joint_rows(identification)))
+    together = (("all records", ""), list(joint_rows(identification)))
     reported = identification.identifiability
     sentences = [
         identification.amplitude_statement,
         identification.joint.statement,
         "" if reported is None else reported.sentence,
     ]
-    tables = [alone, together]
+    tables: list[_Table] = [alone, together]
     if (hysteresis := identification.hysteresis) is not None:
         sentences.append(hysteresis.statement)
-        tables.append(NotebookTable((HEADING, ""), list(hysteresis_rows(hysteresis))))
-        tables.append(NotebookTable(ERROR_HEADS, list(error_rows(hysteresis))))
+        tables.append(((HEADING, ""), list(hysteresis_rows(hysteresis))))
+        tables.append((ERROR_HEADS, list(error_rows(hysteresis))))
     return _html(f"Identified: {identification.title}", sentences, tables, identification.warnings)
 
 
 def discovery_html(discovery: Discovery) -> str:
     """Return the equations, their numbers and terms, and the error on the held-out records."""
-    rows = NotebookTable((), list(discovery_rows(discovery)))
+    rows = ((), list(discovery_rows(discovery)))
     return _html(f"Discovered: {discovery.title}", discovery.equations, [rows], discovery.warnings)
 
 
@@ -105,13 +89,13 @@ def comparison_html(comparison: Comparison) -> str:
         (name, *(f"{cell.text}{' *' if cell.is_best else ''}" for cell in cells))
         for name, cells in overall.rows.items()
     ]
-    table = NotebookTable(("model", *overall.heads), [*rows, ("noise floor", *overall.floor)])
+    table = (("model", *overall.heads), [*rows, ("noise floor", *overall.floor)])
     sentence = f"Errors over {overall.title}; * smallest of its column."
     return _html(f"Compared: {comparison.title}", [sentence], [table], comparison.notes)
 
 
 def _html(
-    title: str, sentences: Iterable[str], tables: Sequence[NotebookTable], warnings: Sequence[str] = ()
+    title: str, sentences: Iterable[str], tables: Sequence[_Table], warnings: Sequence[str] = ()
 ) -> str:
     return (
         environment()

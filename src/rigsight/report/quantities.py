@@ -10,6 +10,8 @@ from rigsight.compare import Column
 from rigsight.compare.score import Quantity
 from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.effects import AT, Effect, kind_of, placed
+from rigsight.parameters import Parameter
+from rigsight.plot.drawing import TWO_SIDED
 from rigsight.rigs import Rig, declared_rig
 
 UNDETERMINED = "not determined by these records"
@@ -37,40 +39,80 @@ def written(value: float, std: float | None = None) -> Written:
     """Return value and standard error with two significant digits of the error; four digits of a value without one."""
     if not math.isfinite(value):
         return Written("not finite", "", 0)
-    known = std is not None and math.isfinite(std) and std > 0.0
-    size = max(abs(value), std if known and std is not None else 0.0)
-    power = math.floor(math.log10(size)) if size > 0.0 else 0
-    exponent = power if power >= 5 or power <= -4 else 0
-    scale = 10.0**-exponent
-    if not known or std is None:
-        return Written(f"{value * scale:z.4g}", "", exponent)
-    # At most ten digits: beyond, the standard error says more about the optimizer than about the rig.
-    decimals = min(max(0, 1 - math.floor(math.log10(std * scale))), 9)
+    if std is None or not math.isfinite(std) or std <= 0.0:
+        exponent = _exponent(abs(value))
+        return Written(f"{value * 10.0**-exponent:z.4g}", "", exponent)
+    exponent = _exponent(max(abs(value), std))
+    decimals, scale = _decimals(std, exponent), 10.0**-exponent
     return Written(f"{value * scale:z.{decimals}f}", f"{std * scale:.{decimals}f}", exponent)
 
 
 def written_limits(low: float, high: float, std: float) -> tuple[Written, Written]:
     """Return the limits of an interval with two significant digits of the standard error, both with the same power of ten."""
-    size = max(abs(low), abs(high))
-    power = math.floor(math.log10(size)) if size > 0.0 else 0
-    exponent = power if power >= 5 or power <= -4 else 0
-    scale = 10.0**-exponent
-    decimals = min(max(0, 1 - math.floor(math.log10(std * scale))), 9)
-    first, last = (Written(f"{limit * scale:z.{decimals}f}", "", exponent) for limit in (low, high))
+    exponent = _exponent(max(abs(low), abs(high)))
+    decimals = _decimals(std, exponent)
+    first, last = (Written(f"{limit * 10.0**-exponent:z.{decimals}f}", "", exponent) for limit in (low, high))
     return first, last
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter, or a combination of some, in a table; a remark stands where the records do not determine it."""
+
+    name: str
+    number: Written
+    unit: str
+    description: str
+    interval: tuple[Written, ...] = ()  # 95 %, empty where there is none
+    remark: str = ""
+    given: str = ""  # value in the given simulation, empty where that has none
+
+
+def parameter_row(
+    name: str, estimate: Estimate, parameter: Parameter | None = None, given: str = "", description: str = ""
+) -> ParameterRow:
+    """Return an estimate with its 95 % interval, cut where the parameter's own range ends."""
+    value, std = estimate.value, estimate.std
+    interval: tuple[Written, ...] = ()
+    if math.isfinite(value) and math.isfinite(std) and std > 0.0:
+        low, high = value - TWO_SIDED * std, value + TWO_SIDED * std
+        if parameter is not None:
+            low, high = max(low, parameter.lower), min(high, parameter.upper)
+        interval = written_limits(low, high, std)
+    remark = "" if math.isfinite(std) else UNDETERMINED
+    about = description if parameter is None else parameter.description
+    return ParameterRow(name, written(value, std), estimate.unit, about, interval, remark, given)
+
+
+def _exponent(size: float) -> int:
+    """Return the power of ten that is written outside of a number of this size: none but for large and small ones."""
+    power = math.floor(math.log10(size)) if size > 0.0 else 0
+    return power if power >= 5 or power <= -4 else 0
+
+
+def _decimals(std: float, exponent: int) -> int:
+    # At most ten digits: beyond, the standard error says more about the optimizer than about the rig.
+    return min(max(0, 1 - math.floor(math.log10(std * 10.0**-exponent))), 9)
+
+
+def plain(number: Written) -> str:
+    """Return a number in ASCII, e.g. ``"(3.10 +/- 0.02)e+5"``."""
+    inside = f"{number.value} +/- {number.std}" if number.std else number.value
+    if not number.exponent:
+        return inside
+    return f"({inside})e{number.exponent:+d}" if number.std else f"{inside}e{number.exponent:+d}"
+
+
+def behind(unit: str) -> str:
+    """Return a unit as it follows a number; nothing for a dimensionless one."""
+    return "" if unit in ("", "1") else f" {unit}"
 
 
 def estimate_text(estimate: Estimate) -> str:
     """Return an estimate in ASCII, e.g. ``"81.2 +/- 1.3 N m/rad"``."""
-    number = written(estimate.value, estimate.std)
-    unit = "" if estimate.unit in ("", "1") else f" {estimate.unit}"
-    power = f"e{number.exponent:+d}" if number.exponent else ""
     if not math.isfinite(estimate.std):
         return UNDETERMINED
-    if not number.std:
-        return f"{number.value}{power}{unit}"
-    inside = f"{number.value} +/- {number.std}"
-    return f"({inside}){power}{unit}" if power else f"{inside}{unit}"
+    return f"{plain(written(estimate.value, estimate.std))}{behind(estimate.unit)}"
 
 
 def gap_percent(value: float) -> str:

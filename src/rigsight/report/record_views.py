@@ -15,19 +15,18 @@ from rigsight.diagnose.location.trace import STAGES, Stage, Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.metrics import nrmse
 from rigsight.records.stamps import time_label, time_origin
-from rigsight.report.drawing.charts import (
+from rigsight.report.figures import (
     Chart,
     ChartPanel,
     Curve,
     Detail,
     chart_data,
     curve_names,
+    page_figure,
     points_per_curve,
 )
-from rigsight.report.drawing.figures import page_figure
-from rigsight.report.drawing.response_charts import response_chart
 from rigsight.report.quantities import gap_percent
-from rigsight.report.responses import PathResponse
+from rigsight.report.responses import PathResponse, response_chart
 from rigsight.report.sections import output_label
 from rigsight.report.wording import sentence_case, stage_names, unit_text
 
@@ -65,7 +64,7 @@ def record_views(
             title=trace.record,
             facts=_facts(diagnosis, trace),
             rows=[
-                (output_label(diagnosis, output), _left(trace, output, stages)) for output in trace.measured
+                (output_label(diagnosis, output), _errors(trace, output, stages)) for output in trace.measured
             ],
             charts=[
                 *(
@@ -84,7 +83,7 @@ def record_views(
         )
 
 
-def _left(trace: Trace, output: str, stages: Mapping[Stage, str]) -> str:
+def _errors(trace: Trace, output: str, stages: Mapping[Stage, str]) -> str:
     return ", ".join(
         f"{name} {gap_percent(nrmse(-trace.residual(stage, output), trace.measured[output]))}"
         for stage, name in stages.items()
@@ -117,12 +116,12 @@ def _time_chart(
         below.append(Curve(stage, names[stage], error_scale.factor * error[kept]))
     panels = [
         ChartPanel(
-            _with_unit(output, scale.unit),
+            plot.with_unit(output, scale.unit),
             3,
             above,
             (scale.factor * (low - span), scale.factor * (high + span)),
         ),
-        ChartPanel(_with_unit("error", error_scale.unit), 2, below, (-far, far)),
+        ChartPanel(plot.with_unit("error", error_scale.unit), 2, below, (-far, far)),
     ]
     label = output_label(diagnosis, output)
     thinned = (
@@ -169,10 +168,6 @@ def _kept(series: Sequence[NDArray[np.float64]], most_points: int) -> NDArray[np
 
 def _largest(values: NDArray[np.float64], limit: float) -> float:
     return min(limit, float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)))
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
 def record_drawing(diagnosis: Diagnosis, trace: Trace, output: str) -> Figure:

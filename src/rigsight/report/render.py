@@ -4,42 +4,32 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.resources import files
+from itertools import chain
+from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from rigsight.diagnose.location.trace import STAGES
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.report import location, sections
-from rigsight.report.drawing.loop_figures import loop_figures
-from rigsight.report.drawing.response_charts import amplitude_figures
-from rigsight.report.drawing.rig_figure import rig_figure
-from rigsight.report.quantities import Written, effect_of, rig_of
+from rigsight.report import location, sections, wording
+from rigsight.report.figures import loop_figures, rig_figure
+from rigsight.report.quantities import Written, effect_of, gap_percent, rig_of
 from rigsight.report.record_views import record_views
-from rigsight.report.responses import record_responses
-from rigsight.report.trust import trust_view
+from rigsight.report.responses import amplitude_figures, record_responses
 from rigsight.report.wording import (
+    TIMES,
     advice_sentences,
-    ambiguity_sentence,
-    basis_sentence,
     effect_label,
     effects_label,
-    error_over_noise,
-    fault_sentences,
-    missing_force_sentence,
     percent,
-    remainder_sentence,
     sentence_case,
     stage_names,
-    times_floor,
-    verdict_name,
-    verdict_sentence,
-    what_is_probable,
 )
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
@@ -56,79 +46,52 @@ def render_report(
     seed: int | None = None,
     own_effects: Iterable[Effect] = (),
 ) -> str:
-    """Return the report as one HTML page.
-
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    command
-        The command line that made it.
-    versions
-        Package -> version, as in ``{"rigsight": "0.1.0", "numpy": "2.0.0"}``.
-    seed
-        Seed of everything random; None where nothing was.
-    own_effects
-        Effects beside those of the catalogue that the simulation may have.
-    """
+    """Return the report as one HTML page."""
     known = known_effects(own_effects)
     responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
     script = _script()
-    return (
-        environment()
-        .get_template("report.html.jinja")
-        .render(
-            diagnosis=diagnosis,
-            verdict_name=verdict_name(diagnosis),
-            verdict_sentence=verdict_sentence(diagnosis),
-            fault_sentences=fault_sentences(diagnosis),
-            missing_force_sentence=missing_force_sentence(diagnosis),
-            law_rows=location.law_rows(diagnosis),
-            remainder_sentence=remainder_sentence(diagnosis),
-            ambiguity_sentence=ambiguity_sentence(diagnosis),
-            basis_sentence=basis_sentence(diagnosis),
-            stages=stage_names(diagnosis),
-            rivals=[sentence_case(effects_label(effects)) for effects in diagnosis.ambiguous_with],
-            effects=sections.effect_summaries(diagnosis, known),
-            left={stage: times_floor(error_over_noise(diagnosis, stage)) for stage in STAGES},
-            probability=percent(diagnosis.probability) if diagnosis.candidates else "",
-            what_is_probable=what_is_probable(diagnosis),
-            rig_figure=rig_figure(diagnosis),
-            budget=sections.budget_figure(diagnosis),
-            budget_rows=sections.budget_rows(diagnosis),
-            path_sentence=diagnosis.localization.sentence.replace("->", "\u2192"),
-            path_rows=location.path_rows(diagnosis),
-            place_rows=location.place_rows(diagnosis),
-            maps=[
-                *location.force_maps(diagnosis),
-                *location.output_maps(diagnosis),
-                *location.joint_maps(diagnosis),
-            ],
-            share_rows=location.share_rows(diagnosis),
-            ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
-            family_rows=sections.family_rows(diagnosis),
-            ranking_rows=sections.ranking_rows(diagnosis),
-            outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
-            parameters=sections.parameter_rows(diagnosis, known),
-            has_given=bool(diagnosis.given),
-            trust=trust_view(diagnosis),
-            errors_reported=sections.errors_reported(diagnosis),
-            equations=equation_groups(diagnosis, known),
-            amplitude_figures=amplitude_figures(diagnosis, responses),
-            loops=loop_figures(diagnosis),
-            records=list(record_views(diagnosis, responses)),
-            advice=advice_sentences(diagnosis),
-            findings=sections.finding_rows(diagnosis),
-            notes=sections.other_notes(diagnosis),
-            script=Markup(script),
-            script_hash=_content_hash(script),
-            floors=sections.floor_rows(diagnosis),
-            command=command,
-            versions=versions,
-            seed=seed,
-            made=datetime.now(UTC),
-        )
+    return rendered(
+        "report.html.jinja",
+        command,
+        versions,
+        seed,
+        diagnosis=diagnosis,
+        quality=diagnosis.data_quality,
+        wording=wording,
+        stages=stage_names(diagnosis),
+        outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
+        effects=sections.effect_summaries(diagnosis, known),
+        rig_figure=rig_figure(diagnosis),
+        budget=sections.budget_figure(diagnosis),
+        budget_rows=sections.budget_rows(diagnosis),
+        path_rows=location.path_rows(diagnosis),
+        law_rows=location.law_rows(diagnosis),
+        maps=[
+            *location.force_maps(diagnosis),
+            *location.output_maps(diagnosis),
+            *location.joint_maps(diagnosis),
+        ],
+        ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
+        parameters=sections.parameter_rows(diagnosis, known),
+        errors_reported=sections.errors_reported(diagnosis),
+        trust=sections.trust_view(diagnosis),
+        equations=equation_groups(diagnosis, known),
+        amplitude_figures=amplitude_figures(diagnosis, responses),
+        loops=loop_figures(diagnosis),
+        records=list(record_views(diagnosis, responses)),
+        advice=advice_sentences(diagnosis),
+        floors=sections.floor_rows(diagnosis),
+        script=Markup(script),
+        script_hash=_content_hash(script),
     )
+
+
+def rendered(
+    template: str, command: str, versions: Mapping[str, str], seed: int | None = None, **content: Any
+) -> str:
+    """Return a page that ends with how it was made."""
+    page = environment().get_template(template)
+    return page.render(command=command, versions=versions, seed=seed, made=datetime.now(UTC), **content)
 
 
 def _script() -> str:
@@ -154,7 +117,19 @@ def environment(*packages: str) -> Environment:
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
-    made.filters |= {"unit": _unit, "number": _number}
+    made.filters |= {
+        "unit": _unit,
+        "number": _number,
+        "percent": percent,
+        "gap": gap_percent,
+        "case": sentence_case,
+        "effects": lambda names: sentence_case(effects_label(names)),
+        "arrows": lambda text: text.replace("->", "\u2192"),
+        "floors": lambda error: f"{error:.3g} {TIMES}" if math.isfinite(error) else "not scored",
+        # The heads of a table: title -> class of its column.
+        "merged": lambda heads, *more: dict(chain(heads.items(), *(own.items() for own in more))),
+    }
+    made.globals["numeric"] = lambda names, before="": {f"{before}{name}": "n" for name in names}
     return made
 
 
@@ -198,7 +173,7 @@ def known_effects(own: Iterable[Effect] = ()) -> dict[str, Effect]:
 def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[EquationGroup]:
     """Return the equations of the rig, then those of each effect of the diagnosed simulation, in the order of the signal path."""
     rig = rig_of(diagnosis)
-    # What the given simulation had already stands in the model beside what was added.
+    # What the given simulation had already is in the model beside what was added.
     names = dict.fromkeys([*diagnosis.model.get("effects", ()), *diagnosis.effects])
     effects = [effect_of(name, known) for name in names]
     named = [effect for effect in effects if effect is not None]

@@ -1,74 +1,50 @@
-"""Rows and figures of each section of the page, in order."""
+"""Rows and figures of the sections of the page, and the line on trust in parameters for a terminal."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rigsight import plot
 from rigsight.diagnose.location.trace import STAGES
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
-from rigsight.diagnose.result import Diagnosis, Estimate
+from rigsight.diagnose.result import Diagnosis
+from rigsight.diagnose.trust.patterns import Pattern
+from rigsight.diagnose.trust.result import ParameterTrust
+from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
 from rigsight.effects import Effect
+from rigsight.errors import InputError
 from rigsight.parameters import Parameter
-from rigsight.report.drawing.figures import PageFigure, page_figure
+from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import (
-    UNDETERMINED,
-    Written,
+    ParameterRow,
     effect_of,
     gap_percent,
+    parameter_row,
     rig_of,
     written,
-    written_limits,
 )
 from rigsight.report.wording import (
-    TIMES,
     effect_label,
     effects_label,
-    family_label,
-    forms_label,
     given_text,
     is_given,
     named_candidate,
     percent,
     sentence_case,
-    share_label,
     stages_reported,
 )
 
 if TYPE_CHECKING:
     from rigsight.plot import Figure
 
-_TWO_SIDED = 1.96
-"""Standard deviations of a 95 % interval."""
-
-
-@dataclass(frozen=True)
-class ParameterRow:
-    """One parameter of the diagnosed simulation."""
-
-    # What it is; the remark stands where the records do not determine it.
-    name: str
-    description: str
-    number: Written
-    unit: str
-    remark: str
-    interval: tuple[Written, ...] = ()  # its 95 % interval, empty where it was not fitted
-    given: str = ""  # its value in the given simulation, empty where that has none
-
-
-@dataclass(frozen=True)
-class FindingRow:
-    """One thing that the records themselves say: where, what, what to do, and whether the gap may come from it."""
-
-    where: str
-    kind: str
-    sentence: str
-    remedy: str
-    serious: bool
-    explained: str
+TRUST_COLUMNS = ("parameter", "by", "group", "value", "std", "unit", "pattern", "p_value")
+"""Columns of the table."""
+_BY = {PORTION: "part of the records", WINDOW_LENGTH: "window length"}
+_MOST_PANELS = 6
+_NAMED_IN_A_LINE = 3
 
 
 def effect_summaries(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[tuple[str, str, str]]:
@@ -156,63 +132,20 @@ def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
     )
 
 
-def family_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
-    """Return each family with its probability, its shares of the gap and along the motion, and its forms; then the rest."""
-    rows = [
-        (
-            sentence_case(family_label(own)),
-            percent(own.probability),
-            share_label(own),
-            "" if own.along_motion is None else percent(own.along_motion),
-            forms_label(own),
-        )
-        for own in diagnosis.families
-    ]
-    if rows and diagnosis.shares is not None:
-        rows.append(("Remainder", "", percent(diagnosis.shares.remainder), "", "explained by none of them"))
-        rows.append(("Noise and disturbance", "", percent(diagnosis.shares.noise), "", ""))
-    return rows
-
-
-def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the candidates as text, best first."""
-    return [
-        {
-            "effects": sentence_case(effects_label(candidate.effects)),
-            "names": ", ".join(candidate.effects),
-            "is_named": bool(diagnosis.effects) and candidate.effects == diagnosis.effects,
-            "is_tied": candidate.effects in diagnosis.ambiguous_with,
-            "probability": percent(candidate.probability),
-            "errors": [
-                gap_percent(candidate.validation_nrmse[output])
-                if output in candidate.validation_nrmse
-                else "not scored"
-                for output in diagnosis.gap
-            ],
-            "error_over_noise": f"{candidate.error_over_noise:.3g} {TIMES}"
-            if math.isfinite(candidate.error_over_noise)
-            else "not scored",
-            "converged": "yes" if candidate.success else "no",
-            "message": candidate.message,
-        }
-        for candidate in diagnosis.candidates
-    ]
-
-
 def parameter_rows(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> list[ParameterRow]:
     """Return the numbers of the diagnosed simulation: fitted ones with their errors, else those of the model file."""
     known = {p.name: p for p in _parameters(diagnosis, effects)}
     candidate = named_candidate(diagnosis)
     if candidate is not None and diagnosis.verdict in ("effect", "parameters"):
         return [
-            replace(_parameter_row(name, estimate, known.get(name)), given=given_text(diagnosis, name))
+            parameter_row(name, estimate, known.get(name), given_text(diagnosis, name))
             for name, estimate in candidate.parameters.items()
         ]
     model, units = diagnosis.model, diagnosis.model.get("units", {})
     values = {**model.get("parameters", {}), **model.get("effect_parameters", {})}
     return [
         ParameterRow(
-            name, known[name].description if name in known else "", written(value), units.get(name, ""), ""
+            name, written(value), units.get(name, ""), known[name].description if name in known else ""
         )
         for name, value in values.items()
         if isinstance(value, int | float)
@@ -233,23 +166,6 @@ def errors_reported(diagnosis: Diagnosis) -> str:
         "Standard errors from the covariance of the fit, because this model could not be simulated with random forces. They may "
         "be too small if disturbances decide when friction sticks or slips."
     )
-
-
-def _parameter_row(name: str, estimate: Estimate, parameter: Parameter | None) -> ParameterRow:
-    remark = "" if math.isfinite(estimate.std) else UNDETERMINED
-    description = parameter.description if parameter else ""
-    number = written(estimate.value, estimate.std)
-    return ParameterRow(name, description, number, estimate.unit, remark, _interval(estimate, parameter))
-
-
-def _interval(estimate: Estimate, parameter: Parameter | None) -> tuple[Written, ...]:
-    """Return the 95 % limits, cut where the parameter's own range ends."""
-    if not (math.isfinite(estimate.value) and math.isfinite(estimate.std) and estimate.std > 0.0):
-        return ()
-    low, high = estimate.value - _TWO_SIDED * estimate.std, estimate.value + _TWO_SIDED * estimate.std
-    if parameter is not None:
-        low, high = max(low, parameter.lower), min(high, parameter.upper)
-    return tuple(written_limits(low, high, estimate.std))
 
 
 def floor_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
@@ -285,29 +201,6 @@ def output_label(diagnosis: Diagnosis, output: str) -> str:
     return meaning if meaning.startswith(output) else f"{meaning} {output}".strip()
 
 
-def finding_rows(diagnosis: Diagnosis) -> list[FindingRow]:
-    """Return what the records themselves say, in the order in which it is worth reading."""
-    if diagnosis.data_quality is None:
-        return []
-    return [
-        FindingRow(
-            where=", ".join(part for part in (finding.record or "all records", finding.signal) if part),
-            kind=finding.kind.replace("_", " "),
-            sentence=finding.sentence,
-            remedy=finding.remedy,
-            serious=finding.serious,
-            explained="not measured" if finding.explained is None else percent(finding.explained),
-        )
-        for finding in diagnosis.data_quality.findings
-    ]
-
-
-def other_notes(diagnosis: Diagnosis) -> list[str]:
-    """Return the notes that do not stand under data quality already."""
-    reported = () if diagnosis.data_quality is None else diagnosis.data_quality.notes
-    return [note for note in diagnosis.notes if note not in reported]
-
-
 def _parameters(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Iterator[Parameter]:
     rig = rig_of(diagnosis)
     if rig:
@@ -318,3 +211,110 @@ def _parameters(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Iterator[P
             yield parameter
             # Where two effects share a name, theirs is in front of it.
             yield replace(parameter, name=f"{name}.{parameter.name}")
+
+
+def trust_view(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """Return figure and rows of the section; None where the question was not asked.
+
+    There is no figure where no number was estimated in two groups.
+    """
+    if diagnosis.trust is None:
+        return None
+    figure = None
+    if drawn := _drawn(diagnosis):
+        reported = "; ".join(f"{number.name}: {_how(number)}" for number in drawn)
+        figure = page_figure(
+            trust_drawing(diagnosis),
+            "figure-trust",
+            f"Parameters estimated from single groups of records, with 95 % intervals. {reported}.",
+            "Each parameter as estimated from one record, level or window alone, with 95 % intervals. Dashed line with band: the "
+            "common fit.",
+        )
+    return {"figure": figure, "rows": [_row(number) for number in diagnosis.trust.parameters]}
+
+
+def trust_drawing(diagnosis: Diagnosis) -> Figure:
+    """Return the numbers by group: those that differ and those of the effects, six at most."""
+    drawn = _drawn(diagnosis)
+    if not drawn:
+        raise InputError("No parameter of this diagnosis could be estimated from two groups of records.")
+    return plot.parameters_by_group(
+        [
+            plot.GroupPanel(
+                number.name,
+                number.unit,
+                _BY.get(_shown(number), _shown(number)),
+                tuple((one.group, one.value, one.std) for one in number.groups[_shown(number)]),
+                (number.value, number.std),
+                not number.stable,
+            )
+            for number in drawn
+        ]
+    )
+
+
+def trust_line(diagnosis: Diagnosis) -> str:
+    """Return one line: that all numbers are the same, or which are not; empty where that was not asked."""
+    if diagnosis.trust is None or not diagnosis.trust.parameters:
+        return ""
+    differing = [number for number in diagnosis.trust.parameters if not number.stable]
+    if not differing:
+        return f"Trust: {diagnosis.trust.statement}"
+    reported = [f"{number.name} {_how(number)}" for number in differing[:_NAMED_IN_A_LINE]]
+    more = len(differing) - len(reported)
+    rest = f"; {more} more {'differs' if more == 1 else 'differ'}" if more > 0 else ""
+    first = differing[0].points_to
+    return f"Trust: {'; '.join(reported)}{rest}. {sentence_case(first.cause) if first else ''}."
+
+
+def trust_rows(diagnosis: Diagnosis) -> Iterator[dict[str, Any]]:
+    """Yield a row per number and group, with the columns `TRUST_COLUMNS`."""
+    for number in () if diagnosis.trust is None else diagnosis.trust.parameters:
+        for kind, groups in number.groups.items():
+            for one in groups:
+                estimate = (number.name, kind, one.group, one.value, one.std, number.unit)
+                row = (*estimate, str(number.pattern), number.p_value)
+                yield dict(zip(TRUST_COLUMNS, row, strict=True))
+
+
+def _drawn(diagnosis: Diagnosis) -> list[ParameterTrust]:
+    numbers = () if diagnosis.trust is None else diagnosis.trust.parameters
+    reported = [n for n in numbers if (not n.stable or n.of_effect) and len(n.groups.get(_shown(n), ())) > 1]
+    return reported[:_MOST_PANELS]
+
+
+def _shown(number: ParameterTrust) -> str:
+    """Return by which groups a number is drawn: those in which it differs, else by record."""
+    if number.pattern in (Pattern.AMPLITUDE, Pattern.CONSTANT):
+        return number.goes_with[0]
+    by_pattern = {Pattern.PORTION: PORTION, Pattern.WINDOW: WINDOW_LENGTH}
+    return by_pattern.get(number.pattern, RECORD if RECORD in number.groups else WINDOW_LENGTH)
+
+
+def _how(number: ParameterTrust) -> str:
+    if number.pattern is Pattern.UNKNOWN:
+        return "not compared"
+    if number.stable:
+        return "the same"
+    if number.pattern is Pattern.RECORD:
+        return "differs from record to record"
+    if number.pattern is Pattern.PORTION:
+        return f"{number.moves} along the records"
+    if number.pattern is Pattern.WINDOW:
+        return f"{number.moves} when windows get shorter"
+    if number.pattern is Pattern.TIME:
+        return f"{number.moves} from record to record"
+    return f"{number.moves} with {' and '.join(number.goes_with)}"
+
+
+def _row(number: ParameterTrust) -> dict[str, Any]:
+    p_value = f"{number.p_value:.2g}" if number.p_value > 1e-6 else "< 1e-6"
+    found = number.points_to
+    return {
+        "name": number.name,
+        "number": written(number.value, number.std),
+        "unit": number.unit,
+        "same": sentence_case(_how(number)),
+        "p_value": "" if number.pattern is Pattern.UNKNOWN else p_value,
+        "cause": "" if found is None else f"{sentence_case(found.cause)}. Next: {found.experiment}",
+    }

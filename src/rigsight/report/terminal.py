@@ -1,97 +1,94 @@
-"""The verdict in about ten lines for a terminal: plain ASCII of our own, color only as an extra."""
+"""Results on a terminal: a verdict in about ten lines, a discovery; plain ASCII of our own, color only as an extra."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from rich.console import Console, ConsoleOptions, RenderResult
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from rigsight.diagnose.result import Candidate, Diagnosis
+from rigsight.diagnose.result import Candidate, Diagnosis, Estimate
+from rigsight.discover import Discovery, JointForce
+from rigsight.discover.result import Term
+from rigsight.report import wording
 from rigsight.report.quantities import estimate_text, gap_percent
-from rigsight.report.trust import trust_line
-from rigsight.report.wording import (
-    TIMES,
-    advice_sentences,
-    ambiguity_sentence,
-    basis_sentence,
-    effects_label,
-    family_label,
-    fault_sentences,
-    forms_label,
-    given_text,
-    missing_force_sentence,
-    named_candidate,
-    percent,
-    remainder_sentence,
-    share_label,
-    stages_reported,
-    verdict_name,
-    verdict_sentence,
-    what_is_probable,
-)
+from rigsight.report.sections import trust_line
 
 _RANKED = 3
 _ADVICES = 1
 _FAULTS = 3
-"""Numbers of candidates, experiments and faults shown; the report holds all."""
+"""Numbers of candidates and rivals, experiments and faults shown; the report holds all."""
 _COLORS = {"effect": "bold green", "parameters": "bold green", "none": "bold green", "unknown": "bold yellow"}
+
+
+Writer = Callable[..., Text]
+"""Makes a line of words and, optionally, a style."""
 
 
 @dataclass(frozen=True)
 class Summary:
-    """A rich renderable that says the verdict, the gap, the ranking and the parameters of a diagnosis."""
+    """A rich renderable: lines, in characters that the terminal's encoding has, for the width of the terminal."""
 
-    diagnosis: Diagnosis
+    lines: Callable[[Writer, int], Iterator[RenderableType]]
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the lines, in characters that the terminal's encoding has."""
-
-        def text(words: str, style: str = "") -> Text:
-            return plain_text(words, options.encoding, style)
-
-        diagnosis = self.diagnosis
-        yield text(f"{verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
-        yield text(verdict_sentence(diagnosis))
-        for sentence in fault_sentences(diagnosis)[:_FAULTS]:
-            yield text(sentence, "bold yellow")
-        if remainder_sentence(diagnosis):
-            yield text(remainder_sentence(diagnosis))
-        if missing_force_sentence(diagnosis):
-            yield text(missing_force_sentence(diagnosis))
-        if trust_line(diagnosis):
-            yield text(trust_line(diagnosis))
-        if ambiguity_sentence(diagnosis):
-            yield text(ambiguity_sentence(diagnosis))
-        for sentence in advice_sentences(diagnosis)[:_ADVICES]:
-            yield text(sentence)
-        table = Table.grid(padding=(0, 2))
-        for subject, words in diagnosis_rows(diagnosis):
-            table.add_row(text(subject, "bold"), text(words))
-        yield Padding(table, (0, 0, 0, 2), expand=False)
-        yield text(basis_sentence(diagnosis), "dim")
+        """Yield the lines."""
+        return self.lines(
+            lambda words, style="": plain_text(words, options.encoding, style), options.max_width
+        )
 
 
 def plain_text(words: str, encoding: str, style: str = "") -> Text:
     """Return words as a terminal with this encoding can show them, each control character as a question mark."""
     # An escape sequence in somebody's title must not reach the terminal.
-    plain = "".join(c if c.isprintable() else "?" for c in words.replace(TIMES, "x"))
+    plain = "".join(c if c.isprintable() else "?" for c in words.replace(wording.TIMES, "x"))
     return Text(plain.encode(encoding, "replace").decode(encoding), style)
 
 
-def summary(diagnosis: Diagnosis) -> Summary:
-    """Return the diagnosis as a rich renderable of about ten lines.
+def pairs(rows: Iterable[tuple[str, str]], text: Writer) -> Padding:
+    """Return subjects and words as a table of two columns."""
+    table = Table.grid(padding=(0, 2))
+    for subject, words in rows:
+        table.add_row(text(subject, "bold"), text(words))
+    return Padding(table, (0, 0, 0, 2), expand=False)
 
-    Parameters
-    ----------
-    diagnosis
-        The result.
-    """
-    return Summary(diagnosis)
+
+def worth_knowing(notes: Sequence[str], text: Writer, n_more: int = 0, file: str = "") -> Iterator[Text]:
+    """Yield what must be known about a result, and how much more of it a file holds; nothing without a note."""
+    if notes:
+        yield text("Worth knowing", "bold yellow")
+    for note in notes:
+        yield text(f"- {note}")
+    if n_more > 0:
+        yield text(f"- and {n_more} more in {file}.", "dim")
+
+
+def summary(diagnosis: Diagnosis) -> Summary:
+    """Return the verdict, the gap, the ranking and the parameters of a diagnosis, in about ten lines."""
+
+    def lines(text: Writer, _: int) -> Iterator[RenderableType]:
+        yield text(f"{wording.verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
+        yield text(wording.verdict_sentence(diagnosis))
+        for sentence in wording.fault_sentences(diagnosis)[:_FAULTS]:
+            yield text(sentence, "bold yellow")
+        for sentence_of in (
+            wording.remainder_sentence,
+            wording.missing_force_sentence,
+            trust_line,
+            wording.ambiguity_sentence,
+        ):
+            if sentence := sentence_of(diagnosis):
+                yield text(sentence)
+        for sentence in wording.advice_sentences(diagnosis)[:_ADVICES]:
+            yield text(sentence)
+        yield pairs(diagnosis_rows(diagnosis), text)
+        yield text(wording.basis_sentence(diagnosis), "dim")
+
+    return Summary(lines)
 
 
 def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
@@ -99,38 +96,102 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     for output, gap in diagnosis.gap.items():
         yield (
             f"gap in {output}",
-            f"{stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
+            f"{wording.stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
         )
     for cause in diagnosis.families[:_RANKED]:
-        of_gap = f", {share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
-        yield family_label(cause), f"probability {percent(cause.probability)}{of_gap}: {forms_label(cause)}"
+        of_gap = f", {wording.share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
+        yield (
+            wording.family_label(cause),
+            f"probability {wording.percent(cause.probability)}{of_gap}: {wording.forms_label(cause)}",
+        )
     if diagnosis.candidates:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
         if not diagnosis.effects:
-            yield "probability", f"{percent(diagnosis.probability)} for {what_is_probable(diagnosis)}"
-    named = named_candidate(diagnosis)
+            yield (
+                "probability",
+                f"{wording.percent(diagnosis.probability)} for {wording.what_is_probable(diagnosis)}",
+            )
+    named = wording.named_candidate(diagnosis)
     if named is not None and named.parameters:
         own = diagnosis.model.get("effect_parameters", {}) if diagnosis.effects else named.parameters
-        for subject, is_told in (("parameters", True), ("of the rig", False)):
+        for subject, is_of_effect in (("parameters", True), ("of the rig", False)):
             numbers = [
                 f"{name} = {estimate_text(estimate)}{_given(diagnosis, name)}"
                 for name, estimate in named.parameters.items()
-                if (name in own) == is_told
+                if (name in own) == is_of_effect
             ]
             if numbers:
                 yield subject, "; ".join(numbers)
 
 
 def _given(diagnosis: Diagnosis, name: str) -> str:
-    given = given_text(diagnosis, name)
+    given = wording.given_text(diagnosis, name)
     return f" (given {given})" if given else ""
 
 
 def _candidate(candidate: Candidate) -> str:
-    left = (
+    error = (
         f"{candidate.error_over_noise:.3g} x floor"
         if math.isfinite(candidate.error_over_noise)
         else "not scored"
     )
     unfinished = "" if candidate.success else ", not converged"
-    return f"{effects_label(candidate.effects)} {percent(candidate.probability)} ({left}{unfinished})"
+    return f"{wording.effects_label(candidate.effects)} {wording.percent(candidate.probability)} ({error}{unfinished})"
+
+
+def discovery_summary(discovery: Discovery) -> Summary:
+    """Return the equations, their terms and numbers, the held-out error, and what must be known of a discovery."""
+
+    def lines(text: Writer, _: int) -> Iterator[RenderableType]:
+        yield text(f"Discovered: {discovery.title}", "bold green")
+        for equation in discovery.equations:
+            yield Padding(text(equation), (0, 0, 0, 2))
+        yield pairs(discovery_rows(discovery), text)
+        for name, alone in discovery.by_record:
+            yield text(f"{name} alone: {_alone(alone)}")
+        yield from worth_knowing(discovery.warnings, text)
+
+    return Summary(lines)
+
+
+def discovery_rows(found: Discovery) -> Iterator[tuple[str, str]]:
+    """Yield subject and words: the numbers, the terms, the held-out error, the rivals."""
+    for name, c in found.rig_parameters.items():
+        yield name, estimate_text(Estimate(c.value, c.std, c.unit))
+    for term in found.kept:
+        if term.name not in found.rig_parameters:
+            yield f"{term.name} at {term.where}" if term.where else term.name, _term(term)
+    for joint in found.joints:
+        yield f"missing at {joint.joint}", _joint(joint)
+    where = ", ".join(found.held_out)
+    yield (
+        "held-out error",
+        f"{gap_percent(found.held_out_nrmse)} on {where} (noise floor {gap_percent(found.noise_floor)})",
+    )
+    for rival in found.alternatives[:_RANKED]:
+        error = (
+            f"{rival.held_out:.3g} x floor, BIC {rival.bic:.1f}"
+            if math.isfinite(rival.held_out)
+            else "diverges"
+        )
+        yield "compared", f"{', '.join(rival.terms) or 'no further term'}: {error}"
+
+
+def _term(term: Term) -> str:
+    numbers = "; ".join(
+        f"{name} = {estimate_text(Estimate(c.value, c.std, c.unit))}" for name, c in term.coefficients.items()
+    )
+    return f"{numbers} (selected in {100 * term.inclusion:.0f} % of the draws)"
+
+
+def _joint(joint: JointForce) -> str:
+    law = " and ".join(term.text for term in joint.law.terms) or "not a function of the motion"
+    explained = f"explains {100 * joint.share:.4g} % of the sensor errors"
+    return f"{explained}, leaves {joint.error_over_noise:.3g} x floor: {law}"
+
+
+def _alone(found: Discovery | str) -> str:
+    if isinstance(found, str):
+        return found
+    terms = ", ".join(term.name for term in found.kept if term.name not in found.rig_parameters)
+    return f"{terms or 'no further term'}, held-out error {gap_percent(found.held_out_nrmse)}"

@@ -47,8 +47,8 @@ _STATED = {
 }
 
 _FORMS = 4
-_LAWS_NAMED = 3
 """Number of forms of a family that are shown."""
+_LAWS_NAMED = 3
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:
@@ -90,8 +90,8 @@ def verdict_name(diagnosis: Diagnosis) -> str:
 
 def _leaves_more(diagnosis: Diagnosis) -> bool:
     """Return whether the named cause leaves more than noise and disturbance."""
-    left = diagnosis.remainder
-    return diagnosis.adequate is False and (left is None or left.share > 0.0)
+    remainder = diagnosis.remainder
+    return diagnosis.adequate is False and (remainder is None or remainder.share > 0.0)
 
 
 def after_label(diagnosis: Diagnosis) -> str:
@@ -150,12 +150,12 @@ def times_floor(error_over_noise: float) -> str:
 
 
 def named_candidate(diagnosis: Diagnosis) -> Candidate | None:
-    """Return the candidate that the verdict names; without an effect the one that stands for the re-identified equations."""
+    """Return the candidate that the verdict names; without an effect that of the re-identified equations."""
     return next((c for c in diagnosis.candidates if c.effects == diagnosis.effects), None)
 
 
 def error_over_noise(diagnosis: Diagnosis, stage: str) -> float:
-    """Return the RMS left over all outputs in units of the noise floor."""
+    """Return the RMS of the residual over all outputs in units of the noise floor."""
     ratios = [
         getattr(gap, stage) / gap.noise_floor for gap in diagnosis.gap.values() if gap.noise_floor > 0.0
     ]
@@ -199,14 +199,13 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
     it = "them" if len(diagnosis.effects) > 1 else "it"
     refitted, after = error_over_noise(diagnosis, "reidentified"), error_over_noise(diagnosis, "after")
-    left = times_floor(after)
     # What wrong numbers cause is closed by refitting them, and is no share of the effect.
     of = " that refitting leaves" if is_given(diagnosis) else ""
     if _leaves_more(diagnosis):
         sure = "mainly caused, most likely," if diagnosis.ambiguous_with else "mainly caused"
     return (
         f"The gap is {sure} by {effects_label(diagnosis.effects)}{' ' if places else ''}{places}; "
-        f"adding {it} {_shrinks(refitted, after, of)}, down to {left}."
+        f"adding {it} {_shrinks(refitted, after, of)}, down to {times_floor(after)}."
     )
 
 
@@ -224,7 +223,7 @@ def _unknown_sentence(diagnosis: Diagnosis) -> str:
 
 
 def _shrinks(before: float, after: float, of: str = "") -> str:
-    """Return by how much the error above the noise floor shrinks between two stages, told in floors."""
+    """Return by how much the error above the noise floor shrinks between two stages, in noise floors."""
     if not before > 1.0:
         return "closes none of it, because there is hardly any gap"
     share = (before - after) / (before - 1.0)
@@ -234,12 +233,10 @@ def _shrinks(before: float, after: float, of: str = "") -> str:
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
     """Return the remaining error of a named or an unknown cause and its correlated signal; empty where there is none."""
-    left = diagnosis.remainder
-    return (
-        left.text
-        if left is not None and diagnosis.verdict in ("effect", "unknown") and left.goes_with
-        else ""
-    )
+    remainder = diagnosis.remainder
+    if remainder is None or not remainder.goes_with or diagnosis.verdict not in ("effect", "unknown"):
+        return ""
+    return remainder.text
 
 
 def given_text(diagnosis: Diagnosis, name: str) -> str:
@@ -248,7 +245,7 @@ def given_text(diagnosis: Diagnosis, name: str) -> str:
 
 
 def fault_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return what is wrong with the records or the campaign, with the mend; it counts before any verdict."""
+    """Return what is wrong with the records or the campaign, with the remedy; it counts before any verdict."""
     if diagnosis.data_quality is None:
         return []
     faults = [finding for finding in diagnosis.data_quality.findings if finding.serious]
@@ -286,7 +283,7 @@ def ambiguity_sentence(diagnosis: Diagnosis) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """Return a unit as it stands behind a number; an axis calls the unit of its input just that."""
+    """Return a unit as it follows a number; an axis calls the unit of its input just that."""
     return "" if unit in ("input", "1") else unit
 
 

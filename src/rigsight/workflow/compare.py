@@ -12,7 +12,7 @@ from joblib import Parallel, delayed
 
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_on_record
-from rigsight.compare.comparison_files import comparison_csv, comparison_json
+from rigsight.compare.comparison import comparison_csv, comparison_json
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option, readable
@@ -27,10 +27,9 @@ from rigsight.simulate.drift import can_drift
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.run.json_file import versions
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent
-from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 
 COMPARISON_FILE, TABLE_FILE, PAGE_FILE = "comparison.json", "comparison.csv", "comparison.html"
 COMPARING = "Comparing"

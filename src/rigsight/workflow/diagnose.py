@@ -1,11 +1,20 @@
-"""The work of `rigsight diagnose`: a campaign -> `diagnosis.json`, `model.json` and `report.html`."""
+"""The work of `rigsight diagnose`: a campaign -> `diagnosis.json`, `model.json` and `report.html`.
+
+Finished fits are kept in a journal on disk, beside the compiled kernels: an interrupted diagnosis is continued from there.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import shlex
-from collections.abc import Callable, Iterable, Sequence
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
 from threadpoolctl import threadpool_limits
 
@@ -14,18 +23,18 @@ from rigsight.diagnose import Diagnosis, diagnose, structures_to_fit
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.rigs import Rig
+from rigsight.simulate import cache_folder
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.effect_names import candidates_of
-from rigsight.workflow.run.fit_journal import FitJournal
-from rigsight.workflow.run.json_file import versions
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
-from rigsight.workflow.run.progress import Listener, Stage, Step, silent, tell
+from rigsight.workflow.run.progress import Listener, Stage, Step, report_notes, silent
 from rigsight.workflow.run.results import (
     DIAGNOSIS_FILE,
     REPORT_FILE,
     check_writable,
     json_text,
+    versions,
     write_together,
 )
 
@@ -73,7 +82,7 @@ def diagnose_campaign(
     keep: Callable[[Diagnosis], None] | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between the simulation that a campaign gives and its records."""
-    tell(campaign.notes, listener)
+    report_notes(campaign.notes, listener)
     candidates = candidates_of(campaign, effects)
     tried = structures_to_try(campaign.rig, candidates, campaign.modelled)
     prepare_kernels(structures_to_fit(campaign, tried), n_jobs, listener)
@@ -81,7 +90,7 @@ def diagnose_campaign(
     journal = (
         contextlib.nullcontext()
         if campaign.path is None
-        else FitJournal(campaign.path, lambda count: _tell_going_on(count, listener))
+        else FitJournal(campaign.path, lambda count: _report_continuation(count, listener))
     )
     # Candidates are fitted in parallel; multithreaded matrix products would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"), journal as memory:
@@ -99,7 +108,7 @@ def diagnose_campaign(
         return diagnosis
 
 
-def _tell_going_on(count: int, listener: Listener) -> None:
+def _report_continuation(count: int, listener: Listener) -> None:
     """Report that an interrupted diagnosis is continued; its results are the same and do not mention it."""
     stage = f"Continuing: {count} fit{'' if count == 1 else 's'} done before the interruption"
     listener(Step(stage, "", 0, count))
@@ -123,4 +132,80 @@ def result_files(
         REPORT_FILE: render_report(
             diagnosis, command=command, versions=versions(), seed=seed, own_effects=effects
         ),
+    }
+
+
+class FitJournal:
+    """The fits of one diagnosis, kept on disk until it is done.
+
+    Used as a context: the file is removed if the context ends without an error, otherwise it is kept.
+    """
+
+    def __init__(self, campaign: Path, going_on: Callable[[int], None] | None = None) -> None:
+        name = hashlib.sha256(
+            f"{version('rigsight')} {campaign.resolve()}".encode("utf-8", "surrogatepass")
+        ).hexdigest()[:24]
+        self._path = cache_folder() / "unfinished" / f"{name}.jsonl"
+        self._known: dict[str, Mapping[str, Any]] = {}
+        self._own: dict[str, Mapping[str, Any]] = {}
+        self._lock = threading.Lock()
+        self._going_on = going_on
+        self._again: set[str] = set()
+
+    @property
+    def recalled(self) -> int:
+        """Number of reused fits; one that is asked for twice counts once."""
+        return len(self._again)
+
+    def __enter__(self) -> Self:
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            lines = self._path.read_text(encoding="utf-8").splitlines() if self._path.exists() else []
+        except (OSError, UnicodeDecodeError):
+            lines = []
+        for line in lines:
+            try:
+                entry = json.loads(line)
+                self._known[entry["key"]] = _checked(entry)
+            except (ValueError, KeyError, TypeError, RecursionError):
+                continue
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            with contextlib.suppress(OSError):
+                self._path.unlink()
+
+    def recall(self, key: str) -> Mapping[str, Any] | None:
+        """Return the outcome stored under a key, also of a fit of this process; None if there is none."""
+        found = self._known.get(key)
+        if found is None:
+            found = self._own.get(key)
+        else:
+            with self._lock:
+                # Not earlier: a campaign that was changed since has the same path but none of these fits.
+                is_first = not self._again
+                self._again.add(key)
+            if is_first and self._going_on is not None:
+                self._going_on(len(self._known))
+        return found
+
+    def remember(self, key: str, outcome: Mapping[str, Any]) -> None:
+        """Append an outcome; if it cannot be written, the diagnosis continues without it."""
+        self._own[key] = outcome
+        line = json.dumps({"key": key, **outcome}) + "\n"
+        with self._lock, contextlib.suppress(OSError), self._path.open("a", encoding="utf-8") as file:
+            file.write(line)
+
+
+def _checked(entry: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return an entry whose parts have the types that a fit needs."""
+    return {
+        "theta": [float(value) for value in entry["theta"]],
+        "success": bool(entry["success"]),
+        "message": str(entry["message"]),
+        "evaluations": int(entry["evaluations"]),
+        "substeps": [int(value) for value in entry["substeps"]],
     }

@@ -24,7 +24,7 @@ from rigsight.rigs import RIGS, Rig, is_built_in_motion
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress import Listener, Stage, silent, tell
+from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, write_together
 
 DISCOVERY_FILE = "discovery.json"
@@ -78,7 +78,7 @@ def discover_campaign(
     """Discover the governing equations behind the records of a campaign that was read or made of records."""
     chosen = cast("Method", check_option("The method", method, METHODS))
     data = regression_data(campaign)
-    tell(campaign.notes, listener)
+    report_notes(campaign.notes, listener)
     stage = Stage(DISCOVERING, _STEPS, listener)
     # Supports are fitted in parallel; multithreaded matrix products would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"):

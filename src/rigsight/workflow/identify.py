@@ -43,10 +43,9 @@ from rigsight.workflow.identification.warnings import (
     out_of_band,
 )
 from rigsight.workflow.own.effect_names import effects_on
-from rigsight.workflow.run.json_file import versions
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
-from rigsight.workflow.run.progress import Listener, Stage, silent, tell
-from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
+from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 
 IDENTIFICATION_FILE = "identification.json"
 PAGE_FILE = "identification.html"
@@ -131,7 +130,7 @@ def identify_campaign(
             f"The method 'thesis' fits rigs whose input moves a mass, and that of {campaign.rig.name} prescribes the motion. Use "
             "--method local_rational."
         )
-    tell(campaign.notes, listener)
+    report_notes(campaign.notes, listener)
     structure = structure_with_memory(campaign, effects) if effects else None
     # The rig is identified without the effects that are calibrated, also where its simulation has one of them already.
     asked = {effect.name for effect in effects_on(campaign.rig, effects, "--effect")}

@@ -16,7 +16,7 @@ from rigsight.json_data import json_data
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.effect_names import candidates_of
-from rigsight.workflow.run.progress import Listener, Stage, silent, tell
+from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, write_together
 
 SCHEMA_VERSION = 1
@@ -74,7 +74,7 @@ def power_of(
     campaign: Campaign, effects: Sequence[Effect] = CATALOGUE, seed: int = 0, listener: Listener = silent
 ) -> Power:
     """Return the smallest size of each effect that a campaign would have named."""
-    tell(campaign.notes, listener)
+    report_notes(campaign.notes, listener)
     if not campaign.estimation:
         raise InputError('This needs at least one record with role = "estimation".')
     candidates = candidates_of(campaign, effects)

@@ -17,7 +17,8 @@ from rigsight.frequency.signal_pair import pair_unit
 from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_break_frequency, peak
 from rigsight.json_data import json_data
 from rigsight.parameters import Parameter
-from rigsight.plot.variation import Curve, picture_files, varied_responses
+from rigsight.plot import png_bytes, svg_text
+from rigsight.plot.frequency_responses import Curve, varied_responses
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, simulate
@@ -335,7 +336,7 @@ def _write(
             f"{name} with other {parameter.name}, sweep of {amplitude:g} {source.unit}",
         )
         pictures[parameter.name] = f"{stem}.svg"
-        contents |= {f"{stem}.{ending}": content for ending, content in picture_files(figure).items()}
+        contents |= {f"{stem}.svg": svg_text(figure, "vary"), f"{stem}.png": png_bytes(figure, dpi=150)}
     content: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "model": name,

@@ -12,7 +12,7 @@ import pytest
 
 CHILD = (
     "import os, time\n"
-    "from rigsight.cli.signals import ended_by_signals\n"
+    "from rigsight.cli.exit_codes import ended_by_signals\n"
     "from rigsight_bench.running.parent_watch import end_with_parent\n"
     "end_with_parent(os.getcwd())\n"
     "with ended_by_signals():\n"

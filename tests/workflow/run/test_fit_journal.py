@@ -10,8 +10,7 @@ import pytest
 from rigsight.diagnose import Diagnosis
 from rigsight.effects import effect_named
 from rigsight.errors import MachineError
-from rigsight.workflow.diagnose import run_diagnose
-from rigsight.workflow.run.fit_journal import FitJournal
+from rigsight.workflow.diagnose import FitJournal, run_diagnose
 from rigsight.workflow.run.progress import Step
 
 CANDIDATES = [effect_named(name) for name in ("cubic_stiffness", "coulomb_friction")]
@@ -33,7 +32,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.fixture
 def journals(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    monkeypatch.setattr("rigsight.workflow.run.fit_journal.cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr("rigsight.workflow.diagnose.cache_folder", lambda: tmp_path / "cache")
     return tmp_path / "cache/unfinished"
 
 
@@ -110,7 +109,7 @@ def test_a_cache_that_cannot_be_written_stops_nothing(
 ) -> None:
     in_the_way = tmp_path / "file"
     in_the_way.write_text("")
-    monkeypatch.setattr("rigsight.workflow.run.fit_journal.cache_folder", lambda: in_the_way)
+    monkeypatch.setattr("rigsight.workflow.diagnose.cache_folder", lambda: in_the_way)
     assert diagnosed(axis_campaign).verdict
 
 

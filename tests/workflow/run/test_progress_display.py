@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.workflow.run.progress import Step, tell
-from rigsight.workflow.run.progress_display import log_lines
+from rigsight.workflow.run.progress import Step, log_lines, report_notes
 
 
 def test_a_remark_is_no_work(capsys: pytest.CaptureFixture[str]) -> None:
-    tell(["The sample times differ."], log_lines(between=30.0, clock=lambda: 0.0))
+    report_notes(["The sample times differ."], log_lines(between=30.0, clock=lambda: 0.0))
     assert capsys.readouterr().err == "Note: The sample times differ.\n"
 
 

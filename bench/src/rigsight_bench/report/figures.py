@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigsight.plot.drawing import FLOOR, GIVEN, WITH_EFFECT, in_style, new_figure
-from rigsight.report.drawing.figures import PageFigure, page_figure
+from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.wording import percent
 from rigsight_bench.report.views import number
 

@@ -31,13 +31,12 @@ from rigsight.workflow.campaign.campaign_file import (
     FileTable,
     Number,
     RecordTable,
+    Where,
     checked_file,
     read_campaign_table,
 )
-from rigsight.workflow.campaign.listed_records import file_inside
-from rigsight.workflow.campaign.read_campaign import listed_rig
-from rigsight.workflow.campaign.where import Where
-from rigsight.workflow.run.json_file import json_object
+from rigsight.workflow.campaign.model_file import json_object
+from rigsight.workflow.campaign.read_campaign import file_inside, listed_rig
 from rigsight.workflow.run.results import json_text, write_together
 from rigsight_bench.running.files import (
     EXTERNAL,

@@ -24,7 +24,7 @@ from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.campaign_file import RecordTable
-from rigsight.workflow.campaign.listed_records import file_inside, read_listed_record
+from rigsight.workflow.campaign.read_campaign import file_inside, read_listed_record
 from rigsight.workflow.run.results import json_text, write_together
 from rigsight_bench.trials import Design, Trial
 

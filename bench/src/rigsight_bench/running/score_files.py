@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
-from rigsight.workflow.run.json_file import versions
-from rigsight.workflow.run.results import REPORT_FILE, check_writable, json_text, write_together
+from rigsight.workflow.run.results import REPORT_FILE, check_writable, json_text, versions, write_together
 from rigsight_bench.report.markdown import blind_markdown
 from rigsight_bench.report.page import render_blind
 from rigsight_bench.running.files import EXTERNAL, STORE_FILE, BenchFolder, read_json

@@ -1,7 +1,9 @@
-"""The allowed contents of a `campaign.toml`, and the messages for what is not allowed."""
+"""The allowed contents of a `campaign.toml`, where its keys are, and the messages for what is not allowed."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -10,8 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold, Kind, Role
 from rigsight.records.formats.ordinary_file import file_size
-from rigsight.rigs.reading.toml_places import toml_tables
-from rigsight.workflow.campaign.where import LISTS, Where
+from rigsight.rigs.reading.toml_places import Place, toml_tables, value_places
 
 MOST_RECORDS = 1000
 Offsets = Literal["shared", "per_record"]
@@ -25,6 +26,11 @@ LARGEST_FILE = 10_000_000
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Seconds = Annotated[float, Field(allow_inf_nan=False, gt=0.0)]
+
+LISTS = ("records", "withheld")
+"""Keys that hold lists of records."""
+
+Location = tuple[str | int, ...]
 
 
 class FileTable(BaseModel):
@@ -113,7 +119,7 @@ def locate(campaign: Path) -> Path:
 
 
 def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
-    """Return the checked contents of a campaign file, and where its keys stand."""
+    """Return the checked contents of a campaign file, and where its keys are."""
     try:
         if file_size(path, "the campaign.toml") > LARGEST_FILE:
             raise InputError(
@@ -149,37 +155,27 @@ def _messages(
     """Return one line per error; if one alternative fails in detail, the errors of the other alternatives are left out."""
     keys = [_without_union_members(problem["loc"], data) for problem in problems]
     reported = [
-        _tell(where, data, table, problem)
+        _message(where, data, table, problem)
         for problem, key in zip(problems, keys, strict=True)
         if not any(len(other) > len(key) and other[: len(key)] == key for other in keys)
     ]
     return list(dict.fromkeys(reported))
 
 
-def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
+def _message(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
     location = _without_union_members(problem["loc"], data)
     if not location:
         # Only a key with an unpaired surrogate has no location.
         return f"{where.name}: a key is not valid text: {shown(problem['input'])}. Use plain letters."
     key = where.at(*location)
-    kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
+    kind, got = problem["type"], problem["input"]
+    if kind == "missing":
+        return f"{key}: is missing.{_how_to_write(location)}"
     if kind == "extra_forbidden":
         allowed = _allowed_keys(location, table)
         return f"{key}: unknown key.{nearest(str(location[-1]), allowed)} Allowed here: {', '.join(allowed)}."
-    if kind == "missing":
-        return f"{key}: is missing.{_how_to_write(location)}"
-    if kind == "literal_error":
-        allowed = context["expected"].replace(" or ", ", ")
-        hint = (
-            nearest(got, [option.strip("' ") for option in allowed.split(",")])
-            if isinstance(got, str)
-            else ""
-        )
-        return f"{key}: is {shown(got)}.{hint} Allowed: {allowed}."
-    if kind == "finite_number":
-        return f"{key}: must be a finite number, got {shown(got)}."
-    if kind == "float_type":
-        return f"{key}: must be a number, got {shown(got)}. Write numbers without quotes and units."
+    if (message := value_message(problem)) is not None:
+        return f"{key}: {message}"
     if location == ("records",) and kind in ("too_short", "too_long"):
         count = len(got)
         return f"{key}: {count} given, 1 to {MOST_RECORDS} are allowed.{_how_to_write(location)}"
@@ -201,6 +197,20 @@ def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: d
     return (
         f"{key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {shown(got)}.{_how_to_write(location)}"
     )
+
+
+def value_message(problem: dict[str, Any]) -> str | None:
+    """Return what is wrong with a value that is none of several words, or no number; None for other errors."""
+    kind, got = problem["type"], problem["input"]
+    if kind == "literal_error":
+        allowed = str(problem["ctx"]["expected"]).replace(" or ", ", ")
+        words = [option.strip("' ") for option in allowed.split(",")]
+        return f"is {shown(got)}.{nearest(got, words) if isinstance(got, str) else ''} Allowed: {allowed}."
+    if kind == "finite_number":
+        return f"must be a finite number, got {shown(got)}."
+    if kind == "float_type":
+        return f"must be a number, got {shown(got)}. Write numbers without quotes and units."
+    return None
 
 
 def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]) -> tuple[str | int, ...]:
@@ -235,3 +245,47 @@ def _how_to_write(location: tuple[str | int, ...]) -> str:
         "records": ' Write [[records]] and file = "..." for every record.',
         "file": ' Write file = "name.csv".',
     }.get(str(location[-1]), "")
+
+
+@dataclass(frozen=True)
+class Where:
+    """The locations of keys."""
+
+    name: str  # the file, or the name of a campaign in memory
+    # The contents of the file, so that a record can be named by its file.
+    data: Mapping[str, Any] = field(default_factory=dict)
+    # Line and column of each value by its keys; empty if unknown.
+    places: Mapping[Location, Place] = field(default_factory=dict)
+
+    @classmethod
+    def of_toml(cls, name: str, text: str, data: Mapping[str, Any]) -> Where:
+        """Return the locations of the keys of a TOML file."""
+        return cls(name, data, value_places(text))
+
+    def at(self, *location: str | int) -> str:
+        """Return the beginning of a message: ``campaign.toml, line 7, column 5: rig.constants.v``."""
+        return f"{self.name}{self._place(location)}: {self.called(location)}"
+
+    def called(self, location: Location) -> str:
+        """Return a location as text: ``rig.constants.v``, ``record 2 (step.csv): role``."""
+        if len(location) < 2 or location[0] not in LISTS or not isinstance(location[1], int):
+            return ".".join(map(str, location))
+        listed = self.data.get(location[0])
+        table = (
+            listed[location[1]] if isinstance(listed, list | tuple) and len(listed) > location[1] else None
+        )
+        file = table.get("file") if isinstance(table, dict) else None
+        record = f"record {location[1] + 1}" + (f" ({file})" if isinstance(file, str) and file else "")
+        rest = ".".join(map(str, location[2:]))
+        return f"{record}: {rest}" if rest else record
+
+    def _place(self, location: Location) -> str:
+        """Return the line of a key; for a missing key, the line of its table."""
+        for length in range(len(location), 0, -1):
+            own = location[:length]
+            place = self.places.get(own) or next(
+                (inner for key, inner in self.places.items() if key[:length] == own), None
+            )
+            if place is not None:
+                return f", line {place[0]}, column {place[1]}"
+        return ""

@@ -9,7 +9,7 @@ from rigsight.errors import InputError, nearest
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
-from rigsight.workflow.campaign.where import Location, Where
+from rigsight.workflow.campaign.campaign_file import Location, Where
 
 
 def rig_named(where: Where, name: str, known: Mapping[str, Rig]) -> Rig:

@@ -1,7 +1,8 @@
-"""Read a `model.json`, with messages for errors in files written or edited by hand."""
+"""Read a `model.json` or another JSON file, with messages for errors in files written or edited by hand."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,17 +13,19 @@ from rigsight.discover.terms.monomials import known_terms
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold
+from rigsight.records.formats.ordinary_file import file_size
 from rigsight.rigs import Rig, declared_rig
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
+from rigsight.workflow.campaign.campaign_file import value_message
 from rigsight.workflow.own.effect_names import effect_on
 from rigsight.workflow.own.own_rigs import known_rigs
-from rigsight.workflow.run.json_file import json_object
 
 MODEL_FILE = "model.json"
 _MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
 
+_LARGEST_FILE = 10_000_000
 Number = Annotated[float, Field(allow_inf_nan=False)]
 _GROUPS = ("constants", "parameters", "effect_parameters")
 
@@ -116,12 +119,12 @@ def _checked_table(path: Path, data: dict[str, Any]) -> ModelTable:
     try:
         return ModelTable.model_validate(data)
     except ValidationError as error:
-        reported = [_tell(path, problem) for problem in map(dict, error.errors(include_url=False))]
+        reported = [_message(path, problem) for problem in map(dict, error.errors(include_url=False))]
         more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
         raise InputError("\n".join(reported[:5]) + more) from None
 
 
-def _tell(path: Path, problem: dict[str, Any]) -> str:
+def _message(path: Path, problem: dict[str, Any]) -> str:
     key = ".".join(map(str, problem["loc"]))
     start, kind, got = f"{path.name}: {key}: ", problem["type"], problem["input"]
     if kind == "extra_forbidden":
@@ -131,13 +134,8 @@ def _tell(path: Path, problem: dict[str, Any]) -> str:
         return f"{start}is missing."
     if key == "schema_version":
         return f"{start}is {shown(got)}, this version reads {SCHEMA_VERSION}. Use the version of rigsight that wrote the model."
-    if kind == "literal_error":
-        options = str(problem["ctx"]["expected"]).replace(" or ", ", ")
-        return f"{start}is {shown(got)}. Allowed: {options}."
-    if kind == "float_type":
-        return f"{start}must be a number, got {shown(got)}."
-    if kind == "finite_number":
-        return f"{start}must be a finite number, got {shown(got)}."
+    if (reason := value_message(problem)) is not None:
+        return f"{start}{reason}"
     message = str(problem["msg"])
     return f"{start}{message[0].lower()}{message[1:]}, got {shown(got)}."
 
@@ -228,3 +226,49 @@ def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
             raise InputError(
                 f"{path.name}: units.{name}: is '{unit}', but values must be in '{units[name]}'. Convert the value."
             )
+
+
+def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
+    """Return the object that a file holds."""
+    try:
+        if file_size(path) > _LARGEST_FILE:
+            raise InputError(f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB, so it is not a {what}.")
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path.name} is not UTF-8 text (byte {error.start}), so it is not a {what}."
+        ) from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    try:
+        data = json.loads(text, object_pairs_hook=_without_repeated_keys, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{path.name}, line {error.lineno}, column {error.colno}: is not valid JSON: {error.msg}. {remedy}"
+        ) from None
+    except RecursionError:
+        raise InputError(f"{path.name}: is nested too deeply for a {what}. {remedy}") from None
+    except (_MeaninglessError, ValueError) as error:
+        raise InputError(f"{path.name}: {error}") from None
+    if not isinstance(data, dict):
+        raise InputError(
+            f"{path.name}: must contain one object in braces, got a {type(data).__name__}. {remedy}"
+        )
+    return data
+
+
+class _MeaninglessError(Exception):
+    """JSON that Python accepts but that is meaningless here."""
+
+
+def _without_repeated_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in content:
+            raise _MeaninglessError(f"the key '{key}' occurs twice in one object; remove one.")
+        content[key] = value
+    return content
+
+
+def _refuse_constant(name: str) -> float:
+    raise _MeaninglessError(f"{name} is not a finite number; give finite numbers.")

@@ -1,15 +1,18 @@
-"""Checks of the records of a campaign before any fit: consistent units and sample times, and independent validation records."""
+"""Checks of the records of a campaign before any fit: units and sample times, and independent validation records."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.errors import InputError
 from rigsight.records import Record
-from rigsight.rigs import Rig
+from rigsight.records.channel_units import UnknownUnitError, conversion, has_si, is_a
+from rigsight.rigs import Rig, rotational
 
 _SEGMENTS = 8
 """Non-overlapping segments of a spectrum: enough for a median over frequencies."""
@@ -137,9 +140,9 @@ def _gain(record: Record, source: str, response: str) -> _Gain | None:
         return None
     length = max(record.n_samples // _SEGMENTS, min(record.n_samples, 64))
     f, driving = welch(record[source], 1.0 / record.dt, nperseg=length)
-    _, answer = welch(record[response], 1.0 / record.dt, nperseg=length)
-    driven = (driving > _DRIVEN * np.max(driving[1:], initial=0.0)) & (f > 0.0) & (answer > 0.0)
-    return (f[driven], np.sqrt(answer[driven] / driving[driven])) if driven.any() else None
+    _, responding = welch(record[response], 1.0 / record.dt, nperseg=length)
+    driven = (driving > _DRIVEN * np.max(driving[1:], initial=0.0)) & (f > 0.0) & (responding > 0.0)
+    return (f[driven], np.sqrt(responding[driven] / driving[driven])) if driven.any() else None
 
 
 def _ratio(one: _Gain, other: _Gain) -> float:
@@ -149,3 +152,58 @@ def _ratio(one: _Gain, other: _Gain) -> float:
     if not inside.any():
         return 1.0
     return float(np.median(gain[inside] / np.interp(f[inside], g, second)))
+
+
+def is_in_units_of(rig: Rig, record: Record) -> bool:
+    """Return True if all signals of a record have the units of a rig."""
+    return all(record.units.get(name) == unit for name, unit in rig.signal_units.items() if name in record)
+
+
+def rig_in_units_of(rig: Rig, records: Sequence[Record]) -> Rig:
+    """Return a built-in rig in the units that its records state; any other rig as it is."""
+    other = rotational(rig)
+    if other is None:
+        return rig
+    stated = [
+        (name, unit) for record in records for name, unit in record.units.items() if unit and name in record
+    ]
+    own, turned = rig.signal_units, other.signal_units
+    turns = any(
+        not is_a(unit, own[name]) and is_a(unit, turned[name])
+        for name, unit in stated
+        if name in own and own[name] != turned[name]
+    )
+    return other if turns else rig
+
+
+def in_units_of(rig: Rig, record: Record) -> Record:
+    """Return a record with its signals in the units of a rig, with a note for each that was converted.
+
+    A signal without a unit is taken to be in that of the rig.
+    """
+    units, signals, notes = dict(record.units), dict(record.signals), list(record.notes)
+    amplitude = record.amplitude
+    for signal in (*rig.inputs, *rig.outputs):
+        stated = record.units.get(signal.name, "")
+        if signal.name not in record or (stated and not has_si(signal.unit)):
+            continue
+        units[signal.name] = signal.unit
+        if not stated or stated == signal.unit or {stated, signal.unit} == {"", "1"}:
+            continue
+        try:
+            scale, offset = conversion(stated, signal.unit)
+        except UnknownUnitError as error:
+            raise InputError(
+                f"Record '{record.name}': the unit '{stated}' of {signal.name} {error}; {signal.name} is in {signal.unit}. Give "
+                f'the right unit, or units = {{"{signal.name}": "{signal.unit}"}} to take the values without conversion.'
+            ) from None
+        if (scale, offset) == (1.0, 0.0):
+            continue
+        signals[signal.name] = scale * record[signal.name] + offset
+        added = f"; {offset:.6g} {signal.unit} was added, as for an absolute temperature" if offset else ""
+        notes.append(
+            f"Record '{record.name}': {signal.name} was converted from {stated}, the unit of the record, to {signal.unit}{added}."
+        )
+        if amplitude is not None and [source.name for source in rig.inputs] == [signal.name]:
+            amplitude *= scale
+    return replace(record, units=units, signals=signals, notes=tuple(notes), amplitude=amplitude)

@@ -20,9 +20,9 @@ from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as
 from rigsight.records.periods import repeated_period
 from rigsight.records.read_record import TIME
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, guess_file, telling
+from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, distinguishing, guess_file
 
-# Share of samples that equal the one before: above it the input stands still but for a few jumps.
+# Share of samples that equal the one before: above it the input rests but for a few jumps.
 _STANDING = 0.9
 _MOST_JUMPS = 50
 # A sweep's frequency goes one way: from stretch to stretch, and by at least this ratio in all.
@@ -147,7 +147,7 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     """Return the lines of the columns table, and the number of blanks in them."""
     lines, blanks = [], 0
     needed = _needed(guess)
-    left = _left(guess, channels)
+    remaining = _remaining(guess, channels)
     for one in (guess.time, *guess.signals):
         if one.channel is not None and one.is_alone:
             (line,) = _column(one, guess.clocks)
@@ -159,7 +159,7 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
         elif one.candidates:
             lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {_listed(one.candidates)}")
             blanks += 1
-        elif one.signal in guess.rig.absent_inputs and not left:
+        elif one.signal in guess.rig.absent_inputs and not remaining:
             lines.append(f"# {one.signal} =    # {_unit_of(one)}not recorded: taken as 0 (no excitation)")
         elif one.signal in needed:
             free = (
@@ -167,11 +167,13 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
                 if one.signal in guess.rig.absent_inputs
                 else ""
             )
-            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{left or 'no channel remains'}{free}")
-            blanks += 1
-        elif one.signal in telling(guess.rig):
             lines.append(
-                f"# {one.signal} =    # {_unit_of(one)}{left or 'no channel remains'}; or not recorded here"
+                f"{one.signal} = {BLANK}  # {_unit_of(one)}{remaining or 'no channel remains'}{free}"
+            )
+            blanks += 1
+        elif one.signal in distinguishing(guess.rig):
+            lines.append(
+                f"# {one.signal} =    # {_unit_of(one)}{remaining or 'no channel remains'}; or not recorded here"
             )
     reference = guess.reference.channel
     if reference is not None and reference.name != guess.reference.signal:
@@ -191,7 +193,7 @@ def _needed(guess: FileGuess) -> set[str]:
     return needed
 
 
-def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
+def _remaining(guess: FileGuess, channels: Sequence[Channel]) -> str:
     """Return the channels that belong to no signal yet; empty if there are none."""
     known = (guess.time, guess.reference, *guess.signals)
     taken = {one.channel.name for one in known if one.channel is not None}

@@ -57,10 +57,10 @@ class FileGuess:
     @property
     def open_questions(self) -> int:
         """Number of characteristic signals of the rig without a channel."""
-        return sum(not guess.is_clear for guess in self.signals if guess.signal in telling(self.rig))
+        return sum(not guess.is_clear for guess in self.signals if guess.signal in distinguishing(self.rig))
 
 
-def telling(rig: Rig) -> tuple[str, ...]:
+def distinguishing(rig: Rig) -> tuple[str, ...]:
     """Return the signals that distinguish a rig from others: those of every record on a rig of one motion, else all."""
     outputs = rig.required_outputs or tuple(signal.name for signal in rig.outputs)
     return (*(signal.name for signal in rig.inputs), *outputs)
@@ -173,9 +173,9 @@ def _completed_by_unit(
     needed = (*(signal.name for signal in found.rig.inputs), *found.rig.required_outputs)
     lacking = [i for i, own in enumerate(guesses) if own.signal in needed and own.channel is None]
     taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]
-    left = [c for c in channels if c not in taken]
-    if len(lacking) == len(left) == 1 and guesses[lacking[0]].signal in found.rig.required_outputs:
-        own, alone = guesses[lacking[0]], left[0]
+    remaining = [c for c in channels if c not in taken]
+    if len(lacking) == len(remaining) == 1 and guesses[lacking[0]].signal in found.rig.required_outputs:
+        own, alone = guesses[lacking[0]], remaining[0]
         unit = _unit_of(alone)
         if not own.candidates and (unit is None or not has_si(own.si) or is_a(unit, own.si)):
             guesses[lacking[0]] = replace(_of_channel(own, alone), is_alone=True)

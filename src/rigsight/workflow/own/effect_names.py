@@ -58,7 +58,7 @@ def _check_place(rig: Rig, effect: Effect, place: str, where: str) -> None:
         )
 
 
-def candidates_of(campaign: Campaign, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+def candidates_of(campaign: Campaign, effects: Sequence[Effect]) -> list[Effect]:
     """Return the candidates at every place of a campaign's rig.
 
     An effect without a place is skipped if it does not apply; a place that was named must exist.

@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import platform
 import signal
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextvars import ContextVar
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,7 @@ ENDING_SIGNALS = tuple(
 """Ctrl-C, kill, and a closed terminal."""
 DIAGNOSIS_FILE, REPORT_FILE = "diagnosis.json", "report.html"
 """Results of a diagnosis; the bench reads one and links the other."""
+_VERSIONS_OF = ("rigsight", "numpy", "scipy")
 ELSEWHERE = "Name another place with --out."
 
 _noted: ContextVar[list[Path] | None] = ContextVar("folders with results", default=None)
@@ -49,6 +52,17 @@ def noting_folders() -> Iterator[Sequence[Path]]:
 def json_text(content: Mapping[str, Any]) -> str:
     """Return content as indented JSON in its own order, with a final line end."""
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of these packages, by name."""
+    found = {"python": platform.python_version()}
+    for package in _VERSIONS_OF:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
 
 
 def check_writable(folder: Path, *names: str) -> None:

@@ -1,1 +1,0 @@
-"""Pictures of a page: curves, loops, rigs, responses."""
