@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import Any
 
 from rigsight.export.equations import Exported
 from rigsight.simulate.input_hold import Hold
@@ -97,13 +96,6 @@ def header_lines(exported: Exported, source: str, *, with_parameters: bool = Tru
     if with_parameters:
         lines += ["", "Parameters:", *(f"  {line}" for line in parameter_lines(exported))]
     return lines
-
-
-def filled(template: str, fragments: dict[str, Any]) -> str:
-    """Return a template with its marks ``<<NAME>>`` replaced."""
-    for key, fragment in fragments.items():
-        template = template.replace(f"<<{key}>>", str(fragment))
-    return template
 
 
 def indented(lines: list[str], level: int = 1) -> str:

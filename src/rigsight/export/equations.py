@@ -58,6 +58,11 @@ class Rest:
     damping: str  # name of the damping parameter, raised to the critical value on the way to rest
     silenced: tuple[str, ...]  # names of the parameters of disturbances, zero on the way to rest
 
+    @property
+    def expressions(self) -> list[sp.Expr]:
+        """Rest position, inertia and stiffness."""
+        return [self.displacement, self.inertia, self.stiffness]
+
 
 @dataclass(frozen=True)
 class Exported:

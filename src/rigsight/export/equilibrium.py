@@ -29,6 +29,11 @@ class Balance:
     # known.
     remembers: bool
 
+    @property
+    def expressions(self) -> list[sp.Expr]:
+        """The residuals, then their derivatives row by row."""
+        return [*self.residuals, *(slope for row in self.slopes for slope in row)]
+
 
 def balance(structure: Structure) -> Balance | None:
     """Return what is zero at the equilibrium of a rig, as `rigsight.simulate.equilibrium` has it; None without a state."""

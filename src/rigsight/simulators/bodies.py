@@ -11,7 +11,6 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
-from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 from typing import Protocol
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.libraries import library_file
+from rigsight.libraries.templates import filled, template
 
 Floats = NDArray[np.float64]
 
@@ -98,18 +98,15 @@ class Bodies:
     @cached_property
     def c_text(self) -> str:
         """C functions ``simulated`` and ``simulated_slope``, which ask the program and remember its last answers."""
-        text = template("simulated.c.txt")
         fragments = {
-            "KEY": str(self.key),
-            "N": str(self.n),
-            "P": str(len(self.parameters)),
-            "GIVEN": str(self.n_given),
+            "KEY": self.key,
+            "N": self.n,
+            "P": len(self.parameters),
+            "GIVEN": self.n_given,
             "STEP": repr(STEP),
             "PROGRAM": self.program.c_text,
         }
-        for key, fragment in fragments.items():
-            text = text.replace(f"<<{key}>>", fragment)
-        return text
+        return filled(template("simulators", "simulated.c.txt"), fragments)
 
     @property
     def n_given(self) -> int:
@@ -194,11 +191,6 @@ EXPORT void answer(int is_force, long count, const double *a, double *value) {
 
 _known: dict[int, Bodies] = {}
 """Bodies by their key, of which numbers alone stand in equations."""
-
-
-def template(name: str) -> str:
-    """Return the text of one of the fixed parts of C."""
-    return files("rigsight.simulators").joinpath("templates", name).read_text("utf-8")
 
 
 def bodies_of(key: int) -> Bodies:

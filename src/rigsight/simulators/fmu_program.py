@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError, nearest
-from rigsight.simulators.bodies import Bodies, template
+from rigsight.libraries.templates import filled, template
+from rigsight.simulators.bodies import Bodies
 
 _FUNCTIONS = {
     "2": (
@@ -139,8 +140,8 @@ class FmuProgram:
     @property
     def c_text(self) -> str:
         """See `Program.c_text`."""
-        text = template("fmu.c.txt") + template("probed.c.txt")
-        return text.replace("<<VERSION>>", self._version).replace("<<STATES>>", str(self._n_states))
+        text = template("simulators", "fmu.c.txt") + template("simulators", "probed.c.txt")
+        return filled(text, {"VERSION": self._version, "STATES": self._n_states})
 
     @property
     def include_folders(self) -> tuple[str, ...]:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
-from rigsight.simulators.bodies import Bodies, template
+from rigsight.libraries.templates import filled, template
+from rigsight.simulators.bodies import Bodies
 
 if TYPE_CHECKING:
     import mujoco
@@ -130,11 +131,8 @@ class MujocoProgram:
         """See `Program.c_text`."""
         import mujoco
 
-        text = template("mujoco.c.txt")
-        text = text.replace("<<VERSION>>", mujoco.__version__)
-        for key, flag in {"<<CONSTRAINED>>": self.reads_forces, "<<PLAIN>>": self._is_plain}.items():
-            text = text.replace(key, str(int(flag)))
-        return text
+        flags = {"CONSTRAINED": int(self.reads_forces), "PLAIN": int(self._is_plain)}
+        return filled(template("simulators", "mujoco.c.txt"), {"VERSION": mujoco.__version__, **flags})
 
     @property
     def include_folders(self) -> tuple[str, ...]:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rigsight.errors import InputError
-from rigsight.simulators.bodies import Bodies, template
+from rigsight.libraries.templates import template
+from rigsight.simulators.bodies import Bodies
 from rigsight.simulators.leaf import forget
 
 Accelerations = Callable[..., Any]
@@ -91,7 +92,7 @@ class PythonProgram:
     @property
     def c_text(self) -> str:
         """See `Program.c_text`."""
-        return template("function.c.txt") + template("probed.c.txt")
+        return template("simulators", "function.c.txt") + template("simulators", "probed.c.txt")
 
     @property
     def include_folders(self) -> tuple[str, ...]:

@@ -1,9 +1,8 @@
-"""Expressions -> bodies of C functions, and the templates of a kernel into which they are inserted."""
+"""Expressions -> bodies of C functions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 
 import sympy as sp
 
@@ -21,18 +20,6 @@ FUNCTIONS = {
         "{ return value > limit ? limit : (value < -limit ? -limit : value); }"
     ),
 }
-
-
-def template(name: str) -> str:
-    """Return the text of one of the templates of a kernel."""
-    return files("rigsight.simulate").joinpath("templates", name).read_text("utf-8")
-
-
-def filled(text: str, fragments: Mapping[str, str]) -> str:
-    """Return a template with every ``<<KEY>>`` replaced."""
-    for key, fragment in fragments.items():
-        text = text.replace(f"<<{key}>>", fragment)
-    return text
 
 
 def real(name: str) -> sp.Symbol:

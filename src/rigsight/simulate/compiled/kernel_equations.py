@@ -8,7 +8,8 @@ from functools import cached_property
 import sympy as sp
 
 from rigsight.effects.symbols import derivative
-from rigsight.simulate.compiled.c_functions import FUNCTIONS, elements, filled, function_body, real, template
+from rigsight.libraries.templates import filled, template
+from rigsight.simulate.compiled.c_functions import FUNCTIONS, elements, function_body, real
 from rigsight.simulate.equations.expressions import gathered, hoist_constants
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
@@ -127,7 +128,7 @@ class KernelEquations:
         texts = {key: str(value) for key, value in fragments.items()}
         bodies = "\n".join(texts.values())
         called = [text for name, text in FUNCTIONS.items() if f"{name}(" in bodies]
-        return filled(template("equations.c.txt"), {"FUNCTIONS": "\n".join(called), **texts})
+        return filled(template("simulate", "equations.c.txt"), {"FUNCTIONS": "\n".join(called), **texts})
 
     def lane_fragments(self) -> dict[str, str]:
         """Return the equations for parameter sets side by side, by their key in the template."""

@@ -18,7 +18,7 @@ and constants are numbered.
 
 from __future__ import annotations
 
-from rigsight.simulate.compiled.c_functions import filled, template
+from rigsight.libraries.templates import filled, template
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.simulated_bodies import bodies_text, lane_bodies_text
 from rigsight.simulate.compiled.tangent_equations import carries_tangents, tangent_fragments
@@ -63,7 +63,9 @@ def accurate_integrator(equations: KernelEquations) -> str:
     left_out = [] if equations.structure.histories else ["history.c.txt"]
     left_out += [] if equations.frozen.frictions else ["friction.c.txt"]
     parts = [part for part in ACCURATE if part not in left_out]
-    return "\n".join(filled(template(part), {"READS_LATE": equations.reads_late}) for part in parts)
+    return "\n".join(
+        filled(template("simulate", part), {"READS_LATE": equations.reads_late}) for part in parts
+    )
 
 
 def kernel_source(structure: Structure) -> str:
@@ -77,7 +79,7 @@ def kernel_source(structure: Structure) -> str:
         accurate_integrator(equations),
     ]
     if structure.histories:
-        return "\n".join([*head, template("one_late.c.txt")])
+        return "\n".join([*head, template("simulate", "one_late.c.txt")])
     tangents = carries_tangents(equations)
     lanes = {
         "LANES": str(LANES),
@@ -89,8 +91,8 @@ def kernel_source(structure: Structure) -> str:
     return "\n".join(
         [
             *head,
-            template("one.c.txt"),
-            *(filled(template(part), lanes) for part in parts),
-            filled(template("tangents.c.txt"), tangent_fragments(equations)) if tangents else "",
+            template("simulate", "one.c.txt"),
+            *(filled(template("simulate", part), lanes) for part in parts),
+            filled(template("simulate", "tangents.c.txt"), tangent_fragments(equations)) if tangents else "",
         ]
     )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ctypes
 
+from rigsight.libraries.templates import template
 from rigsight.simulate.equations.structure import Structure
-from rigsight.simulators.bodies import template
 
 
 def bodies_text(structure: Structure) -> str:
@@ -18,7 +18,7 @@ def lane_bodies_text(structure: Structure) -> str:
     """Return the same for parameter sets side by side."""
     if structure.rig.mechanism.bodies is None:
         return ""
-    return template("lane_simulated.c.txt")
+    return template("simulators", "lane_simulated.c.txt")
 
 
 def include_folders(structure: Structure) -> tuple[str, ...]:
