@@ -13,10 +13,10 @@ from rigsight.effects.symbols import v, x
 from rigsight.export import TARGETS, export_model
 from rigsight.export.equations import exported
 from rigsight.export.targets import RESERVED
+from rigsight.libraries.templates import template
 from rigsight.parameters import Parameter
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
-from rigsight.libraries.templates import template
 from rigsight.simulate.compiled.kernel_source import ACCURATE
 from rigsight.simulate.model import Model
 

@@ -7,8 +7,8 @@ from importlib.metadata import version
 from rigsight.export.equations import Exported
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.printing.names import rate_symbol
+from rigsight.simulate.printing.notation import text, text_equation
 from rigsight.simulate.printing.shown import shown_equations
-from rigsight.simulate.printing.text import text, text_equation
 
 HOLDS: dict[Hold, str] = {
     "zoh": "constant from each sample to the next",

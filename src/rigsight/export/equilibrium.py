@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import sympy as sp
 
 from rigsight.effects.symbols import clamp
+from rigsight.simulate.equations.derivatives import slope
 from rigsight.simulate.equations.kinks import freeze, is_zero
-from rigsight.simulate.equations.linear_forms import slope
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 
 NO_START = "with friction or hysteresis the equilibrium is known only for zero inputs: begin with these, or give initial_state"

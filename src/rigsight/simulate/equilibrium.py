@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from rigsight.effects.symbols import v
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze, is_zero
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
-from rigsight.simulate.printing.c import limited
+from rigsight.simulate.printing.language import limited
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from scipy.fft import dct, idct, idst
 from scipy.interpolate import make_interp_spline, make_smoothing_spline
 from scipy.optimize import minimize_scalar
 
-from rigsight.simulate.linear_prediction import continued
+from rigsight.simulate.input_hold import continued
 
 _cache: OrderedDict[bytes, tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]] = (
     OrderedDict()

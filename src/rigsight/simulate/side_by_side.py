@@ -1,4 +1,4 @@
-"""Simulation of many parameter sets of a structure for a fit: side by side, or one with its derivatives."""
+"""Simulation of many parameter sets of a structure for a fit: side by side, or one with its derivatives, in fixed steps."""
 
 from __future__ import annotations
 
@@ -13,20 +13,24 @@ from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.sensor_delay import as_measured, read_ahead
+from rigsight.simulate.model import at_parameters
 from rigsight.simulate.simulation import (
     DEFAULT_ACCURACY,
     LOCAL_PER_GLOBAL,
+    as_measured,
+    read_ahead,
     simulate_outputs,
     state_vector,
 )
-from rigsight.simulate.substeps import Substeps, relative_needs
 
 _NUDGE = 1e-12
 """Perturbation of a state at rest: far below any accuracy, but unstable steps amplify it visibly."""
 _CAUTION = 0.6
 """Share of the predicted number of substeps below which numbers are not tried."""
 _SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
+
+_NEEDED_BY = 0.99
+"""Share of the pieces that need at most the full number of steps; the others need more only because events divide them."""
 
 
 def simulate_sets(
@@ -264,3 +268,69 @@ def choose_substeps(
         f"{most} substeps per sample do not reach a relative accuracy of {accuracy:g}; "
         f"the model is too stiff for its sample time."
     )
+
+
+class Substeps(int):
+    """Largest number of Runge-Kutta steps in a piece of an input, and the number in each piece.
+
+    Attributes
+    ----------
+    needs
+        Steps that each piece needs as a share of the largest number, see `relative_needs`; None if all pieces take that number.
+    """
+
+    needs: NDArray[np.float64] | None
+    _schedule: NDArray[np.intc] | None
+
+    def __new__(cls, most: int, needs: NDArray[np.float64] | None = None) -> Substeps:
+        """Create the schedule from the largest number of steps and the `needs` of the pieces."""
+        made = super().__new__(cls, most)
+        made.needs = needs
+        made._schedule = None
+        return made
+
+    @property
+    def mean(self) -> float:
+        """Mean number of steps per piece, which determines the cost of a simulation."""
+        return float(self) if self.needs is None else float(np.mean(self.per_piece(self.needs.size)))
+
+    def with_most(self, most: int) -> Substeps:
+        """Return the same needs with another largest number of steps."""
+        return Substeps(most, self.needs)
+
+    def per_piece(self, n_pieces: int) -> NDArray[np.intc]:
+        """Return the steps of each piece, shape (n_pieces,); the largest number for all if the needs are of another input."""
+        if self.needs is None or self.needs.size != n_pieces:
+            return np.full(n_pieces, int(self), dtype=np.intc)
+        if self._schedule is None:
+            # A product such as 3 * (1 / 3) may be slightly above its exact integer value.
+            steps = np.ceil(self.needs * int(self) - 1e-9)
+            self._schedule = np.asarray(np.clip(steps, 1, int(self)), dtype=np.intc)
+        return self._schedule
+
+
+def relative_needs(taken: NDArray[np.intc]) -> NDArray[np.float64]:
+    """Return the steps that pieces need, relative to a number that is sufficient for all but a few of them."""
+    place = int(_NEEDED_BY * (taken.size - 1))
+    return np.asarray(taken / max(float(np.partition(taken, place)[place]), 1.0))
+
+
+def state_limits(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the half-width of the range that each state cannot leave, infinite for a free state.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    p
+        Parameter values in the order of the structure, shape (n_parameters, n_sets).
+
+    Returns
+    -------
+    Shape (n_states, n_sets).
+    """
+    limits = np.full((len(structure.equations), p.shape[1]), np.inf)
+    for i, equation in enumerate(structure.equations):
+        if equation.limit is not None:
+            limits[i] = at_parameters(structure, equation.limit, p)
+    return limits

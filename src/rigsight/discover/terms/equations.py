@@ -9,9 +9,8 @@ import sympy as sp
 
 from rigsight.identify import FitResult
 from rigsight.simulate import Structure
-from rigsight.simulate.printing.latex import latex_equation
+from rigsight.simulate.printing.notation import latex_equation, text_equation
 from rigsight.simulate.printing.shown import ShownEquation, flat_equations
-from rigsight.simulate.printing.text import text_equation
 
 _DIGITS = 4
 """Significant digits of numbers in an effect's equation; parameters are written as symbols."""

@@ -24,7 +24,7 @@ from rigsight.discover.weak_form import Rows
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
-from rigsight.simulate.printing.text import TermPrinter
+from rigsight.simulate.printing.notation import TermPrinter
 
 _FORCE = sp.Symbol("F", real=True)
 _RATE = sp.Symbol("x'", real=True)

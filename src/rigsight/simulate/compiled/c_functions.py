@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from rigsight.simulate.equations.straight_line import StraightLine, needed_steps
-from rigsight.simulate.printing.c import C_LANES, C
+from rigsight.simulate.printing.language import C_LANES, C
 
 _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import MachineError
-from rigsight.simulate.compiled.simulated_bodies import connect
+from rigsight.simulate.compiled.kernel_source import connect
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
 

@@ -7,8 +7,7 @@ import threading
 
 from rigsight.libraries import is_kept, library_file
 from rigsight.simulate.compiled.kernel import Kernel
-from rigsight.simulate.compiled.kernel_source import kernel_source
-from rigsight.simulate.compiled.simulated_bodies import include_folders
+from rigsight.simulate.compiled.kernel_source import include_folders, kernel_source
 from rigsight.simulate.equations.structure import Structure
 
 _kernels: dict[str, Kernel] = {}
@@ -59,3 +58,8 @@ def _text(structure: Structure) -> str:
     if text is None:
         text = _texts[structure] = kernel_source(structure)
     return text
+
+
+def compile_kernels(structure: Structure) -> None:
+    """Compile the kernels of a structure and keep them on disk."""
+    kernel_of(structure)

@@ -14,10 +14,8 @@ from rigsight.effects import Effect, Energy, Place
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
-from rigsight.simulate.equations.binder import Binder
-from rigsight.simulate.equations.defined_signals import DefinedSignals
-from rigsight.simulate.equations.lagrange import equations_of_motion
-from rigsight.simulate.equations.observer_acceleration import measured_before, observer_acceleration
+from rigsight.simulate.equations.binder import Binder, DefinedSignals
+from rigsight.simulate.equations.lagrange import equations_of_motion, measured_before, observer_acceleration
 from rigsight.simulate.equations.structure import ahead_name, bandwidth_name, input_symbols
 from rigsight.simulate.equations.tree import (
     EquationsOfMotion,
