@@ -23,7 +23,7 @@ from rigsight.identify.fit import fit_problem
 from rigsight.identify.fit.coordinates import FINE_STEP, STEP, Coordinates
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.libraries import library_cache
-from rigsight.libraries.compiler import c_compilers, library
+from rigsight.libraries.library_cache import c_compilers, library
 from rigsight.records import Record
 from rigsight.records.record import Hold
 from rigsight.rigs import RUNNING_GEAR

@@ -11,8 +11,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.export import export_model
-from rigsight.libraries.compiler import c_compilers
-from rigsight.libraries.library_cache import kernel_options
+from rigsight.libraries.library_cache import c_compilers, kernel_options
 
 from ..tiers import slow_but
 

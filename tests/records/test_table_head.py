@@ -9,8 +9,8 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping
+from rigsight.records.channel_summary import open_measurement
 from rigsight.records.column_mapping import Columns
-from rigsight.records.formats.csv_channels import open_measurement
 from rigsight.records.formats.read_csv import read_csv
 
 T = 0.01 * np.arange(80)

@@ -19,7 +19,7 @@ import rigsight
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.libraries import library_cache
-from rigsight.libraries.compiler import c_compilers, library
+from rigsight.libraries.library_cache import c_compilers, library
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.compiled import kernel_cache

@@ -13,8 +13,8 @@ from rigsight.discover.result import Coefficient, Term
 from rigsight.discover.selection import Selection, criterion
 from rigsight.discover.terms.force_law import ForceEquation
 from rigsight.effects import Effect
-from rigsight.records.periods import same_signal
 from rigsight.records.record import Record
+from rigsight.records.signals import same_signal
 
 _SURE = 0.9
 _ZERO = 3.0

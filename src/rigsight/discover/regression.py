@@ -23,8 +23,8 @@ from rigsight.campaign import Campaign
 from rigsight.discover.motion import Motion
 from rigsight.discover.weak_form import Rows
 from rigsight.errors import InputError
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 
 _WINDOW = 0.75

@@ -7,17 +7,13 @@ from collections.abc import Mapping
 import sympy as sp
 
 from rigsight.export.description import header_lines, hold_text, indented
-from rigsight.export.equations import Exported
-from rigsight.export.equilibrium import Balance
-from rigsight.export.reserved_words import words
+from rigsight.export.equations import Balance, Exported, words
 from rigsight.libraries.templates import filled, template, template_parts
-from rigsight.simulate.compiled.c_functions import FUNCTIONS
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.kernel_source import accurate_integrator
 from rigsight.simulate.equations.structure import input_symbols
-from rigsight.simulate.equilibrium import BALANCED
-from rigsight.simulate.printing.language import C
-from rigsight.simulate.rest import INTERVALS, RAMP_PERIODS, SETTLED, TOLERANCE, WAITS
+from rigsight.simulate.equilibrium import BALANCED, INTERVALS, RAMP_PERIODS, SETTLED, TOLERANCE, WAITS
+from rigsight.simulate.printing.language import FUNCTIONS, C
 from rigsight.simulate.simulation import DEFAULT_ACCURACY, LOCAL_PER_GLOBAL
 
 _MACROS_OF_HEADERS = words(

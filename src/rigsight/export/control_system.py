@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sympy as sp
 
-from rigsight.export.at_rest import state_at_rest
 from rigsight.export.description import header_lines, indented
 from rigsight.export.equations import Exported
+from rigsight.export.fixed_step import state_at_rest
 from rigsight.export.python_function import (
     code_names,
     parameter_entries,

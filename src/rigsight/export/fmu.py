@@ -15,8 +15,7 @@ from rigsight.errors import InputError
 from rigsight.export.c_source import c_source
 from rigsight.export.description import equation_lines, hold_text, made_by
 from rigsight.export.equations import Exported
-from rigsight.libraries.compiler import first_library, library_suffix
-from rigsight.libraries.library_cache import OPTIONS
+from rigsight.libraries.library_cache import OPTIONS, first_library, library_suffix
 from rigsight.libraries.templates import filled, template
 
 _NO_UNIT = "1"

@@ -7,12 +7,17 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from rigsight.export.description import header_lines, hold_text
-from rigsight.export.equations import Exported
-from rigsight.export.equilibrium import NO_START, Balance
-from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
-from rigsight.export.precomputed import constant_names, equations_of
+from rigsight.export.equations import NO_START, Balance, Exported, words
+from rigsight.export.fixed_step import (
+    constant_names,
+    equations_of,
+    friction_mode,
+    friction_sign,
+    held_velocity,
+    slip_rate,
+    slope_symbol,
+)
 from rigsight.export.python_function import min_steps
-from rigsight.export.reserved_words import words
 from rigsight.libraries.templates import filled, template, template_parts
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.equilibrium import BALANCED

@@ -8,12 +8,17 @@ from collections.abc import Mapping, Set
 import sympy as sp
 
 from rigsight.export.description import header_lines, hold_text, indented
-from rigsight.export.equations import Exported
-from rigsight.export.equilibrium import NO_START, Balance
-from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
-from rigsight.export.internal_step import is_linear
-from rigsight.export.precomputed import constant_names, equations_of
-from rigsight.export.reserved_words import words
+from rigsight.export.equations import NO_START, Balance, Exported, words
+from rigsight.export.fixed_step import (
+    constant_names,
+    equations_of,
+    friction_mode,
+    friction_sign,
+    held_velocity,
+    is_linear,
+    slip_rate,
+    slope_symbol,
+)
 from rigsight.libraries.templates import filled, template, template_parts
 from rigsight.simulate.equations.structure import input_symbols
 from rigsight.simulate.equilibrium import BALANCED

@@ -14,8 +14,8 @@ import numpy as np
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.undetermined import listed
 from rigsight.parameters import Parameter
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 from rigsight.rigs.reading.dimensions import UnitError, dimension
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.records.channel_names import NAMES_OF, closeness, plain_words
 from rigsight.records.column_mapping import Columns
-from rigsight.records.formats.time_stamps import seconds_since
+from rigsight.records.stamps import seconds_since
 
 TIME = "t"
 _NAMED = 2.0

@@ -18,9 +18,9 @@ from rigsight.records.column_mapping import ColumnMapping, Columns, checked_colu
 from rigsight.records.conditioning import check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
 from rigsight.records.formats.read_csv import read_csv
-from rigsight.records.readings import between_readings, refuse_codes, unwrapped
 from rigsight.records.record import Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, joined
+from rigsight.records.sensor_signs import between_readings, refuse_codes, unwrapped
 from rigsight.records.sound_signals import (
     NamedSignal,
     alike_notes,

@@ -13,7 +13,7 @@ from rigsight.errors import InputError, nearest
 from rigsight.records.channel_names import closeness
 from rigsight.records.column_mapping import Columns
 from rigsight.records.conditioning import LARGEST_NUMBER
-from rigsight.records.plausibility import clipping, is_constant
+from rigsight.records.signals import clipping, is_constant
 
 _LISTED = 30
 """Columns that a message lists."""

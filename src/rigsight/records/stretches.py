@@ -23,7 +23,7 @@ from rigsight.records.conditioning import (
     resolution,
     stamp_text,
 )
-from rigsight.records.plausibility import is_constant
+from rigsight.records.signals import is_constant
 from rigsight.records.stamps import written_span
 
 

@@ -9,7 +9,7 @@ from rigsight.simulate.equations.structure import Structure as Structure
 from rigsight.simulate.equations.structure import carried_over as carried_over
 from rigsight.simulate.equations.structure import special_values as special_values
 from rigsight.simulate.equations.structure import unique_names as unique_names
-from rigsight.simulate.rest import rest_state as rest_state
+from rigsight.simulate.equilibrium import rest_state as rest_state
 from rigsight.simulate.side_by_side import Substeps as Substeps
 from rigsight.simulate.side_by_side import carries_tangents as carries_tangents
 from rigsight.simulate.side_by_side import choose_substeps as choose_substeps

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
-from rigsight.simulate.compiled.kernel import FittedRecord
-from rigsight.simulate.compiled.kernel_cache import kernel_of
+from rigsight.simulate.compiled.kernel import FittedRecord, kernel_of
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.records.record import Record
-from rigsight.simulate.compiled.kernel_cache import kernel_of
+from rigsight.simulate.compiled.kernel import kernel_of
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.structure import Structure, ahead_name, bandwidth_name
+from rigsight.simulate.equilibrium import rest_state
 from rigsight.simulate.input_hold import (
     HeldInput,
     hold_accelerated_motion,
@@ -22,7 +23,6 @@ from rigsight.simulate.input_hold import (
 )
 from rigsight.simulate.model import at_parameters
 from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
-from rigsight.simulate.rest import rest_state
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""

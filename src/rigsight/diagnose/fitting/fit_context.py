@@ -15,8 +15,8 @@ from rigsight.diagnose.policy import HORIZON
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, joint_of
 from rigsight.simulate import Structure, compose, special_values
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from rigsight.identify.start.place_scales import scales_at_places
 from rigsight.identify.typical_size import typical_size
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 

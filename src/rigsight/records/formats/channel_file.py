@@ -15,19 +15,19 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.records.formats.channel import (
+    AS_STORED,
     Channel,
     ChannelFile,
     Load,
     ReadingError,
+    Stored,
     check_count,
     check_size,
     check_total,
     with_distinct_names,
 )
 from rigsight.records.formats.isolated_reader import open_isolated
-from rigsight.records.formats.known import BY_SUFFIX, HEAD, PACKAGES, Format, reader_of, recognized
-from rigsight.records.formats.ordinary_file import file_size
-from rigsight.records.formats.stored_numbers import AS_STORED, Stored
+from rigsight.records.formats.known import BY_SUFFIX, HEAD, PACKAGES, Format, file_size, reader_of, recognized
 
 LARGEST_FILE = 2_000_000_000
 MEND = "Export it again, or as CSV."

@@ -1,20 +1,24 @@
 """Which formats of measurement files are known beside delimited text, and how is each recognized?
 
-This is the only list of them. The format ``key`` is read by the function ``open_<key>`` of the module ``read_<key>``, which is
-imported when a file of that format is opened.
+This is the only list of them. The format ``key`` is read by the function ``open_<key>`` of the module ``read_<key>``, without a
+``_hdf5`` at its end, which is imported when a file of that format is opened.
 """
 
 from __future__ import annotations
 
 import re
+import stat
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rigsight.errors import InputError
+
 if TYPE_CHECKING:
     from rigsight.records.formats.channel import ChannelFile
+
 
 HEAD = 4096
 """Bytes at the beginning of a file that decide its format."""
@@ -96,7 +100,9 @@ FORMATS = (
     Format("uff", "UFF", (".uff", ".unv"), _is_uff, "pyuff"),
     Format("json", "JSON", (".json", ".jsonl", ".ndjson"), _is_json),
 )
+
 BY_SUFFIX = {suffix: known for known in FORMATS for suffix in known.suffixes}
+
 PACKAGES = {known.key: known.package for known in FORMATS if known.isolated and known.package}
 """Format -> package that is called in a process of its own."""
 
@@ -109,6 +115,24 @@ def recognized(head: bytes) -> Format | None:
 def reader_of(key: str) -> Callable[[Path], Iterator[ChannelFile]]:
     """Return the function that reads a format; it and its library are imported no earlier than that."""
     reader: Callable[[Path], Iterator[ChannelFile]] = getattr(
-        import_module(f"rigsight.records.formats.read_{key}"), f"open_{key}"
+        import_module(f"rigsight.records.formats.read_{key.removesuffix('_hdf5')}"), f"open_{key}"
     )
     return reader
+
+
+def file_size(path: Path, what: str = "the file") -> int:
+    """Return the size of a file in bytes."""
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; check the path.") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "this is not a file name"
+        raise InputError(f"{path} cannot be read: {reason}.") from None
+    if stat.S_ISDIR(found.st_mode):
+        raise InputError(f"{path} is a folder; name {what} in it.")
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(
+            f"{path} is a device or a pipe, not a regular file; save its contents as a file first."
+        )
+    return found.st_size

@@ -12,9 +12,8 @@ from rigsight.errors import InputError, nearest
 from rigsight.records.clocks import TIME, increases, possible_clocks
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.formats.channel import distinct_names
-from rigsight.records.formats.dialect import Dialect
-from rigsight.records.formats.layout import Layout, find_layout, kept_lines
-from rigsight.records.formats.text_file import read_text
+from rigsight.records.formats.layout import Layout, find_layout, kept_lines, read_text
+from rigsight.records.formats.table_head import Dialect
 
 
 def read_csv(

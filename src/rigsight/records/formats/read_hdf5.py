@@ -17,8 +17,8 @@ from rigsight.records.formats.channel import (
     columns_of,
     kept_last,
     stated_unit,
+    stored_by,
 )
-from rigsight.records.formats.stored_numbers import stored_by
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 

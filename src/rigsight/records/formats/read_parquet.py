@@ -16,9 +16,9 @@ from rigsight.records.formats.channel import (
     Refused,
     check_count,
     stated_unit,
+    stored_by,
 )
-from rigsight.records.formats.stored_numbers import stored_by
-from rigsight.records.formats.time_stamps import earliest, seconds_since
+from rigsight.records.stamps import earliest, seconds_since
 
 UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
 

@@ -17,9 +17,9 @@ from rigsight.records.formats.channel import (
     Refused,
     TimeAxis,
     stated_unit,
+    stored_by,
 )
-from rigsight.records.formats.stored_numbers import stored_by
-from rigsight.records.formats.time_stamps import earliest, seconds_since
+from rigsight.records.stamps import earliest, seconds_since
 
 SCALES = (
     "Polynomial",

@@ -1,8 +1,10 @@
-"""Compiled kernels as functions of arrays. While one runs, other Python threads can run."""
+"""Compiled kernels as functions of arrays, kept by structure. While one runs, other Python threads can run."""
 
 from __future__ import annotations
 
 import ctypes
+import hashlib
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import MachineError
-from rigsight.simulate.compiled.kernel_source import connect
+from rigsight.libraries import is_kept, library_file
+from rigsight.simulate.compiled.kernel_source import connect, include_folders, kernel_source
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
 
@@ -19,6 +22,14 @@ Floats = NDArray[np.float64]
 
 _DOUBLES, _INTS = ctypes.c_void_p, ctypes.c_void_p
 _LONG, _DOUBLE, _INT = ctypes.c_long, ctypes.c_double, ctypes.c_int
+
+_kernels: dict[str, Kernel] = {}
+_keys: dict[Structure, str] = {}
+_texts: dict[Structure, str] = {}
+"""C texts of structures whose kernel is not loaded yet; printing a text takes some 20 ms."""
+_lock = threading.Lock()
+_made: dict[str, threading.Lock] = {}
+"""A lock for each kernel, so that it is compiled only once while others may be compiled at the same time."""
 
 
 class _FittedRecord(ctypes.Structure):
@@ -212,3 +223,49 @@ class Kernel:
 
 def _doubles(values: Any) -> Floats:
     return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def kernel_of(structure: Structure) -> Kernel:
+    """Return the compiled kernels of a structure, compiling them if this machine has not yet done so."""
+    known = _loaded(structure)
+    if known is not None:
+        return known
+    with _lock:
+        known = _loaded(structure)
+        if known is not None:
+            return known
+        # Threads write texts one after the other, which is no slower in pure Python. The compilers run in parallel.
+        text = _text(structure)
+        key = hashlib.sha256(text.encode()).hexdigest()
+        own = _made.setdefault(key, threading.Lock())
+    with own:
+        if key not in _kernels:
+            _kernels[key] = Kernel(library_file(text, include_folders(structure)), structure)
+        _keys[structure] = key
+        _texts.pop(structure, None)
+        return _kernels[key]
+
+
+def _loaded(structure: Structure) -> Kernel | None:
+    key = _keys.get(structure)
+    return None if key is None else _kernels.get(key)
+
+
+def compiled(structure: Structure) -> bool:
+    """Return True if the machine code of a structure's kernels is loaded or in the cache."""
+    if _loaded(structure) is not None:
+        return True
+    text = _text(structure)
+    return is_kept(text)
+
+
+def _text(structure: Structure) -> str:
+    text = _texts.get(structure)
+    if text is None:
+        text = _texts[structure] = kernel_source(structure)
+    return text
+
+
+def compile_kernels(structure: Structure) -> None:
+    """Compile the kernels of a structure and keep them on disk."""
+    kernel_of(structure)

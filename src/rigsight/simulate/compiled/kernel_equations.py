@@ -9,11 +9,10 @@ import sympy as sp
 
 from rigsight.effects.symbols import derivative
 from rigsight.libraries.templates import filled, template
-from rigsight.simulate.compiled.c_functions import FUNCTIONS, elements, function_body, real
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.straight_line import gathered, hoist_constants
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
-from rigsight.simulate.printing.language import limited
+from rigsight.simulate.printing.language import FUNCTIONS, elements, function_body, limited, real
 
 
 class KernelEquations:

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
-from rigsight.simulate.compiled.c_functions import elements, function_body, lane_body, real, symbols
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.equations.derivatives import LinearForms, linear_forms, slope, slopes_of
 from rigsight.simulate.equations.elimination import Elimination
 from rigsight.simulate.equations.kinks import absolute
 from rigsight.simulate.equations.straight_line import needed_steps, of_parts, straight_line
 from rigsight.simulate.equations.structure import INPUT, INPUT_RATE
-from rigsight.simulate.printing.language import C, limited
+from rigsight.simulate.printing.language import C, elements, function_body, lane_body, limited, real, symbols
 
 _EARLIER = sp.Symbol("earlier input", real=True)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rigsight.errors import InputError, readable
 from rigsight.records import Role
-from rigsight.records.formats.csv_channels import open_measurement
+from rigsight.records.channel_summary import open_measurement
 from rigsight.records.formats.known import BY_SUFFIX
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.record_proposal import (

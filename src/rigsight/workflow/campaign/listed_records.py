@@ -9,7 +9,7 @@ from pathlib import Path
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import ColumnMapping, ReadingOptions, Record
 from rigsight.records.read_record import TIME, read_stretches
-from rigsight.records.reference import signals_beside
+from rigsight.records.signals import signals_beside
 from rigsight.rigs import Rig
 from rigsight.units import INPUT_UNIT
 from rigsight.workflow.campaign.campaign_file import RecordTable

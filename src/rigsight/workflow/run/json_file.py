@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
-from rigsight.records.formats.ordinary_file import file_size
+from rigsight.records.formats.known import file_size
 
 _VERSIONS_OF = ("rigsight", "numpy", "scipy")
 

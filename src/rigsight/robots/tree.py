@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 import os
 from pathlib import Path
 
-from rigsight.records.formats.ordinary_file import file_size
+from rigsight.records.formats.known import file_size
 
 if TYPE_CHECKING:
     import mujoco

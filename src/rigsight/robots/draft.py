@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
 from rigsight.errors import InputError
 from rigsight.rigs import Rig, rig_of_tables
-from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field, Names
-from rigsight.robots.drafting.drive_tables import drive_of, plain_drive
-from rigsight.robots.drafting.energies import Energies, energies_of
-from rigsight.robots.drafting.gears import gear_table, split_joints
-from rigsight.robots.drafting.joint_tables import armature, joint_table, way_unit
-from rigsight.robots.reading.actuators import actuators_of
-from rigsight.robots.reading.left_out import left_out_of
-from rigsight.robots.reading.sensors import TreeSensor, sensors_of
-from rigsight.robots.reading.tree import TreeJoint, bodies_of, gravity_of
+from rigsight.robots.declared_numbers import DeclaredNumbers, Field, Names
+from rigsight.robots.energies import Energies, energies_of
+from rigsight.robots.parts import TreeSensor, actuators_of, left_out_of, sensors_of
+from rigsight.robots.rig_tables import (
+    armature,
+    drive_of,
+    gear_table,
+    joint_table,
+    plain_drive,
+    split_joints,
+    way_unit,
+)
+from rigsight.robots.tree import TreeJoint, bodies_of, gravity_of, load_spec
 from rigsight.simulators import has_constraints
-
-if TYPE_CHECKING:
-    import mujoco
-import os
-from pathlib import Path
 
 if TYPE_CHECKING:
     import mujoco
@@ -270,3 +271,29 @@ def simulator_table(
         **({"coordinates": coordinates} if coordinates else {}),
         **({"parameters": parameters} if parameters else {}),
     }
+
+
+@dataclass(frozen=True, eq=False)
+class RobotFile:
+    """A robot's model with its rig."""
+
+    spec: mujoco.MjSpec  # what the file says; may be changed
+    model: mujoco.MjModel  # compiled
+    draft: RigDraft  # its rig file
+
+
+def read_robot(path: Path, gears: Mapping[str, float] | None = None, *, as_it_is: bool = False) -> RobotFile:
+    """Read an MJCF or URDF file; a URDF, which has no actuators, gets a force or torque at every joint."""
+    spec = load_spec(path)
+    model = spec.compile()
+    try:
+        draft = draft_rig(
+            model,
+            path.stem,
+            with_drives=path.suffix.lower() == ".urdf",
+            gears=gears,
+            as_it_is=path.resolve().as_posix() if as_it_is else None,
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return RobotFile(spec, model, draft)

@@ -1,22 +1,24 @@
-"""Fixed step size that reproduces the motion of a model with the accuracy of the engine."""
+"""What an export with an integrator of its own needs: its step, its start, constants that are computed once, and dry friction."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.effects.symbols import derivative
-from rigsight.export.at_rest import no_input
+from rigsight.export.equations import Exported
 from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, rest_state
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
+from rigsight.simulate.input_hold import HeldInput, hold_input, together
 from rigsight.simulate.model import Model
 
 OSCILLATION = 0.03
@@ -137,3 +139,103 @@ def _rounded(step: float) -> float:
         return LONGEST
     scale = 10.0 ** (math.floor(math.log10(step)) - 1)
     return float(f"{math.floor(step / scale) * scale:.2g}")
+
+
+def state_at_rest(exported: Exported) -> tuple[float, ...]:
+    """Return the states at the static equilibrium without input, in order."""
+    if exported.rest is None:
+        return tuple(0.0 for _ in exported.states)
+    rest = rest_state(exported.structure, np.array(exported.values), no_input(exported.structure))
+    return tuple(float(value) for value in rest)
+
+
+def no_input(structure: Structure) -> HeldInput:
+    """Return inputs that are zero, of one piece."""
+    return together([hold_input(np.zeros(2), 1.0, "foh")] * max(1, len(structure.rig.inputs)))
+
+
+@dataclass(frozen=True)
+class IntegratorEquations:
+    """What an integrator evaluates."""
+
+    # Expressions of states, inputs, modes, parameters and `constants`; an output that shows what dry friction
+    # holds with reads the friction's sign, or its multiplier while it sticks.
+    rates: tuple[sp.Expr, ...]
+    switches: tuple[sp.Expr, ...]
+    outputs: tuple[sp.Expr, ...]
+    constants: dict[sp.Symbol, sp.Expr]  # symbol -> the expression of parameters that it stands for
+    # What is computed before the rates, and before the outputs, as `Structure.steps`.
+    steps: dict[sp.Symbol, sp.Expr]
+    shown_steps: dict[sp.Symbol, sp.Expr]
+
+
+def equations_of(exported: Exported) -> IntegratorEquations:
+    """Return a model's equations with powers and functions of parameters as symbols.
+
+    Sums and products of parameters stay: they cost little, and a reader looks for them.
+    """
+    fixed = set(exported.structure.parameter_symbols)
+    found: dict[sp.Expr, sp.Symbol] = {}
+
+    def walk(expression: sp.Expr) -> sp.Expr:
+        if not expression.args:
+            return expression
+        if expression.free_symbols and expression.free_symbols <= fixed and _costly(expression):
+            return found.setdefault(expression, sp.Symbol(f"constant {len(found)}", real=True))
+        return expression.func(*map(walk, expression.args))
+
+    signs = exported.frozen.friction_signs(exported.structure)
+    shown = tuple(output.xreplace(signs) for output in exported.structure.computed_outputs)
+    groups = (exported.frozen.rates, exported.frozen.switches, shown)
+    rates, switches, outputs = (tuple(map(walk, group)) for group in groups)
+    steps = {symbol: walk(step) for symbol, step in exported.frozen.steps.items()}
+    shown_steps = {symbol: walk(step.xreplace(signs)) for symbol, step in exported.structure.steps.items()}
+    constants = {symbol: expression for expression, symbol in found.items()}
+    return IntegratorEquations(rates, switches, outputs, constants, steps, shown_steps)
+
+
+def constant_names(equations: IntegratorEquations) -> dict[sp.Symbol, str]:
+    """Return the names of the constants in code, which in exports differ from all names of rigs and effects."""
+    return {symbol: symbol.name.replace(" ", "_") for symbol in equations.constants}
+
+
+def _costly(expression: sp.Expr) -> bool:
+    powers = (power for power in expression.atoms(sp.Pow) if not power.exp.is_Integer)
+    return bool(expression.atoms(sp.Function)) or any(True for _ in powers)
+
+
+def friction_mode(exported: Exported) -> int | None:
+    """Return the index of the mode that is the sign of the velocity which dry friction can hold, or None."""
+    return exported.frictions[0] if exported.frictions else None
+
+
+def friction_sign(exported: Exported) -> sp.Symbol:
+    """Return the symbol of this velocity's sign in outputs; while the friction sticks it stands for the share that holds."""
+    return exported.frozen.friction_sign(0)
+
+
+def held_velocity(exported: Exported) -> int | None:
+    """Return the index of the state that this velocity is; None where it is made of several."""
+    mode = friction_mode(exported)
+    states = exported.structure.states
+    switch = None if mode is None else exported.frozen.switches[mode]
+    return states.index(switch) if switch in states else None
+
+
+def slope_symbol(index: int) -> sp.Symbol:
+    """Return the symbol of the rate of a state, where it is given."""
+    return sp.Symbol(f"slope {index}", real=True)
+
+
+def slip_rate(exported: Exported) -> sp.Expr:
+    """Return the time derivative of the velocity that dry friction can hold, by the rates of the states; 0 without friction."""
+    mode = friction_mode(exported)
+    if mode is None:
+        return sp.S.Zero
+    along = {state: slope_symbol(i) for i, state in enumerate(exported.structure.states)}
+    along[TIME] = sp.S.One
+    for index in range(len(exported.sources)):
+        value, rate, curvature = input_symbols(index)
+        along |= {value: rate, rate: curvature}
+    switch = exported.frozen.switches[mode]
+    return sp.Add(*(derivative(switch, s) * rate for s, rate in along.items() if s in switch.free_symbols))

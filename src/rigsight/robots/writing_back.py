@@ -12,9 +12,8 @@ import numpy as np
 
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import InputError
-from rigsight.robots.drafting.declared_numbers import Field
-from rigsight.robots.drafting.draft import Gear, RigDraft
-from rigsight.robots.robot_file import RobotFile, read_robot
+from rigsight.robots.declared_numbers import Field
+from rigsight.robots.draft import Gear, RigDraft, RobotFile, read_robot
 from rigsight.simulate.model import Model
 
 if TYPE_CHECKING:

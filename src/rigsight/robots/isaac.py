@@ -13,8 +13,8 @@ from typing import Any
 
 from rigsight.effects import kind_of
 from rigsight.errors import InputError
-from rigsight.robots.drafting.draft import RigDraft
-from rigsight.robots.writing.writing_back import WrittenBack, read_for
+from rigsight.robots.draft import RigDraft
+from rigsight.robots.writing_back import WrittenBack, read_for
 from rigsight.simulate.model import Model
 
 _FIELDS: Mapping[tuple[str, str], tuple[str, ...]] = {

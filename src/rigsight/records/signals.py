@@ -1,15 +1,26 @@
-"""Period of a signal, or repetition of another signal."""
+"""What does a signal show: does it change, is it clipped, has it a period, does it repeat another, is it a reference?"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.records.record import Record
+
+# A cut leaves plateaus of at least this many samples, at least this often.
+SHORTEST_PLATEAU = 3
+FEWEST_PLATEAUS = 2
+# Of the root mean square step: slower approaches are the rounded top of a peak, not a cut.
+SLOWEST_ENTRY = 0.15
+LARGEST_SHARE_HELD = 0.1
+# Of the noise from sample to sample: the motion then has ten times its power.
+_CLEARLY_MOVES = 3.0
+# A signal that is nearly always at an extreme switches between two levels.
+SMALLEST_SHARE_MOVING = 0.1
 
 _SAME = 1e-3
 """Largest difference between two periods of one signal, relative to its standard deviation."""
@@ -22,6 +33,51 @@ _APART = 0.5
 below, while noise as small as `_ALIKE` crosses it once."""
 _ROUGH = 0.5
 """Share of a difference that must be as rough as white noise: a slightly other amplitude or time is smooth."""
+
+REFERENCE = "reference"
+"""The signal that a record may hold beside those of its rig; a rig with a signal of this name means its own."""
+
+
+def is_constant(samples: NDArray[np.float64]) -> bool:
+    """Return True if no sample of shape (n_samples,) differs from the first by more than rounding."""
+    return bool(np.ptp(samples) <= 1e-12 * np.max(np.abs(samples)))
+
+
+def moves_beyond_noise(samples: NDArray[np.float64]) -> bool:
+    """Return True if a signal of shape (n_samples,) clearly moves: where a cause is not found in it, noise does not hide it."""
+    return float(np.std(samples)) > _CLEARLY_MOVES * roughness(samples)
+
+
+def clipping(samples: NDArray[np.float64]) -> tuple[tuple[float, int], ...]:
+    """Return level and number of samples for each extreme at which a signal of shape (n_samples,) is clipped.
+
+    A clipped signal reaches its extreme at speed and is exactly constant there, repeatedly, while it changes from sample to
+    sample elsewhere. Steps, held inputs and coarsely quantized signals are constant elsewhere too; a signal at rest reaches its
+    level once, or slowly.
+    """
+    steps = np.diff(samples)
+    typical_step = float(np.sqrt(np.mean(steps**2)))
+    moving = np.abs(steps[steps != 0.0])
+    if moving.size == 0:
+        return ()
+    levels = (float(samples.min()), float(samples.max()))
+    extreme = (samples == levels[0]) | (samples == levels[1])
+    elsewhere = ~(extreme[1:] & extreme[:-1])
+    moves = (
+        np.mean(~extreme) > SMALLEST_SHARE_MOVING and np.mean(steps[elsewhere] == 0.0) < LARGEST_SHARE_HELD
+    )
+    found = []
+    for level in levels if moves else ():
+        at_level = samples == level
+        edges = np.diff(at_level.astype(np.int8), prepend=0, append=0)
+        starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+        inside = (stops - starts >= SHORTEST_PLATEAU) & (starts > 0) & (stops < samples.size)
+        if np.count_nonzero(inside) < FEWEST_PLATEAUS:
+            continue
+        entry = float(np.median(np.abs(steps[starts[inside] - 1])))
+        if entry > SLOWEST_ENTRY * typical_step and entry > 2.0 * float(moving.min()):
+            found.append((level, int(np.sum((stops - starts)[inside]))))
+    return tuple(found)
 
 
 def repeated_period(samples: NDArray[np.float64]) -> int | None:
@@ -99,3 +155,15 @@ def same_signal(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool
     squares = energy[part.size :] - energy[: -part.size] + float(part @ part)
     squares -= 2.0 * correlate(whole, part, mode="valid", method="fft")
     return bool(np.min(squares) <= part.size * (_ALIKE * size) ** 2)
+
+
+def signals_beside(own: Collection[str]) -> tuple[str, ...]:
+    """Return the signals that a record may contain in addition to those of its rig, whose names are given."""
+    return () if REFERENCE in own else (REFERENCE,)
+
+
+def instrument_of(record: Record, own: Collection[str]) -> str | None:
+    """Return the name of the reference signal of a record's control loop; None if there is none, or it never changes."""
+    if not signals_beside(own) or REFERENCE not in record or is_constant(record[REFERENCE]):
+        return None
+    return REFERENCE

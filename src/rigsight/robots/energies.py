@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import sympy as sp
 
-from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field
-from rigsight.robots.reading.tree import Floats, TreeBody, TreeJoint
+from rigsight.robots.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.tree import Floats, TreeBody, TreeJoint
 
 AXES = "xyz"
 
