@@ -268,7 +268,7 @@ def test_its_binary_is_for_every_processor_of_its_kind(case_named, monkeypatch: 
 @pytest.mark.parametrize("target", VERSIONS)
 def test_without_a_compiler_the_way_out_is_named(target: str, case_named, monkeypatch: pytest.MonkeyPatch):
     model = case_named("linear axis").model
-    monkeypatch.setattr("rigsight.libraries.compiler.c_compilers", lambda: ())
+    monkeypatch.setattr("rigsight.libraries.library_cache.c_compilers", lambda: ())
     with pytest.raises(InputError, match=r"No C compiler was found.*--source-only"):
         export_model(model, target, source="model.json")
     monkeypatch.undo()

@@ -121,7 +121,9 @@ def _friction(exported: Exported) -> dict[str, str]:
         return dict.fromkeys(_OF_FRICTION, "")
     slopes = {slope_symbol(i): f"slopes({i + 1})" for i in range(len(exported.states))}
     own = {
-        "SLIP_RATE": _body("slip", [slip_rate(exported)], {**_names(exported), **slopes}),
+        "SLIP_RATE": "\n".join(
+            MATLAB.statements(["slip"], [slip_rate(exported)], {**_names(exported), **slopes})
+        ),
         "STOP": _parts()["STOP"] if velocity is None else _STOP_ONE,
         "VELOCITY": (velocity or 0) + 1,
         "FRICTION": mode + 1,
