@@ -16,7 +16,7 @@ from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.declared_numbers import DeclaredNumbers, Field, Names
 from rigsight.robots.energies import Energies, energies_of
 from rigsight.robots.parts import TreeSensor, actuators_of, left_out_of, sensors_of
-from rigsight.robots.rig_tables import (
+from rigsight.robots.tables import (
     armature,
     drive_of,
     gear_table,

@@ -36,6 +36,38 @@ def force_unit(joint: TreeJoint) -> str:
     return "N" if joint.slides else "N m"
 
 
+@dataclass(frozen=True)
+class _Joint:
+    """Declares the numbers of one joint, which are called after its coordinate."""
+
+    joint: TreeJoint
+    name: str
+    numbers: DeclaredNumbers
+
+    def unit(self, form: str) -> str:
+        """Return a unit in which way, force and inertia are those of the joint."""
+        inertia = "kg" if self.joint.slides else "kg m^2"
+        return form.format(way=way_unit(self.joint), force=force_unit(self.joint), inertia=inertia)
+
+    def parameter(
+        self,
+        what: str,
+        value: float,
+        unit: str,
+        about: str,
+        at: str,
+        entry: int = 0,
+        *,
+        lower: float | None = 0.0,
+    ) -> str:
+        """Declare a parameter, given the element and attribute of its field, and return its name."""
+        element, _, attribute = at.partition(" ")
+        field = Field(element, self.joint.index, attribute, entry)
+        return self.numbers.parameter(
+            f"{self.name}_{what}", value, self.unit(unit), about, field, lower=lower
+        )
+
+
 def joint_table(
     model: mujoco.MjModel, joint: TreeJoint, name: str, numbers: DeclaredNumbers
 ) -> dict[str, Any]:
@@ -44,76 +76,53 @@ def joint_table(
     The inertia that moves with it is that of the model as it is drawn. Effects that read one, a flexible mode, take it for
     constant.
     """
-    way, force = way_unit(joint), force_unit(joint)
-    table: dict[str, Any] = {"motion": name}
-    moved = 1.0 / float(model.dof_invweight0[joint.dof])
-    inertia = numbers.constant(
-        f"{name}_inertia",
-        moved,
-        "kg" if joint.slides else "kg m^2",
-        f"inertia moved by {name} in the reference pose of the model",
-    )
-    table["inertia"] = str(inertia)
-    table["damping"] = numbers.parameter(
-        f"{name}_damping",
-        float(model.dof_damping[joint.dof]),
-        f"{force} s/{way}",
-        f"damping of {name}",
-        Field("joint", joint.index, "damping"),
-    )
+    own, moved = _Joint(joint, name, numbers), 1.0 / float(model.dof_invweight0[joint.dof])
+    about = f"inertia moved by {name} in the reference pose of the model"
+    inertia = numbers.constant(f"{name}_inertia", moved, own.unit("{inertia}"), about)
+    damping = float(model.dof_damping[joint.dof])
+    table: dict[str, Any] = {
+        "motion": name,
+        "inertia": str(inertia),
+        "damping": own.parameter(
+            "damping", damping, "{force} s/{way}", f"damping of {name}", "joint damping"
+        ),
+    }
     forces = []
     loss = float(model.dof_frictionloss[joint.dof])
     if loss > 0.0:
-        own = numbers.parameter(
-            f"{name}_frictionloss",
-            loss,
-            force,
-            f"dry friction of {name}",
-            Field("joint", joint.index, "frictionloss"),
-        )
-        forces.append(f"{own}*sign(d({name}))")
+        dry = own.parameter("frictionloss", loss, "{force}", f"dry friction of {name}", "joint frictionloss")
+        forces.append(f"{dry}*sign(d({name}))")
     for power, law in ((2, f"d({name})*abs(d({name}))"), (3, f"d({name})^3")):
         value = float(model.dof_dampingpoly[joint.dof, power - 2])
         if value:
-            own = numbers.parameter(
-                f"{name}_damping_{power}",
-                value,
-                f"{force} s^{power}/{way}^{power}",
+            unit, about = (
+                f"{{force}} s^{power}/{{way}}^{power}",
                 f"damping of {name} with power {power} of the speed",
-                Field("joint", joint.index, "damping", power - 1),
-                lower=None,
             )
-            forces.append(f"{own}*{law}")
-    spring, beside = _spring(model, joint, name, numbers)
+            higher = own.parameter(
+                f"damping_{power}", value, unit, about, "joint damping", power - 1, lower=None
+            )
+            forces.append(f"{higher}*{law}")
+    spring, beside = _spring(model, own)
     if forces or beside:
         table["force"] = " + ".join([*forces, *beside])
     return {**table, **spring}
 
 
-def _spring(
-    model: mujoco.MjModel, joint: TreeJoint, name: str, numbers: DeclaredNumbers
-) -> tuple[dict[str, Any], list[str]]:
+def _spring(model: mujoco.MjModel, own: _Joint) -> tuple[dict[str, Any], list[str]]:
     """Return what the spring of a joint adds to its table, and what its force has beside the linear part."""
-    index, way, force = joint.index, way_unit(joint), force_unit(joint)
+    index, name = own.joint.index, own.name
     linear, *higher = float(model.jnt_stiffness[index]), *map(float, model.jnt_stiffnesspoly[index])
     if linear == 0.0 and not any(higher):
         return {}, []
-    at_rest = numbers.constant(
-        f"{name}_springref",
-        float(model.qpos_spring[int(model.jnt_qposadr[index])]),
-        way,
-        f"rest of the spring of {name}",
-        Field("joint", index, "springref"),
-    )
+    place, field = float(model.qpos_spring[int(model.jnt_qposadr[index])]), Field("joint", index, "springref")
+    about = f"rest of the spring of {name}"
+    at_rest = own.numbers.constant(f"{name}_springref", place, own.unit("{way}"), about, field)
     table: dict[str, Any] = {}
     if linear:
-        table["stiffness"] = numbers.parameter(
-            f"{name}_stiffness",
-            linear,
-            f"{force}/{way}",
-            f"stiffness of {name}",
-            Field("joint", index, "stiffness"),
-            lower=0.0 if linear > 0.0 else None,
+        least, about = 0.0 if linear > 0.0 else None, f"stiffness of {name}"
+        table["stiffness"] = own.parameter(
+            "stiffness", linear, "{force}/{way}", about, "joint stiffness", lower=least
         )
         if at_rest != 0:
             table["rest"] = str(at_rest)
@@ -121,15 +130,14 @@ def _spring(
     forces = []
     for power, value in enumerate(higher, start=2):
         if value:
-            own = numbers.parameter(
-                f"{name}_stiffness_{power}",
-                value,
-                f"{force}/{way}^{power}",
+            unit, about = (
+                f"{{force}}/{{way}}^{power}",
                 f"stiffness of {name} with power {power} of the deflection",
-                Field("joint", index, "stiffness", power - 1),
-                lower=None,
             )
-            forces.append(f"{own}*{stretched}^{power}")
+            stiffness = own.parameter(
+                f"stiffness_{power}", value, unit, about, "joint stiffness", power - 1, lower=None
+            )
+            forces.append(f"{stiffness}*{stretched}^{power}")
     return table, forces
 
 
@@ -138,13 +146,8 @@ def armature(model: mujoco.MjModel, joint: TreeJoint, name: str, numbers: Declar
     value = float(model.dof_armature[joint.dof])
     if value == 0.0:
         return sp.S.Zero
-    own = numbers.parameter(
-        f"{name}_armature",
-        value,
-        "kg" if joint.slides else "kg m^2",
-        f"inertia of the rotor at {name}",
-        Field("joint", joint.index, "armature"),
-    )
+    about = f"inertia of the rotor at {name}"
+    own = _Joint(joint, name, numbers).parameter("armature", value, "{inertia}", about, "joint armature")
     return sp.Symbol(own, real=True) * sp.Symbol(f"d({name})", real=True) ** 2 / 2
 
 
@@ -185,26 +188,17 @@ def gear_table(
     model: mujoco.MjModel, joint: TreeJoint, name: str, play: str, stiffness: float, numbers: DeclaredNumbers
 ) -> dict[str, Any]:
     """Return ``[joints.NAME_gear]``, with its stiffness and damping declared as parameters."""
-    force, way = force_unit(joint), way_unit(joint)
+    own = _Joint(joint, f"{name}_gear", numbers)
     damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * float(model.dof_armature[joint.dof]))
+    about = f"of the gear of {name}"
     return {
         "motion": play,
-        "stiffness": numbers.parameter(
-            f"{name}_gear_stiffness",
-            stiffness,
-            f"{force}/{way}",
-            f"stiffness of the gear of {name}",
-            Field("gear", joint.index, "stiffness"),
+        "stiffness": own.parameter(
+            "stiffness", stiffness, "{force}/{way}", f"stiffness {about}", "gear stiffness"
         ),
         # Teeth that do not touch damp nothing.
         "damps_spring": True,
-        "damping": numbers.parameter(
-            f"{name}_gear_damping",
-            damping,
-            f"{force} s/{way}",
-            f"damping of the gear of {name}",
-            Field("gear", joint.index, "damping"),
-        ),
+        "damping": own.parameter("damping", damping, "{force} s/{way}", f"damping {about}", "gear damping"),
         "about": f"between the rotor of {name} and the moved body",
     }
 
@@ -255,34 +249,33 @@ def drive_of(
 
     gear = numbers.factor(f"{name}_gear", actuator.gear, f"gear of {name}", own("gear"))
     unit, terms = _law(actuator, joint, name, f"{gear}{coordinate}", f"{gear}d({coordinate})", numbers)
+
+    def clipped(
+        inner: str, ends: tuple[float, float], called: Sequence[str], what: str, unit: str, at: str
+    ) -> str:
+        low, high = (
+            numbers.constant(f"{name}_{which}", end, unit, f"{which} {what} of {name}", own(at, i))
+            for i, (which, end) in enumerate(zip(called, ends, strict=True))
+        )
+        return f"clip({inner}, {low}, {high})"
+
     signal = reported
     if actuator.control_range is not None:
-        low, high = (
-            numbers.constant(f"{name}_{what}", end, unit, f"{what} control of {name}", own("ctrlrange", i))
-            for i, (what, end) in enumerate(zip(("lowest", "highest"), actuator.control_range, strict=True))
-        )
-        signal = f"clip({reported}, {low}, {high})"
+        called = ("lowest", "highest")
+        signal = clipped(reported, actuator.control_range, called, "control", unit, "ctrlrange")
     states: dict[str, Any] = {}
     acting = name
     if actuator.time_constant > 0.0:
         acting = names.free(f"{name}_filtered")
+        about = f"time constant of the filter of {name}"
         constant = numbers.constant(
-            f"{name}_time_constant",
-            actuator.time_constant,
-            "s",
-            f"time constant of the filter of {name}",
-            own("dynprm"),
+            f"{name}_time_constant", actuator.time_constant, "s", about, own("dynprm")
         )
         states[acting] = {"unit": unit, "rate": f"({name} - {acting})/{constant}"}
     force = "".join(terms).format(acting)
     if actuator.force_range is not None:
-        weak, strong = (
-            numbers.constant(
-                f"{name}_{what}", end, force_unit(joint), f"{what} force of {name}", own("forcerange", i)
-            )
-            for i, (what, end) in enumerate(zip(("weakest", "strongest"), actuator.force_range, strict=True))
-        )
-        force = f"clip({force}, {weak}, {strong})"
+        called = ("weakest", "strongest")
+        force = clipped(force, actuator.force_range, called, "force", force_unit(joint), "forcerange")
     geared = f"{gear}({force})" if gear and not force.isidentifier() else f"{gear}{force}"
     table = {"signal": signal, "force": geared, "along": coordinate}
     control = {"unit": unit, "about": f"control of {name}"}
