@@ -36,6 +36,8 @@ MOST_COLUMNS = 64
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 _NO_UNIT = {"", "-", "--", "none", "null", "n/a", "unknown", "unit"}
 
+UNIT_NAMES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+
 Load = Callable[[], NDArray[Any]]
 """Reads stored numbers as they are, shape (n_samples,), while the file is open."""
 
@@ -256,21 +258,18 @@ def columns_of(
     read: Load,
     unit: str | None = None,
     stored: Stored = AS_STORED,
-) -> list[Channel] | Refused:
-    """Return the channels of a stored array: one of a vector, one per column of a table."""
-    long = [length for length in shape if length != 1]
-    if not long or 0 in long:
-        return Refused(name, "holds a single number" if not long else "is empty")
+) -> list[Channel | Refused]:
+    """Return the channels of a stored array, one of a vector, one per column of a table, or why it has none."""
+    long, size = [length for length in shape if length != 1], math.prod(shape)
+    if reason := too_short(size):
+        return [Refused(name, reason)]
     if len(long) == 1:
-        return [Channel(name, long[0], lambda: read().reshape(-1), unit, stored=stored)]
+        return [Channel(name, size, lambda: read().reshape(-1), unit, stored=stored)]
     if len(long) > 2 or min(long) > MOST_COLUMNS:
-        return Refused(name, f"is an array of shape {shape}, neither a vector nor a table of columns")
-
-    if math.prod(long) > MOST_IN_TABLE:
-        return Refused(
-            name,
-            f"is a table of {math.prod(long)} numbers, more than the {MOST_IN_TABLE} that are read of one",
-        )
+        return [Refused(name, f"is an array of shape {shape}, neither a vector nor a table of columns")]
+    if size > MOST_IN_TABLE:
+        why = f"is a table of {size} numbers, more than the {MOST_IN_TABLE} that are read of one"
+        return [Refused(name, why)]
 
     def column(index: int) -> Load:
         return lambda: _upright(read())[:, index]
@@ -278,6 +277,24 @@ def columns_of(
     return [
         Channel(f"{name}(:,{i + 1})", max(long), column(i), unit, stored=stored) for i in range(min(long))
     ]
+
+
+def too_short(n_samples: int) -> str | None:
+    """Return why so few samples are no channel, None where they are enough."""
+    return None if n_samples > 1 else "holds a single number" if n_samples else "is empty"
+
+
+def listed(file: str, parts: Iterable[Channel | Refused]) -> ChannelFile:
+    """Return what a file holds, of parts that are found one after the other."""
+    channels: list[Channel] = []
+    refused: list[Refused] = []
+    for part in parts:
+        if isinstance(part, Refused):
+            refused.append(part)
+        else:
+            channels.append(part)
+        check_count(file, len(channels) + len(refused))
+    return ChannelFile(tuple(channels), tuple(refused))
 
 
 def kept_last(kept: dict[str, NDArray[Any]], name: str, read: Load) -> Load:
@@ -307,6 +324,11 @@ def stated_unit(text: object) -> str | None:
         return None
     text = printable(re.sub(r"^\[(.*)\]$", r"\1", text.replace("\x00", "").strip()).strip())
     return None if text.lower() in _NO_UNIT else text
+
+
+def unit_of(attributes: Mapping[str, Any], names: Sequence[str] = UNIT_NAMES) -> str | None:
+    """Return the unit that a file states in one of some attributes."""
+    return next((unit for name in names if (unit := stated_unit(attributes.get(name))) is not None), None)
 
 
 def with_distinct_names(channels: Iterable[Channel]) -> tuple[Channel, ...]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.formats.channel import MOST_SAMPLES, check_count, printable, stated_unit
-from rigsight.records.formats.known import file_size
+from rigsight.records.formats.known import LARGEST_FILE, check_largest
 from rigsight.records.formats.table_head import (
     LAST_LINES,
     MOST_HEAD,
@@ -25,8 +25,6 @@ from rigsight.records.formats.table_head import (
     without_comment,
 )
 
-# The text and its lines are held in memory together, about five times the file.
-LARGEST_FILE = 2_000_000_000
 _PIECE = 1 << 20
 _LONGEST_LINE = 1_000_000
 _MOST_LINES = MOST_SAMPLES + 1000
@@ -38,12 +36,7 @@ shows with a probability of 0.65, in the hundreds of a record for certain."""
 
 def read_text(path: Path) -> str:
     """Return the text of a file with line feeds only."""
-    size = file_size(path)
-    if size > LARGEST_FILE:
-        raise InputError(
-            f"{path.name} has {size / 1e9:.1f} GB, more than the {LARGEST_FILE / 1e9:g} GB that are read; "
-            "split it into several records or reduce the sample rate."
-        )
+    check_largest(path, LARGEST_FILE)
     try:
         _check_text(path)
         data = path.read_bytes()
