@@ -201,13 +201,7 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def cache_folder() -> Path:
-    """Return the folder of compiled kernels: $RIGSIGHT_CACHE_DIR, else the platform's cache folder of the user.
-
-    Raises
-    ------
-    InputError
-        If the variable is not set and there is no home folder.
-    """
+    """Return the folder of compiled kernels: $RIGSIGHT_CACHE_DIR, else the platform's cache folder of the user."""
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
         return Path(chosen)
@@ -230,19 +224,7 @@ def _caches_at_home() -> Path:
 def library_file(text: str, included: Sequence[str] = ()) -> Path:
     """Return an intact library of a C text, of the first compiler for which one is cached or can be compiled.
 
-    Parameters
-    ----------
-    text
-        C, which is a library by itself.
-    included
-        Folders of headers that are not the compiler's.
-
-    Raises
-    ------
-    InputError
-        If there is no C compiler.
-    MachineError
-        If the cache folder cannot be written, or the compiler fails.
+    The folders hold headers that are not the compiler's.
     """
     for compiler in c_compilers():
         path = _path(text, compiler)

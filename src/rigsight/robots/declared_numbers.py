@@ -27,15 +27,7 @@ class Field:
 
 
 class DeclaredNumbers:
-    """Constants and parameters, each declared once.
-
-    Attributes
-    ----------
-    parameters
-        Their tables, by name.
-    fields
-        Parameter or constant -> the numbers of the model that it stands for.
-    """
+    """Constants and parameters, each declared once, and the numbers of the model that each stands for."""
 
     def __init__(self, names: Names) -> None:
         self._names = names

@@ -65,13 +65,7 @@ class TreeBody:
 
 
 def bodies_of(model: mujoco.MjModel) -> tuple[TreeBody, ...]:
-    """Return the bodies of a model behind their parents, without the world.
-
-    Raises
-    ------
-    InputError
-        If a joint is no hinge or slide, or nothing moves.
-    """
+    """Return the bodies of a model behind their parents, without the world; each joint must be a hinge or slide."""
     import mujoco
 
     kinds = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}

@@ -52,24 +52,11 @@ _SINGULAR = 1e-9
 
 
 def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
-    """Return the states at the start of a record: those that the rig declares, and all others in static equilibrium with them.
+    """Return the states at the start of a record, shape (n_states,): declared ones, and all others in equilibrium with them.
 
     This is the equilibrium under the first sample of the inputs, reached from rest with empty memories: the inputs are raised
     slowly from zero, so that hysteresis and friction hold the same forces as on a rig. A rig without a spring has no equilibrium
     and starts at its rest position.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    p
-        Parameter values in the order of the structure, shape (n_parameters,).
-    held
-        Input between its samples.
-
-    Returns
-    -------
-    Shape (n_states,).
     """
     states = structure.states
     given = {

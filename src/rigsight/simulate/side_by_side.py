@@ -40,27 +40,10 @@ def simulate_sets(
     n_samples: int,
     substeps: int | Substeps,
 ) -> NDArray[np.float64]:
-    """Simulate many parameter sets side by side.
+    """Return the outputs of parameter sets that are simulated side by side, shape (n_samples, n_outputs, n_sets).
 
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    held
-        Input between its samples.
-    p
-        Shape (n_parameters, n_sets).
-    initial_states
-        Shape (n_states, n_sets).
-    n_samples
-        Samples of the record.
-    substeps
-        Runge-Kutta steps per piece of the input, see `choose_substeps`. If there are delays within the rig, the sets are
-        simulated accurately, one after the other, and this is not used.
-
-    Returns
-    -------
-    Shape (n_samples, n_outputs, n_sets); NaN or infinity for a set that diverges.
+    Parameters have the shape (n_parameters, n_sets), initial states (n_states, n_sets). A set that diverges has NaN or infinity.
+    With delays within the rig, the sets are simulated accurately, one after the other, and the substeps are not used.
     """
     held, p = read_ahead(structure, held, p)
     if structure.histories:
@@ -95,29 +78,11 @@ def normal_equations(
     p: NDArray[np.float64],
     initial_states: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the products of weighted residuals and differences that a least-squares step needs for some records.
+    """Return the products of weighted residuals and differences that least squares need, shape (n_records, n_sets, n_sets).
 
     Outputs are not stored: for many records and sets, moving them through memory would take longer than computing them.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects whose kernel has no tangents; no sensor may be delayed, because its reading is interpolated afterwards.
-    records
-        The fitted records.
-    p
-        Shape (n_parameters, n_sets).
-    initial_states
-        Shape (n_records, n_states, n_sets).
-
-    Returns
-    -------
-    Shape (n_records, n_sets, n_sets), see `Kernel.normal_equations`.
-
-    Raises
-    ------
-    ValueError
-        If a sensor is delayed, or there are delays within the rig.
+    Parameters have the shape (n_parameters, n_sets), initial states (n_records, n_states, n_sets). The kernel has no tangents,
+    and a ValueError is raised for a delayed sensor, because its reading is interpolated afterwards, or delays within the rig.
     """
     if structure.is_shifted or structure.histories:
         raise ValueError(
@@ -153,24 +118,9 @@ def tangent_equations(
 ) -> NDArray[np.float64]:
     """Return the products of weighted residuals and their derivatives that a least-squares step needs for some records.
 
-    Parameters
-    ----------
-    structure
-        Rig and effects whose kernel has tangents.
-    records
-        The fitted records.
-    p
-        Shape (n_parameters,).
-    dp
-        Derivatives of the parameters along each direction, shape (n_parameters, n_directions).
-    initial_states
-        Shape (n_records, n_states).
-    initial_slopes
-        Their derivatives, shape (n_states, n_directions); the same for all records.
-
-    Returns
-    -------
-    Shape (n_records, 1 + n_directions, 1 + n_directions), see `Kernel.tangent_equations`.
+    Their shape is (n_records, 1 + n_directions, 1 + n_directions). Parameters have the shape (n_parameters,), their derivatives
+    along each direction (n_parameters, n_directions), initial states (n_records, n_states) and their derivatives, the same for
+    all records, (n_states, n_directions). The kernel must have tangents.
     """
     return kernel_of(structure).tangent_equations(records, p, dp, initial_states, initial_slopes)
 
@@ -188,31 +138,8 @@ def simulate_tangents(
     """Simulate one parameter set with its derivatives along any directions of parameters and initial states.
 
     The derivatives of the equations are integrated with the motion, including the reversal of a velocity under dry friction and
-    the jump of a delayed held input. No difference step has to be chosen.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects whose kernel has tangents.
-    held
-        Input between its samples.
-    p
-        Shape (n_parameters,).
-    dp
-        Derivatives of the parameters along each direction, shape (n_parameters, n_directions).
-    initial_state
-        Shape (n_states,).
-    initial_slope
-        Its derivatives, shape (n_states, n_directions).
-    n_samples
-        Samples of the record.
-    substeps
-        Runge-Kutta steps per piece of the input, see `choose_substeps`.
-
-    Returns
-    -------
-    Shape (n_samples, n_outputs, 1 + n_directions): the outputs, followed by their derivatives; NaN or infinity if the simulation
-    diverges.
+    the jump of a delayed held input. No difference step has to be chosen. Shapes are those of `tangent_equations` for one record;
+    that of the result is (n_samples, n_outputs, 1 + n_directions): the outputs, then their derivatives.
     """
     steps = Substeps.per_piece(
         substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
@@ -315,19 +242,7 @@ def relative_needs(taken: NDArray[np.intc]) -> NDArray[np.float64]:
 
 
 def state_limits(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the half-width of the range that each state cannot leave, infinite for a free state.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    p
-        Parameter values in the order of the structure, shape (n_parameters, n_sets).
-
-    Returns
-    -------
-    Shape (n_states, n_sets).
-    """
+    """Return the half-width of the range that each state cannot leave, infinite for a free one, shape (n_states, n_sets)."""
     limits = np.full((len(structure.equations), p.shape[1]), np.inf)
     for i, equation in enumerate(structure.equations):
         if equation.limit is not None:

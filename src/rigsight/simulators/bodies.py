@@ -120,13 +120,7 @@ class Bodies:
 
     @cached_property
     def program(self) -> Program:
-        """The program, opened once.
-
-        Raises
-        ------
-        InputError
-            If it is not installed, or its model cannot be read or lacks a name.
-        """
+        """The program, opened once."""
         if self.digest and model_digest(self.kind, Path(self.file)) != self.digest:
             included = ", what it includes or MuJoCo itself" if self.kind == "mujoco" else ""
             raise InputError(
@@ -137,18 +131,7 @@ class Bodies:
 
 
 class Responses:
-    """Evaluates bodies at many points, with a compiled library.
-
-    Parameters
-    ----------
-    bodies
-        What is simulated elsewhere.
-
-    Raises
-    ------
-    MachineError
-        If the library cannot be compiled or loaded.
-    """
+    """Evaluates bodies at many points, with a compiled library."""
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies

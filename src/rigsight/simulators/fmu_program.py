@@ -45,23 +45,7 @@ class _Told(ctypes.Structure):
 
 
 class FmuProgram:
-    """An open FMU.
-
-    Parameters
-    ----------
-    bodies
-        Its file, and the names of states, of the inputs that take forces, and of parameters.
-
-    Attributes
-    ----------
-    reads_forces
-        False: forces enter accelerations linearly, as those of mechanics without contacts do.
-
-    Raises
-    ------
-    InputError
-        If FMPy is not installed, or the FMU is not for Model Exchange, not for this machine, or lacks a name.
-    """
+    """An open FMU; forces enter accelerations linearly, as those of mechanics without contacts do."""
 
     reads_forces = False
 

@@ -62,17 +62,7 @@ class simulated_slope(sp.Function):  # type: ignore[misc]  # noqa: N801
 
 
 def mass_leaf(bodies: Bodies, row: int, column: int, q: Sequence[sp.Expr], p: Sequence[sp.Expr]) -> sp.Expr:
-    """Return an entry of the mass matrix.
-
-    Parameters
-    ----------
-    bodies
-        What is simulated elsewhere.
-    row, column
-        Of the entry.
-    q, p
-        Coordinates and parameters.
-    """
+    """Return an entry of the mass matrix, of coordinates q and parameters p."""
     i, j = max(row, column), min(row, column)
     return simulated(sp.Integer(bodies.key), sp.Integer(i * (i + 1) // 2 + j), *q, *p)
 
@@ -87,14 +77,7 @@ def force_leaf(
 ) -> sp.Expr:
     """Return the force along a coordinate that the bodies' weight, gyration and constraints put on it.
 
-    Parameters
-    ----------
-    bodies
-        What is simulated elsewhere.
-    row
-        Number of the coordinate.
-    q, v, f, p
-        Coordinates, rates, forces of drives and joints, and parameters; f is read only where bodies touch or are bound.
+    It depends on coordinates q, rates v and parameters p, and on the forces f of drives and joints where bodies touch.
     """
     index = sp.Integer(bodies.n * (bodies.n + 1) // 2 + row)
     return simulated(sp.Integer(bodies.key), index, *q, *v, *(f if bodies.program.reads_forces else ()), *p)

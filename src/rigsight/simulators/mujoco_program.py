@@ -30,18 +30,7 @@ _OBJECTS = ("body", "jnt", "dof", "geom", "tendon", "eq", "pair")
 
 
 class MujocoProgram:
-    """An open MuJoCo model.
-
-    Parameters
-    ----------
-    bodies
-        Its file, and the names of joints and fields.
-
-    Raises
-    ------
-    InputError
-        If MuJoCo is not installed, cannot read the file, or has no such joint or field.
-    """
+    """An open MuJoCo model."""
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies

@@ -40,23 +40,7 @@ def give_function(name: str, accelerations: Accelerations) -> None:
 
 
 class PythonProgram:
-    """A function of Python.
-
-    Parameters
-    ----------
-    bodies
-        What it is called, and what parameters are called in it.
-
-    Attributes
-    ----------
-    reads_forces
-        False: forces enter accelerations linearly.
-
-    Raises
-    ------
-    InputError
-        If no such function was given.
-    """
+    """A function of Python; forces enter linearly."""
 
     reads_forces = False
 

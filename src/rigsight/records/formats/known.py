@@ -55,7 +55,7 @@ _HDF5 = rb"(?:.{512}|.{1024}|.{2048})?\x89HDF\r\n\x1a\n"
 _OF_MATLAB_7_3 = rb"MATLAB 7\.3 MAT-file"
 FORMATS = (
     Format(
-        "matlab", "MATLAB", (".mat",), _begins(rb"(?!%b).{124}(?:\0\1|\1\0)(?:IM|MI)" % _HDF5), "scipy", isolated=True,
+        "matlab", "MATLAB", (".mat",), _begins(rb"(?!%b).{124}(?:\x00\x01|\x01\x00)(?:IM|MI)" % _HDF5), "scipy", isolated=True,
         advice="MATLAB files before version 5 are not read: save it again with save -v7.",
     ),
     Format("matlab_hdf5", "MATLAB 7.3", (), _begins(rb"(?=%b)%b" % (_HDF5, _OF_MATLAB_7_3)), "h5py", isolated=True),

@@ -20,8 +20,8 @@ from rigsight.simulate.input_hold import HeldInput
 
 Floats = NDArray[np.float64]
 
-_DOUBLES, _INTS = ctypes.c_void_p, ctypes.c_void_p
-_LONG, _DOUBLE, _INT = ctypes.c_long, ctypes.c_double, ctypes.c_int
+_TYPES = {"a": ctypes.c_void_p, "l": ctypes.c_long, "d": ctypes.c_double, "i": ctypes.c_int}
+"""Types of arguments: address of an array, long, double, int."""
 
 _kernels: dict[str, Kernel] = {}
 _keys: dict[Structure, str] = {}
@@ -35,25 +35,18 @@ _made: dict[str, threading.Lock] = {}
 class _FittedRecord(ctypes.Structure):
     """The C structure ``fitted_record`` of the kernel."""
 
-    _fields_ = (
-        ("c", _DOUBLES), ("n_pieces", _LONG), ("length", _DOUBLE), ("per_sample", _LONG), ("substeps", _INTS),
-        ("start_time", _DOUBLE), ("measured", _DOUBLES), ("weights", _DOUBLES),
-    )  # fmt: skip
+    _fields_ = [
+        (field[2:], _TYPES[field[0]])
+        for field in (
+            "a c", "l n_pieces", "d length", "l per_sample", "a substeps", "d start_time", "a measured", "a weights",
+        )
+    ]  # fmt: skip
 
 
 class FittedRecord:
-    """A record to which parameter sets are fitted.
+    """A record to which parameter sets are fitted: with steps of shape (n_pieces,) and outputs (n_samples, n_outputs).
 
-    Parameters
-    ----------
-    held
-        Input between its samples.
-    substeps
-        Runge-Kutta steps in each piece of the input, shape (n_pieces,).
-    measured
-        Outputs, shape (n_samples, n_outputs).
-    weights
-        Factors of the residuals, shape (n_outputs,); 0 for an output that was not measured.
+    Weights are factors of the residuals, shape (n_outputs,); 0 for an output that was not measured.
     """
 
     def __init__(
@@ -69,20 +62,7 @@ class FittedRecord:
 
 
 class Kernel:
-    """The integrators of a structure.
-
-    Parameters
-    ----------
-    path
-        Shared library.
-    structure
-        The structure that was compiled.
-
-    Raises
-    ------
-    MachineError
-        If the library cannot be loaded.
-    """
+    """The integrators of a structure that was compiled to a shared library."""
 
     def __init__(self, path: Path, structure: Structure) -> None:
         self.path = path
@@ -97,30 +77,16 @@ class Kernel:
             ) from error
         connect(structure, loaded)
         self._bodies = structure.rig.mechanism.bodies
-        self._one = loaded.simulate_one
-        self._one.restype = _INT
-        self._one.argtypes = [
-            _DOUBLES, _LONG, _DOUBLE, _LONG, _INT, _DOUBLE, _DOUBLES, _DOUBLES, _DOUBLE, _DOUBLES, _LONG, _INTS,
-        ]  # fmt: skip
+        self._one = _function(loaded, "simulate_one", "a l d l i d a a d a l a")
         self.carries_tangents = hasattr(loaded, "tangent_equations")
         """True if `tangent_equations` and `simulate_tangents` are available, False if `normal_equations` is."""
         if structure.histories:
             return
-        self._lanes = loaded.simulate_lanes
-        self._lanes.restype = None
-        self._lanes.argtypes = [
-            _DOUBLES, _LONG, _DOUBLE, _LONG, _INTS, _DOUBLE, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES,
-        ]  # fmt: skip
+        self._lanes = _function(loaded, "simulate_lanes", "a l d l a d a l l a a", None)
         if self.carries_tangents:
-            self._tangents = loaded.tangent_equations
-            self._tangents.restype = _INT
-            self._tangents.argtypes = [
-                _DOUBLES, _LONG, _DOUBLES, _DOUBLES, _LONG, _DOUBLES, _DOUBLES, _LONG, _DOUBLES, _DOUBLES,
-            ]  # fmt: skip
+            self._tangents = _function(loaded, "tangent_equations", "a l a a l a a l a a")
         else:
-            self._normal = loaded.normal_equations
-            self._normal.restype = _INT
-            self._normal.argtypes = [_DOUBLES, _LONG, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES]
+            self._normal = _function(loaded, "normal_equations", "a l a l l a a")
 
     def simulate_one(
         self,
@@ -219,6 +185,13 @@ class Kernel:
         self._check_bodies()
         if failed:
             raise MachineError(f"Not enough memory to simulate {n_directions} derivatives side by side.")
+
+
+def _function(library: ctypes.CDLL, name: str, arguments: str, result: Any = ctypes.c_int) -> Any:
+    """Return a function of a library that takes arguments of `_TYPES`."""
+    function = getattr(library, name)
+    function.restype, function.argtypes = result, [_TYPES[own] for own in arguments.split()]
+    return function
 
 
 def _doubles(values: Any) -> Floats:

@@ -22,16 +22,7 @@ from rigsight.simulate.equations.tree import (
 class Binder:
     """Replaces the symbols of rig and effect declarations by those of one structure.
 
-    Parameters
-    ----------
-    rig
-        The rig.
-    symbols
-        Symbol of each parameter of the structure, by its name in the structure.
-    unique
-        Name of each effect's parameter in the structure, by (effect, own name).
-    fixed
-        Values of parameters that appear in the equations as numbers.
+    `unique` has the name of each effect's parameter in the structure, by (effect, own name); those in `fixed` become numbers.
     """
 
     def __init__(
@@ -80,15 +71,7 @@ def state_symbol(effect: Effect, symbol: sp.Symbol) -> sp.Symbol:
 
 
 class DefinedSignals:
-    """Definitions in the order in which they were made.
-
-    Parameters
-    ----------
-    binder
-        Binds expressions of the rig and of effects.
-    rig
-        The rig.
-    """
+    """Definitions in the order in which they were made."""
 
     def __init__(self, binder: Binder, rig: Rig) -> None:
         self.binder = binder

@@ -227,14 +227,8 @@ def _of_sympy(expression: sp.Expr) -> sp.Expr:
 class Jumps:
     """Derivatives of accelerations that are computed by elimination, with respect to symbols in the equations.
 
-    Parameters
-    ----------
-    elimination
-        The elimination.
-    steps
-        The steps to the accelerations, in functions that sympy can evaluate.
-    still
-        Velocities -> their expressions in the other velocities while a joint rests, without symbols of `steps`.
+    While a joint rests, `still` has velocities in terms of the others, without symbols of `steps`, which sympy must be able to
+    evaluate.
     """
 
     def __init__(

@@ -115,13 +115,7 @@ def latex_text(text: str, *, math: bool = False) -> str:
 
 
 class LatexPrinter(ReadingOrder, SympyLatexPrinter):  # type: ignore[misc]
-    """sympy's LaTeX with the displayed names.
-
-    Parameters
-    ----------
-    names
-        Name of each symbol.
-    """
+    """sympy's LaTeX with the displayed names."""
 
     def __init__(self, names: Mapping[sp.Symbol, ShownName]) -> None:
         symbols = {sp.Symbol(name.plain, real=True): latex_name(name) for name in names.values()}
@@ -157,13 +151,7 @@ def mathml_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName
 
 
 class MathMLPrinter(ReadingOrder, MathMLPresentationPrinter):  # type: ignore[misc]
-    """sympy's MathML with the displayed names.
-
-    Parameters
-    ----------
-    names
-        Name of each symbol.
-    """
+    """sympy's MathML with the displayed names."""
 
     def __init__(self, names: Mapping[sp.Symbol, ShownName]) -> None:
         super().__init__()
