@@ -17,9 +17,9 @@ from rigsight.simulate import parameter_vector
 from rigsight.simulate.equations.binder import state_symbol
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.derivatives import slope
-from rigsight.simulate.equations.kinks import FrozenStructure, freeze, is_zero
+from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
-from rigsight.simulate.equilibrium import has_raisable_damping
+from rigsight.simulate.equilibrium import has_raisable_damping, residuals_at_rest
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
 from rigsight.units import unit_text
@@ -305,7 +305,7 @@ class Balance:
 
 def balance(structure: Structure) -> Balance | None:
     """Return what is zero at the equilibrium of a rig, as `rigsight.simulate.equilibrium` has it; None without a state."""
-    motion, states = structure.tree.motion, structure.states
+    states = structure.states
     if not states:
         return None
     own = dict(zip(structure.names, structure.parameter_symbols, strict=True))
@@ -314,45 +314,13 @@ def balance(structure: Structure) -> Balance | None:
         for symbol, value in structure.rig.mechanism.initial.items()
         if symbol in states
     }
-    n = len(motion.coordinates)
-    unknown = tuple(i for i in (*range(n), *range(2 * n, len(states))) if i not in start)
-    residuals = {i: _residual(structure, i, start) for i in unknown}
-    memories = [i for i in unknown if i >= n and _is_memory(structure, i)]
+    before = [start.get(i, sp.S.Zero) for i in range(len(states))]
+    residuals, memories = residuals_at_rest(structure, before, clamp)
+    unknown = tuple(i for i in residuals if i not in start)
     return Balance(
         unknown,
-        tuple(residuals.values()),
-        tuple(tuple(slope(residual, states[i]) for i in unknown) for residual in residuals.values()),
+        tuple(residuals[i] for i in unknown),
+        tuple(tuple(slope(residuals[row], states[i]) for i in unknown) for row in unknown),
         start,
-        bool(memories or freeze(structure).frictions),
+        bool(memories.intersection(unknown) or freeze(structure).frictions),
     )
-
-
-def _at_rest(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
-    rising = [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)[1:]]
-    return dict.fromkeys((*rising, TIME), sp.S.Zero)
-
-
-def _still(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
-    return {**_at_rest(structure), **dict.fromkeys(structure.tree.motion.velocities, sp.S.Zero)}
-
-
-def _is_memory(structure: Structure, index: int) -> bool:
-    """Return True for a state that nothing moves at rest: it holds what the way to rest left."""
-    return is_zero(structure.equations[index].rate.xreplace(_still(structure)))
-
-
-def _residual(structure: Structure, index: int, start: dict[int, sp.Expr]) -> sp.Expr:
-    """Return what vanishes at rest: what a coordinate lacks of balance, the rate of a state, or what a memory has of the way."""
-    motion = structure.tree.motion
-    n = len(motion.coordinates)
-    if index < n:
-        return structure.out_of_balance[index].xreplace(_still(structure))
-    equation = structure.equations[index]
-    if not _is_memory(structure, index):
-        return equation.rate.xreplace(_still(structure))
-    gone = {
-        velocity: coordinate - start.get(i, sp.S.Zero)
-        for i, (coordinate, velocity) in enumerate(zip(motion.coordinates, motion.velocities, strict=True))
-    }
-    reached = start.get(index, sp.S.Zero) + equation.rate.xreplace({**_at_rest(structure), **gone})
-    return equation.symbol - (reached if equation.limit is None else clamp(reached, equation.limit))

@@ -250,41 +250,22 @@ def _reached(
 
 @lru_cache(maxsize=256)
 def _balance_of(structure: Structure) -> _Balance:
-    tree, states = structure.tree, structure.states
     frozen = freeze(structure)
     signs = frozen.friction_signs(structure)
-    rising = [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)[1:]]
-    at_rest: dict[sp.Expr, sp.Expr] = dict.fromkeys((*rising, TIME), sp.Integer(0))
-    still = {**at_rest, **dict.fromkeys(tree.motion.velocities, sp.Integer(0))}
-    before = [sp.Symbol(f"before {i}", real=True) for i in range(len(states))]
-    moved = {**at_rest, **_moved(structure, before)}
-    of_first_order = structure.equations[2 * len(tree.motion.coordinates) :]
-    rates, remembers = [], False
-    for missing in structure.out_of_balance:
-        rates.append(missing.xreplace(signs).xreplace(still))
-    for index, equation in enumerate(of_first_order, 2 * len(tree.motion.coordinates)):
-        rate = equation.rate.xreplace(still)
-        if not is_zero(rate):
-            rates.append(rate)
-            continue
-        remembers = True
-        reached = before[index] + equation.rate.xreplace(moved)
-        rates.append(
-            equation.symbol - (reached if equation.limit is None else limited(reached, equation.limit))
-        )
-    turned = [speed.xreplace(moved) for speed in frozen.speeds(structure)]
+    before = [sp.Symbol(f"before {i}", real=True) for i in range(len(structure.states))]
+    residuals, memories = residuals_at_rest(structure, before, limited, signs)
+    turned = [speed.xreplace(_moved(structure, before)) for speed in frozen.speeds(structure)]
     arguments = _arguments(structure, before, len(frozen.frictions))
     functions = [
         {"positive_part": lambda x: max(x, 0.0), "limited": lambda x, end: min(max(x, -end), end)},
         "numpy",
     ]
-    n = len(tree.motion.coordinates)
     return _Balance(
-        rates=sp.lambdify(arguments, rates, functions),
+        rates=sp.lambdify(arguments, list(residuals.values()), functions),
         turned=sp.lambdify(arguments, turned, functions),
-        unknown=(*range(n), *range(2 * n, len(states))),
+        unknown=tuple(residuals),
         n_frictions=len(frozen.frictions),
-        remembers=remembers,
+        remembers=bool(memories),
         one_sided=_one_sided(structure),
     )
 
@@ -306,13 +287,43 @@ def _one_sided(structure: Structure) -> dict[int, float]:
     return found
 
 
-def _moved(structure: Structure, before: Sequence[sp.Symbol]) -> dict[sp.Expr, sp.Expr]:
-    """Return the velocities over a step of unit time: differences of coordinates."""
+def residuals_at_rest(
+    structure: Structure,
+    before: Sequence[sp.Expr],
+    within: Callable[[sp.Expr, sp.Expr], sp.Expr],
+    signs: Mapping[sp.Expr, sp.Expr] | None = None,
+) -> tuple[dict[int, sp.Expr], set[int]]:
+    """Return what is zero at rest for each state but the velocities, by index, and the indices of memories.
+
+    It is what a coordinate lacks of balance, the rate of a state, or what a memory, which nothing moves at rest, has of the way
+    from the states before; `within` limits that to its range.
+    """
     motion = structure.tree.motion
-    return {
-        velocity: coordinate - before[i]
-        for i, (coordinate, velocity) in enumerate(zip(motion.coordinates, motion.velocities, strict=True))
-    }
+    n, still = len(motion.coordinates), {**_steady(structure), **dict.fromkeys(motion.velocities, sp.S.Zero)}
+    lacking = (missing.xreplace(signs or {}).xreplace(still) for missing in structure.out_of_balance)
+    found, memories = dict(enumerate(lacking)), set()
+    for index, equation in enumerate(structure.equations[2 * n :], 2 * n):
+        found[index] = equation.rate.xreplace(still)
+        if is_zero(found[index]):
+            memories.add(index)
+            reached = before[index] + equation.rate.xreplace(_moved(structure, before))
+            found[index] = equation.symbol - (
+                reached if equation.limit is None else within(reached, equation.limit)
+            )
+    return found, memories
+
+
+def _steady(structure: Structure) -> dict[sp.Expr, sp.Expr]:
+    """Return zeros for time and the rates of inputs."""
+    rising = [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)[1:]]
+    return dict.fromkeys((*rising, TIME), sp.S.Zero)
+
+
+def _moved(structure: Structure, before: Sequence[sp.Expr]) -> dict[sp.Expr, sp.Expr]:
+    """Return the velocities over a step of unit time under steady inputs: differences of coordinates."""
+    motion = structure.tree.motion
+    pairs = zip(motion.velocities, motion.coordinates, before, strict=False)
+    return {**_steady(structure), **{velocity: now - then for velocity, now, then in pairs}}
 
 
 def _arguments(structure: Structure, before: Sequence[sp.Symbol], n_frictions: int) -> list[list[sp.Symbol]]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,6 @@ _MOST_REMEMBERED = 16
 """A place and the moved ones around it, of two rigs with few coordinates."""
 
 _lock = threading.Lock()
-_remembered: OrderedDict[tuple[Any, ...], Floats] = OrderedDict()
-"""Values by what they were computed of: each entry of a mass matrix asks for the same."""
 
 
 class simulated(sp.Function):  # type: ignore[misc]  # noqa: N801
@@ -92,12 +90,6 @@ def place_of(leaf: sp.Expr) -> tuple[int, ...]:
     return row, int(index) - row * (row + 1) // 2
 
 
-def forget() -> None:
-    """Drop what is remembered: a function of Python may be another one now."""
-    with _lock:
-        _remembered.clear()
-
-
 def _n_mass(key: Any) -> int:
     n = bodies_of(int(key)).n
     return n * (n + 1) // 2
@@ -121,13 +113,15 @@ def _values(key: int, is_force: bool, arguments: Sequence[Any]) -> Floats:
     columns = np.atleast_2d(
         np.stack(np.broadcast_arrays(*(np.asarray(a, dtype=np.float64).ravel() for a in arguments)))
     )
-    asked = (key, is_force, columns.shape, columns.tobytes())
+    return _answered(key, is_force, columns.shape, columns.tobytes())
+
+
+@lru_cache(maxsize=_MOST_REMEMBERED)
+def _answered(key: int, is_force: bool, shape: tuple[int, ...], content: bytes) -> Floats:
+    """Return the same of points whose numbers are given as bytes; each entry of a mass matrix asks for the same."""
     with _lock:
-        if asked in _remembered:
-            _remembered.move_to_end(asked)
-            return _remembered[asked]
-        found = bodies_of(key).answers.at(columns, is_force=is_force)
-        _remembered[asked] = found
-        if len(_remembered) > _MOST_REMEMBERED:
-            _remembered.popitem(last=False)
-        return found
+        return bodies_of(key).answers.at(np.frombuffer(content).reshape(shape), is_force=is_force)
+
+
+forget = _answered.cache_clear
+"""Drops what is remembered: a function of Python may be another one now."""

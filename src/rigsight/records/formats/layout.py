@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,11 +100,38 @@ class Layout:
         rows: Sequence[int],
         numbers: NDArray[np.float64],
     ) -> None:
-        """Refuse a column of numbers, shape (n_rows,), whose decimal sign separates thousands."""
+        """Refuse a column of numbers, shape (n_rows,), whose decimal sign separates thousands: ``39,998`` beside ``998``.
+
+        Decimals are written with as many places in all cells, or without zeros at their end, so that some have less than three.
+        """
+        finite = numbers[np.isfinite(numbers)]
+        whole = finite == np.round(finite)
+        # Cheap questions first: of three decimals at most, and numbers with and without.
+        if whole.all() or not whole.any() or np.max(np.abs(finite)) >= 1000.0:
+            return
+        if (
+            np.min(np.abs(finite[~whole])) < 1.0
+            or np.max(np.abs(1e3 * finite - np.round(1e3 * finite))) > 1e-6
+        ):
+            return
+        sign = self.dialect.decimal
+        grouped, plain = [], False
         of_rows = ((number, self.dialect.cells(lines[number - 1])) for number in rows)
         # Rows may be shorter than the header: what they lack is missing, not a number.
-        cells = ((number, row[position]) for number, row in of_rows if position < len(row))
-        refuse_thousands(path, self.names[position], self.dialect.decimal, cells, numbers)
+        for number, cell in ((number, row[position]) for number, row in of_rows if position < len(row)):
+            if sign not in cell:
+                plain = True
+            elif re.fullmatch(rf"[+-]?[1-9]\d{{0,2}}{re.escape(sign)}\d{{3}}", cell):
+                grouped.append((number, cell))
+            else:
+                return
+        if plain and len(grouped) >= _FEWEST_GROUPED:
+            number, cell = grouped[0]
+            raise InputError(
+                f"{path.name}, line {number}, column '{self.names[position]}': '{cell}' has a '{sign}' between thousands: in all "
+                f"{len(grouped)} numbers with a '{sign}' three digits follow, and others have none. Export the column without "
+                "signs between thousands."
+            )
 
 
 def kept_lines(lines: Sequence[str], comment: str | None = None) -> list[int]:
@@ -170,38 +197,3 @@ def _names_in_comment(
     ]
     names = [name for name in names if name] if dialect.separator == " " else names
     return tuple(names) if len(names) == width and looks_like_names(dialect, names) else None
-
-
-def refuse_thousands(
-    path: Path,
-    name: str,
-    sign: str,
-    cells: Iterable[tuple[int, str]],
-    numbers: NDArray[np.float64],
-) -> None:
-    """Refuse a column whose decimal sign separates thousands: ``39,998`` beside ``998``.
-
-    Decimals are written with as many places in all cells, or without zeros at their end, so that some have less than three.
-    """
-    finite = numbers[np.isfinite(numbers)]
-    whole = finite == np.round(finite)
-    # Cheap questions first: of three decimals at most, and numbers with and without.
-    if whole.all() or not whole.any() or np.max(np.abs(finite)) >= 1000.0:
-        return
-    if np.min(np.abs(finite[~whole])) < 1.0 or np.max(np.abs(1e3 * finite - np.round(1e3 * finite))) > 1e-6:
-        return
-    grouped, plain = [], False
-    for number, cell in cells:
-        if sign not in cell:
-            plain = True
-        elif re.fullmatch(rf"[+-]?[1-9]\d{{0,2}}{re.escape(sign)}\d{{3}}", cell):
-            grouped.append((number, cell))
-        else:
-            return
-    if plain and len(grouped) >= _FEWEST_GROUPED:
-        number, cell = grouped[0]
-        raise InputError(
-            f"{path.name}, line {number}, column '{name}': '{cell}' has a '{sign}' between thousands: in all "
-            f"{len(grouped)} numbers with a '{sign}' three digits follow, and others have none. Export the column without signs "
-            "between thousands."
-        )
