@@ -19,7 +19,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -166,27 +165,21 @@ def _run(command: Sequence[str], place: str) -> tuple[int, str]:
 
     It runs programs of its own, which end with it when we are interrupted.
     """
-    temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), place)
-    # Ctrl-C reaches the main thread alone: in another one a program is started whole, and its number is known.
-    with ThreadPoolExecutor(1) as starter:
-        started = starter.submit(
-            subprocess.Popen,
-            command,
-            cwd=place,
-            env={**os.environ, **temporary},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            errors="replace",
-            start_new_session=True,
-        )
+    with subprocess.Popen(
+        command,
+        cwd=place,
+        env={**os.environ, **dict.fromkeys(("TMPDIR", "TMP", "TEMP"), place)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    ) as process:
         try:
-            process = started.result()
             _, said = process.communicate()
         except BaseException:
-            with started.result() as process:
-                _end(process)
+            _end(process)
             raise
     return process.returncode, said
 

@@ -13,7 +13,6 @@ from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,20 +29,15 @@ KINDS = ("mujoco", "fmu", "python")
 """Supported programs."""
 
 
-class Program(Protocol):
-    """A program that is open."""
+class Program:
+    """A program that is open: it gives C text, and is connected to libraries that contain it."""
 
-    @property
-    def reads_forces(self) -> bool:
-        """Whether h depends on f, as it does with contacts and other constraints."""
-
-    @property
-    def c_text(self) -> str:
-        """C functions ``bodies_mass`` and ``bodies_force`` of the arguments of a leaf, and ``connect``."""
-
-    @property
-    def include_folders(self) -> tuple[str, ...]:
-        """Folders of the headers that `c_text` includes."""
+    reads_forces = False
+    """Whether h depends on f, as it does with contacts and other constraints; without them f enters linearly."""
+    c_text = ""
+    """C functions ``bodies_mass`` and ``bodies_force`` of the arguments of a leaf, and ``connect``."""
+    include_folders: tuple[str, ...] = ()
+    """Folders of the headers that `c_text` includes."""
 
     def connect(self, library: ctypes.CDLL) -> None:
         """Connect a library that contains `c_text` with the program."""

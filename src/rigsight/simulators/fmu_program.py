@@ -13,7 +13,7 @@ from typing import Any
 
 from rigsight.errors import InputError, nearest
 from rigsight.libraries.templates import filled, template
-from rigsight.simulators.bodies import Bodies
+from rigsight.simulators.bodies import Bodies, Program
 
 _FUNCTIONS = {
     "2": (
@@ -44,10 +44,8 @@ class _Told(ctypes.Structure):
     )  # fmt: skip
 
 
-class FmuProgram:
+class FmuProgram(Program):
     """An open FMU; forces enter accelerations linearly, as those of mechanics without contacts do."""
-
-    reads_forces = False
 
     def __init__(self, bodies: Bodies) -> None:
         self._file = bodies.file
@@ -97,7 +95,8 @@ class FmuProgram:
         self._strings = [
             text.encode() for text in (identifier, description.guid or description.instantiationToken, where)
         ]
-        self._n_states = len(states)
+        text = template("simulators", "fmu.c.txt") + template("simulators", "probed.c.txt")
+        self.c_text = filled(text, {"VERSION": self._version, "STATES": len(states)})
         self._kept: list[Any] = []
 
     def _state(self, name: str, states: list[str]) -> int:
@@ -120,17 +119,6 @@ class FmuProgram:
                 f"{self._file} {what}.{nearest(name, known)} It has: {', '.join(known) or 'none'}."
             )
         return int(self._variables[name].valueReference)
-
-    @property
-    def c_text(self) -> str:
-        """See `Program.c_text`."""
-        text = template("simulators", "fmu.c.txt") + template("simulators", "probed.c.txt")
-        return filled(text, {"VERSION": self._version, "STATES": self._n_states})
-
-    @property
-    def include_folders(self) -> tuple[str, ...]:
-        """No headers beside those of the compiler."""
-        return ()
 
     def connect(self, library: ctypes.CDLL) -> None:
         """See `Program.connect`."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.libraries.templates import template
-from rigsight.simulators.bodies import Bodies
+from rigsight.simulators.bodies import Bodies, Program
 from rigsight.simulators.leaf import forget
 
 Accelerations = Callable[..., Any]
@@ -39,10 +39,8 @@ def give_function(name: str, accelerations: Accelerations) -> None:
     forget()
 
 
-class PythonProgram:
+class PythonProgram(Program):
     """A function of Python; forces enter linearly."""
-
-    reads_forces = False
 
     def __init__(self, bodies: Bodies) -> None:
         if bodies.file not in _given:
@@ -51,6 +49,7 @@ class PythonProgram:
                 f"line, --simulator FILE.py:FUNCTION, or in Python with rigsight.simulators.give_function."
             )
         self._bodies = bodies
+        self.c_text = template("simulators", "function.c.txt") + template("simulators", "probed.c.txt")
         self._error: BaseException | None = None
         self._call = _CALL(self._answer)
         self._failed = ctypes.c_int(0)
@@ -72,16 +71,6 @@ class PythonProgram:
             found = np.full(n, np.nan)
         for i, acceleration in enumerate(found.tolist()):
             a[i] = acceleration
-
-    @property
-    def c_text(self) -> str:
-        """See `Program.c_text`."""
-        return template("simulators", "function.c.txt") + template("simulators", "probed.c.txt")
-
-    @property
-    def include_folders(self) -> tuple[str, ...]:
-        """No headers beside those of the compiler."""
-        return ()
 
     def connect(self, library: ctypes.CDLL) -> None:
         """See `Program.connect`."""

@@ -110,7 +110,7 @@ class _Path:
 
     def _shifts(self) -> list[FirstOrderState]:
         return [
-            FirstOrderState(symbol, (sp.Integer(0),), at_place("x", name), None, None)
+            FirstOrderState(symbol, (sp.Integer(0),), at_place("x", name))
             for name, symbol in self._offsets.items()
         ]
 
@@ -302,7 +302,7 @@ class _Path:
                 for effect in self._effects
                 if effect.lateral is not None
             ]
-            found.append(FirstOrderState(state.symbol, (linear, *changes), "length", None, None))
+            found.append(FirstOrderState(state.symbol, (linear, *changes), "length"))
         return found
 
     def _sensor(
