@@ -134,12 +134,12 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
     shared = shared_clock(chosen)
     known = {signal: clock.origin for signal, clock in clocks.items() if clock.origin is not None}
     if shared is not None:
-        labels = {**table.labels, time: shared.label}
+        labels = {time: shared.label, **table.labels}
         units = table.units if shared.unit is None else {**table.units, time: shared.unit}
         lines = table.lines if table.lines.size else np.arange(1, shared.stamps.size + 1, dtype=np.int64)
         return replace(
             table,
-            values={**table.values, time: shared.stamps},
+            values={time: shared.stamps, **table.values},
             labels=labels,
             units=units,
             lines=lines,
@@ -166,7 +166,7 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
     unit = next((clock.unit for clock in chosen if clock.unit is not None), None)
     return replace(
         table,
-        labels={**table.labels, time: chosen[0].label},
+        labels={time: chosen[0].label, **table.labels},
         units=table.units if unit is None else {**table.units, time: unit},
         axes=axes,
         clocks={signal: clock.label for signal, clock in clocks.items()},

@@ -171,6 +171,10 @@ class Channel:
     axis: TimeAxis | None = None  # its own time; None where time is a channel like any other
     stored: Stored = AS_STORED  # how stored numbers become quantities
     origin: np.datetime64 | None = None  # of a channel of dates, the moment from which its seconds count
+    label: str = ""  # what the file calls it; that is its name where it is not given
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "label", self.label or self.name)
 
     @property
     def short_name(self) -> str:
@@ -195,6 +199,10 @@ class Refused:
         object.__setattr__(self, "reason", printable(self.reason))
 
 
+def _each_by_itself(needed: Mapping[str, int], blank: bool) -> None:
+    """Read nothing ahead."""
+
+
 @dataclass(frozen=True, eq=False)
 class ChannelFile:
     """What a file holds, found out without reading any samples."""
@@ -203,6 +211,22 @@ class ChannelFile:
     channels: tuple[Channel, ...]
     refused: tuple[Refused, ...] = ()  # what else is in it
     format: str = ""  # plain name, ``"MATLAB"``; `open_channels` fills it in
+    # Of a delimited text the line of each row, shape (n_rows,); what was assumed of its layout; whether it has a header; and how
+    # some columns, by signal, are read at once, with blank cells or without.
+    lines: NDArray[np.int64] | None = None
+    notes: tuple[str, ...] = ()
+    has_names: bool = True
+    ahead: Callable[[Mapping[str, int], bool], None] = _each_by_itself
+
+    @property
+    def word(self) -> str:
+        """What a channel is called in messages."""
+        return "channel" if self.lines is None else "column"
+
+    @property
+    def row(self) -> str:
+        """What a row is called in messages."""
+        return "sample" if self.lines is None else "line"
 
 
 def check_size(file: str, name: str, n_samples: int) -> None:
@@ -335,7 +359,9 @@ def with_distinct_names(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     """Return the channels with printable names, with a number behind each that is not the first of its name."""
     channels = tuple(channels)
     names = distinct_names([printable(channel.name) for channel in channels])
-    return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
+    return tuple(
+        replace(channel, name=name, label=name) for channel, name in zip(channels, names, strict=True)
+    )
 
 
 def distinct_names(names: Sequence[str]) -> list[str]:

@@ -96,7 +96,7 @@ class Layout:
         self,
         path: Path,
         position: int,
-        lines: Sequence[str],
+        texts: Sequence[str],
         rows: Sequence[int],
         numbers: NDArray[np.float64],
     ) -> None:
@@ -116,7 +116,7 @@ class Layout:
             return
         sign = self.dialect.decimal
         grouped, plain = [], False
-        of_rows = ((number, self.dialect.cells(lines[number - 1])) for number in rows)
+        of_rows = ((number, self.dialect.cells(text)) for number, text in zip(rows, texts, strict=True))
         # Rows may be shorter than the header: what they lack is missing, not a number.
         for number, cell in ((number, row[position]) for number, row in of_rows if position < len(row)):
             if sign not in cell:

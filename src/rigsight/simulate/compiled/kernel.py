@@ -20,7 +20,7 @@ from rigsight.simulate.input_hold import HeldInput
 
 Floats = NDArray[np.float64]
 
-_TYPES = {"a": ctypes.c_void_p, "l": ctypes.c_long, "d": ctypes.c_double, "i": ctypes.c_int}
+_TYPES: dict[str, Any] = {"a": ctypes.c_void_p, "l": ctypes.c_long, "d": ctypes.c_double, "i": ctypes.c_int}
 """Types of arguments: address of an array, long, double, int."""
 
 _kernels: dict[str, Kernel] = {}
