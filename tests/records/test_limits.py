@@ -64,7 +64,7 @@ def test_a_line_without_end_is_refused(tmp_path: Path) -> None:
 def test_more_lines_than_samples_are_read_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rigsight.records.formats.layout._MOST_LINES", 1000)
+    monkeypatch.setattr("rigsight.records.formats.text_channels._MOST_LINES", 1000)
     (tmp_path / "run.csv").write_text("t,u\n" + "\n" * 1001, encoding="utf-8")
     with pytest.raises(InputError, match="more than 1000 lines"):
         run_inspect(tmp_path / "run.csv")

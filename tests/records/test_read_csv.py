@@ -164,7 +164,7 @@ def test_missing_file_and_folder_are_told(tmp_path: Path) -> None:
 def test_too_large_a_file_is_refused_before_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rigsight.records.formats.layout.LARGEST_FILE", 10)
+    monkeypatch.setattr("rigsight.records.formats.text_channels.LARGEST_FILE", 10)
     with pytest.raises(InputError, match="more than the 1e-08 GB"):
         read(tmp_path, text())
 

@@ -10,10 +10,7 @@ from rigsight.simulate.printing.names import rate_symbol
 from rigsight.simulate.printing.notation import text, text_equation
 from rigsight.simulate.printing.shown import shown_equations
 
-HOLDS: dict[Hold, str] = {
-    "zoh": "constant from each sample to the next",
-    "foh": "linear between samples",
-}
+HOLDS: dict[Hold, str] = {"zoh": "constant from each sample to the next", "foh": "linear between samples"}
 MOTION_HOLD = "the cubic through values and rates at both ends of a sample time"
 
 

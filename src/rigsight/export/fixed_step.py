@@ -21,6 +21,8 @@ from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.input_hold import HeldInput, hold_input, together
 from rigsight.simulate.model import Model
 
+Floats = NDArray[np.float64]
+
 OSCILLATION = 0.03
 """Step times the angular frequency of the fastest oscillation: Runge-Kutta then errs by less than 1e-6 over its decay."""
 SETTLING = 0.1
@@ -61,9 +63,7 @@ def internal_step(model: Model) -> float:
     return _rounded(step if is_linear(frozen, structure) else CAUTION * step)
 
 
-def _rates(
-    structure: Structure, frozen: FrozenStructure, p: NDArray[np.float64]
-) -> Callable[..., list[float]]:
+def _rates(structure: Structure, frozen: FrozenStructure, p: Floats) -> Callable[..., list[float]]:
     """Return the rates as a function of inputs, time, states and modes."""
     kinks = {"absolute": np.abs, "positive_part": lambda value: np.maximum(value, 0.0)}
     inputs, modules = _input_symbols(structure), [kinks, "numpy"]
@@ -101,7 +101,7 @@ def _input_symbols(structure: Structure) -> list[sp.Symbol]:
     return [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)]
 
 
-def _rest(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rest(structure: Structure, p: Floats) -> Floats:
     """Return the states about which time scales are read: at rest without input."""
     rest = np.zeros(len(structure.states))
     if not structure.rig.has_one_motion:
@@ -111,7 +111,7 @@ def _rest(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:
     return rest
 
 
-def _sides(frozen: FrozenStructure) -> Iterator[NDArray[np.float64]]:
+def _sides(frozen: FrozenStructure) -> Iterator[Floats]:
     count = len(frozen.modes)
     for side in (1.0, -1.0):
         yield np.full(count, side)
@@ -121,7 +121,7 @@ def _sides(frozen: FrozenStructure) -> Iterator[NDArray[np.float64]]:
             yield modes
 
 
-def _of_eigenvalues(jacobian: NDArray[np.float64]) -> float:
+def _of_eigenvalues(jacobian: Floats) -> float:
     if not np.all(np.isfinite(jacobian)):
         return LONGEST
     step = LONGEST

@@ -78,10 +78,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         "RATES": _body("r", equations.rates, {**names, **modes}, equations.steps),
         "SWITCHES": _body("g", equations.switches, {**names, **modes}),
         "OUTPUTS": _body(
-            "y",
-            equations.outputs,
-            {**names, friction_sign(exported): "friction_sign"},
-            equations.shown_steps,
+            "y", equations.outputs, {**names, friction_sign(exported): "friction_sign"}, equations.shown_steps
         ),
         "PIECES": _pieces(exported, inputs),
         "WITHOUT_MODES": "" if frozen.modes else "  m.x = x_new;\n  return\n",

@@ -33,10 +33,7 @@ MIN_STEPS = 4
 MIN_STEPS_PRESCRIBED = 32
 """The same if the motion is prescribed: the model has no time scale that requires more."""
 
-_PIECES = {
-    "zoh": "_steps({name})",
-    "foh": "_lines({name}, dt)",
-}
+_PIECES = {"zoh": "_steps({name})", "foh": "_lines({name}, dt)"}
 _CUBIC = "_cubics({value}, {rate}, dt)"
 _OWN_WORDS_OF_REST = words("first inertia stiffness")
 """Of `_REST` where parameters stand, beside what no name in any export is."""

@@ -10,12 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.records.formats.channel import (
-    Channel,
-    ChannelFile,
-    as_floats,
-    as_stamps,
-)
+from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
 from rigsight.records.formats.channel_file import file_format, open_channels
 from rigsight.records.formats.text_channels import TextColumns
 from rigsight.records.sensor_signs import FULL_TURNS, codes, held, is_wrapped, wrapping_counter

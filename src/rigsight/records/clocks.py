@@ -90,10 +90,7 @@ def _in_front(names: Sequence[str], times: Sequence[int], number: int) -> int | 
 
 
 def possible_clocks(
-    names: Sequence[str],
-    signals: Mapping[str, int],
-    given: Mapping[str, int],
-    declared: int | None,
+    names: Sequence[str], signals: Mapping[str, int], given: Mapping[str, int], declared: int | None
 ) -> dict[str, list[int]]:
     """Return the numbers of the times by which each signal may go, the first that increases is its own."""
     own = own_clocks(names)

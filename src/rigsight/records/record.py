@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigsight.errors import InputError, check_option, nearest
 
+Floats = NDArray[np.float64]
+
 Role = Literal["estimation", "validation"]
 Kind = Literal["sweep", "step", "multisine", "operation"]
 Hold = Literal["zoh", "foh", "band_limited"]
@@ -66,7 +68,7 @@ class Record:
 
     name: str
     dt: float
-    signals: Mapping[str, NDArray[np.float64]]
+    signals: Mapping[str, Floats]
     units: Mapping[str, str]
     t0: float = 0.0
     role: Role = "estimation"
@@ -104,7 +106,7 @@ class Record:
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
         object.__setattr__(self, "constants", MappingProxyType(self._checked_constants()))
 
-    def _checked(self, signal: str, samples: ArrayLike) -> NDArray[np.float64]:
+    def _checked(self, signal: str, samples: ArrayLike) -> Floats:
         """Return a private, read-only copy, so that a caller cannot change the record through its array."""
         array = np.array(samples, dtype=np.float64)
         if array.ndim != 1 or array.size == 0:
@@ -155,7 +157,7 @@ class Record:
         return next(iter(self.signals.values())).size
 
     @property
-    def t(self) -> NDArray[np.float64]:
+    def t(self) -> Floats:
         """Time stamps [s], shape (n_samples,)."""
         return self.t0 + self.dt * np.arange(self.n_samples, dtype=np.float64)
 
@@ -164,7 +166,7 @@ class Record:
         """Time from the first to the last sample [s]."""
         return self.dt * (self.n_samples - 1)
 
-    def __getitem__(self, signal: str) -> NDArray[np.float64]:
+    def __getitem__(self, signal: str) -> Floats:
         try:
             return self.signals[signal]
         except KeyError:

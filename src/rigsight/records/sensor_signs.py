@@ -18,6 +18,8 @@ from rigsight.errors import InputError
 from rigsight.records.channel_units import conversion, is_a
 from rigsight.records.column_mapping import ColumnMapping, Columns
 
+Floats = NDArray[np.float64]
+
 _CODE_SIZE = 1e30
 """From here on no reading in any unit: 9.9e37 and 9.91e37 (SCPI), 9.97e36 (NetCDF), 9.9e34 (DIAdem), 3.4e38 (end of a type)."""
 _CODES = np.array(
@@ -58,7 +60,7 @@ class Code:
     samples: NDArray[np.intp]
 
 
-def codes(samples: NDArray[np.float64]) -> tuple[Code, ...]:
+def codes(samples: Floats) -> tuple[Code, ...]:
     """Return the codes for no reading in a signal of shape (n_samples,), all finite.
 
     A code is a usual number for it, rare, and further from all readings than any two of them that follow each other: a signal
@@ -86,7 +88,7 @@ def codes(samples: NDArray[np.float64]) -> tuple[Code, ...]:
     return tuple(found)
 
 
-def is_wrapped(samples: NDArray[np.float64], period: float) -> bool:
+def is_wrapped(samples: Floats, period: float) -> bool:
     """Return True if a signal of shape (n_samples,) begins again at the end of a period, as an angle does after a full turn.
 
     It stays within one period, and at each jump it moves on as it does elsewhere if a period is added or taken off.
@@ -107,7 +109,7 @@ def is_wrapped(samples: NDArray[np.float64], period: float) -> bool:
     )
 
 
-def wrapping_counter(samples: NDArray[np.float64]) -> float | None:
+def wrapping_counter(samples: Floats) -> float | None:
     """Return the range of a counter of whole numbers that begins again at its end, a power of two; None if it is none."""
     low, high = float(np.min(samples)), float(np.max(samples))
     for period in _COUNTERS:
@@ -127,7 +129,7 @@ class Held:
     fresh: NDArray[np.intp]  # rows with a reading of their own
 
 
-def held(samples: NDArray[np.float64]) -> Held | None:
+def held(samples: Floats) -> Held | None:
     """Return how a signal of shape (n_samples,) is held over several rows; None if it is not.
 
     It then changes after the same number of rows again and again, and never in two rows that follow each other. Rounding and rest
@@ -196,7 +198,7 @@ def unwrapped(
 
 
 def _period(
-    where: str, signal: str, samples: NDArray[np.float64], mapping: ColumnMapping, si: str
+    where: str, signal: str, samples: Floats, mapping: ColumnMapping, si: str
 ) -> tuple[float | None, str]:
     """Return the period of a signal in the numbers of its column, None where nothing is unwrapped, and its unit in a note."""
     scale = 1.0 if mapping.scale is None else abs(mapping.scale)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from rigsight.records.record import Record
 
+Floats = NDArray[np.float64]
+
 # A cut leaves plateaus of at least this many samples, at least this often.
 SHORTEST_PLATEAU = 3
 FEWEST_PLATEAUS = 2
@@ -38,17 +40,17 @@ REFERENCE = "reference"
 """The signal that a record may hold beside those of its rig; a rig with a signal of this name means its own."""
 
 
-def is_constant(samples: NDArray[np.float64]) -> bool:
+def is_constant(samples: Floats) -> bool:
     """Return True if no sample of shape (n_samples,) differs from the first by more than rounding."""
     return bool(np.ptp(samples) <= 1e-12 * np.max(np.abs(samples)))
 
 
-def moves_beyond_noise(samples: NDArray[np.float64]) -> bool:
+def moves_beyond_noise(samples: Floats) -> bool:
     """Return True if a signal of shape (n_samples,) clearly moves: where a cause is not found in it, noise does not hide it."""
     return float(np.std(samples)) > _CLEARLY_MOVES * roughness(samples)
 
 
-def clipping(samples: NDArray[np.float64]) -> tuple[tuple[float, int], ...]:
+def clipping(samples: Floats) -> tuple[tuple[float, int], ...]:
     """Return level and number of samples for each extreme at which a signal of shape (n_samples,) is clipped.
 
     A clipped signal reaches its extreme at speed and is exactly constant there, repeatedly, while it changes from sample to
@@ -80,7 +82,7 @@ def clipping(samples: NDArray[np.float64]) -> tuple[tuple[float, int], ...]:
     return tuple(found)
 
 
-def repeated_period(samples: NDArray[np.float64]) -> int | None:
+def repeated_period(samples: Floats) -> int | None:
     """Return the period in samples of a signal of shape (n_samples,) that is periodic apart from noise; None if it is not."""
     centered = samples - np.mean(samples)
     n = centered.size
@@ -123,7 +125,7 @@ def mean_period(record: Record, drives: Sequence[str]) -> tuple[Record, int]:
     return replace(record, signals=kept), count - 1
 
 
-def differ_by_noise(first: NDArray[np.float64], second: NDArray[np.float64], size: float) -> bool:
+def differ_by_noise(first: Floats, second: Floats, size: float) -> bool:
     """Return True if two signals of shape (n_samples,) are the same, or measured with small white noise on each."""
     difference = first - second
     if float(np.max(np.abs(difference), initial=0.0)) <= _SAME * size:
@@ -132,7 +134,7 @@ def differ_by_noise(first: NDArray[np.float64], second: NDArray[np.float64], siz
     return rms <= _ALIKE * size and roughness(difference) >= _ROUGH * rms
 
 
-def roughness(samples: NDArray[np.float64]) -> float:
+def roughness(samples: Floats) -> float:
     """Return the standard deviation of white noise with the median size of third differences, which rare jumps leave alone."""
     differences = np.diff(samples, 3)
     if differences.size == 0:
@@ -141,7 +143,7 @@ def roughness(samples: NDArray[np.float64]) -> float:
     return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(20.0))
 
 
-def same_signal(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
+def same_signal(first: Floats, second: Floats) -> bool:
     """Return True if the shorter of two signals is a stretch of the longer one, amplitude and mean included."""
     # Loaded where it is used: the process that reads a file imports this package and needs none of it.
     from scipy.signal import correlate

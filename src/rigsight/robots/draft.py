@@ -153,10 +153,7 @@ def draft_rig(
         "constants": {},
         "parameters": numbers.parameters,
         "coordinates": {q: {"unit": way_unit(joint)} for joint, q in zip(joints, coordinates, strict=True)},
-        "energy": {
-            "kinetic": _sum(*energies.kinetic, *rotors),
-            "potential": _sum(*energies.potential),
-        },
+        "energy": {"kinetic": _sum(*energies.kinetic, *rotors), "potential": _sum(*energies.potential)},
         "simulator": {} if as_it_is is None else simulator_table(model, as_it_is, own, numbers.fields),
         "signals": {signal: _sum(value) for signal, value in energies.signals.items()},
         "states": {name: state for drive in drives for name, state in drive.states.items()},

@@ -17,6 +17,8 @@ from rigsight.simulate import compose, simulate
 if TYPE_CHECKING:
     import mujoco
 
+Floats = NDArray[np.float64]
+
 
 STEP, SAMPLES, STEPS_PER_SAMPLE = 1e-4, 500, 10
 """MuJoCo's step [s], samples that are compared, and steps from each to the next."""
@@ -99,9 +101,7 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     return FreeRun(STEP * STEPS_PER_SAMPLE * (SAMPLES - 1), differences, friction)
 
 
-def _ours(
-    draft: RigDraft, start: dict[str, float], reported: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
+def _ours(draft: RigDraft, start: dict[str, float], reported: Floats) -> dict[str, Floats]:
     """Return the coordinates of the rig along the run, shape (SAMPLES,) each."""
     rig = watched(draft)
     structure = compose(rig, [])
@@ -128,7 +128,7 @@ def watched(draft: RigDraft) -> Rig:
     return rig_of_tables(tables, "the rig from the model")
 
 
-def sensor_readings(model: mujoco.MjModel, controls: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
+def sensor_readings(model: mujoco.MjModel, controls: Floats, dt: float) -> Floats:
     """Run a model by its own integrator from where it is drawn, at rest."""
     import mujoco
 

@@ -51,7 +51,7 @@ _SINGULAR = 1e-9
 """Singular value of the scaled stiffness, relative to the largest, below which it counts as zero."""
 
 
-def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
+def rest_state(structure: Structure, p: Floats, held: HeldInput) -> Floats:
     """Return the states at the start of a record, shape (n_states,): declared ones, and all others in equilibrium with them.
 
     This is the equilibrium under the first sample of the inputs, reached from rest with empty memories: the inputs are raised
@@ -79,7 +79,7 @@ def has_raisable_damping(rig: Rig) -> bool:
     return rig.has_one_motion and (rig.motion.inertia is None or isinstance(rig.motion.damping, sp.Symbol))
 
 
-def _risen(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
+def _risen(structure: Structure, p: Floats, held: HeldInput) -> Floats:
     """Return the state in which a rig with one motion rests after a slow rise of its input, simulated with high damping."""
     state = np.zeros(max(1, len(structure.states)))
     motion = structure.rig.motion
@@ -101,14 +101,12 @@ def _risen(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDA
     return state
 
 
-def _value(structure: Structure, p: NDArray[np.float64], expression: sp.Expr) -> float:
+def _value(structure: Structure, p: Floats, expression: sp.Expr) -> float:
     """Return the value of an expression in the rig's own symbols."""
     return float(expression.subs({s: p[structure.names.index(s.name)] for s in expression.free_symbols}))
 
 
-def _quiet_parameters(
-    structure: Structure, p: NDArray[np.float64], critical_damping: float
-) -> NDArray[np.float64]:
+def _quiet_parameters(structure: Structure, p: Floats, critical_damping: float) -> Floats:
     """Return parameters with the same equilibria, but with critical damping and without delays and disturbances.
 
     An overshoot of the equilibrium would leave a memory in hysteresis and friction that a rig at rest does not have.
@@ -131,12 +129,8 @@ def _quiet_parameters(
 
 
 def _settled(
-    structure: Structure,
-    p: NDArray[np.float64],
-    state: NDArray[np.float64],
-    ramp: tuple[float, float],
-    duration: float,
-) -> NDArray[np.float64] | None:
+    structure: Structure, p: Floats, state: Floats, ramp: tuple[float, float], duration: float
+) -> Floats | None:
     """Return the state after a ramp of the input and waits until all states are at rest; None if the simulation fails."""
     velocity = structure.velocity_index or 0
     interval = duration / INTERVALS

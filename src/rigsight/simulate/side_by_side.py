@@ -22,6 +22,8 @@ from rigsight.simulate.simulation import (
     state_vector,
 )
 
+Floats = NDArray[np.float64]
+
 _NUDGE = 1e-12
 """Perturbation of a state at rest: far below any accuracy, but unstable steps amplify it visibly."""
 _CAUTION = 0.6
@@ -35,11 +37,11 @@ _NEEDED_BY = 0.99
 def simulate_sets(
     structure: Structure,
     held: HeldInput,
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
+    p: Floats,
+    initial_states: Floats,
     n_samples: int,
     substeps: int | Substeps,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return the outputs of parameter sets that are simulated side by side, shape (n_samples, n_outputs, n_sets).
 
     Parameters have the shape (n_parameters, n_sets), initial states (n_states, n_sets). A set that diverges has NaN or infinity.
@@ -56,12 +58,8 @@ def simulate_sets(
 
 
 def _one_by_one(
-    structure: Structure,
-    held: HeldInput,
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-    n_samples: int,
-) -> NDArray[np.float64]:
+    structure: Structure, held: HeldInput, p: Floats, initial_states: Floats, n_samples: int
+) -> Floats:
     """Return the outputs of sets that each need a history of their own, shape (n_samples, n_outputs, n_sets)."""
     sets = []
     for own, state in zip(p.T, initial_states.T, strict=True):
@@ -73,11 +71,8 @@ def _one_by_one(
 
 
 def normal_equations(
-    structure: Structure,
-    records: Sequence[FittedRecord],
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    structure: Structure, records: Sequence[FittedRecord], p: Floats, initial_states: Floats
+) -> Floats:
     """Return the products of weighted residuals and differences that least squares need, shape (n_records, n_sets, n_sets).
 
     Outputs are not stored: for many records and sets, moving them through memory would take longer than computing them.
@@ -111,11 +106,11 @@ def has_dry_friction(structure: Structure) -> bool:
 def tangent_equations(
     structure: Structure,
     records: Sequence[FittedRecord],
-    p: NDArray[np.float64],
-    dp: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-    initial_slopes: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    p: Floats,
+    dp: Floats,
+    initial_states: Floats,
+    initial_slopes: Floats,
+) -> Floats:
     """Return the products of weighted residuals and their derivatives that a least-squares step needs for some records.
 
     Their shape is (n_records, 1 + n_directions, 1 + n_directions). Parameters have the shape (n_parameters,), their derivatives
@@ -128,13 +123,13 @@ def tangent_equations(
 def simulate_tangents(
     structure: Structure,
     held: HeldInput,
-    p: NDArray[np.float64],
-    dp: NDArray[np.float64],
-    initial_state: NDArray[np.float64],
-    initial_slope: NDArray[np.float64],
+    p: Floats,
+    dp: Floats,
+    initial_state: Floats,
+    initial_slope: Floats,
     n_samples: int,
     substeps: int | Substeps,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Simulate one parameter set with its derivatives along any directions of parameters and initial states.
 
     The derivatives of the equations are integrated with the motion, including the reversal of a velocity under dry friction and
@@ -150,8 +145,8 @@ def simulate_tangents(
 def choose_substeps(
     structure: Structure,
     held: HeldInput,
-    p: NDArray[np.float64],
-    initial_state: NDArray[np.float64],
+    p: Floats,
+    initial_state: Floats,
     n_samples: int,
     accuracy: float,
     most: int = _SUBSTEPS[-1],
@@ -205,10 +200,10 @@ class Substeps(int):
         Steps that each piece needs as a share of the largest number, see `relative_needs`; None if all pieces take that number.
     """
 
-    needs: NDArray[np.float64] | None
+    needs: Floats | None
     _schedule: NDArray[np.intc] | None
 
-    def __new__(cls, most: int, needs: NDArray[np.float64] | None = None) -> Substeps:
+    def __new__(cls, most: int, needs: Floats | None = None) -> Substeps:
         """Create the schedule from the largest number of steps and the `needs` of the pieces."""
         made = super().__new__(cls, most)
         made.needs = needs
@@ -235,13 +230,13 @@ class Substeps(int):
         return self._schedule
 
 
-def relative_needs(taken: NDArray[np.intc]) -> NDArray[np.float64]:
+def relative_needs(taken: NDArray[np.intc]) -> Floats:
     """Return the steps that pieces need, relative to a number that is sufficient for all but a few of them."""
     place = int(_NEEDED_BY * (taken.size - 1))
     return np.asarray(taken / max(float(np.partition(taken, place)[place]), 1.0))
 
 
-def state_limits(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:
+def state_limits(structure: Structure, p: Floats) -> Floats:
     """Return the half-width of the range that each state cannot leave, infinite for a free one, shape (n_states, n_sets)."""
     limits = np.full((len(structure.equations), p.shape[1]), np.inf)
     for i, equation in enumerate(structure.equations):

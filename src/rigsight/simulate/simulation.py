@@ -14,13 +14,7 @@ from rigsight.simulate.compiled.kernel import kernel_of
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.structure import Structure, ahead_name, bandwidth_name
 from rigsight.simulate.equilibrium import rest_state
-from rigsight.simulate.input_hold import (
-    HeldInput,
-    hold_accelerated_motion,
-    hold_input,
-    hold_motion,
-    together,
-)
+from rigsight.simulate.input_hold import HeldInput, hold_accelerated_motion, hold_input, hold_motion, together
 from rigsight.simulate.model import at_parameters
 from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
 
@@ -77,9 +71,9 @@ def simulate(
     structure: Structure,
     values: Mapping[str, float],
     record: Record,
-    initial_state: NDArray[np.float64] | None = None,
+    initial_state: Floats | None = None,
     accuracy: float = DEFAULT_ACCURACY,
-    before: NDArray[np.float64] | Mapping[str, NDArray[np.float64]] | None = None,
+    before: Floats | Mapping[str, Floats] | None = None,
 ) -> Record:
     """Simulate a record's input and return the outputs as a record of the same form.
 
@@ -132,9 +126,7 @@ def simulate(
     return record.with_signals(**{name: outputs[:, i] for i, name in enumerate(names)})
 
 
-def _before(
-    structure: Structure, before: NDArray[np.float64] | Mapping[str, NDArray[np.float64]]
-) -> dict[str, NDArray[np.float64]]:
+def _before(structure: Structure, before: Floats | Mapping[str, Floats]) -> dict[str, Floats]:
     """Return the samples of each input before the record, by its name."""
     inputs = [signal.name for signal in structure.rig.inputs]
     if not inputs:
@@ -173,7 +165,7 @@ def record_values(structure: Structure, values: Mapping[str, float], record: Rec
     return {**values, **record.constants, **bandwidths}
 
 
-def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArray[np.float64]:
+def parameter_vector(structure: Structure, values: Mapping[str, float]) -> Floats:
     """Return the parameter values in the order of the structure, shape (n_parameters,).
 
     A missing value is the parameter's default; values of other names are ignored.
@@ -195,12 +187,12 @@ def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArr
 def simulate_outputs(
     structure: Structure,
     held: HeldInput,
-    p: NDArray[np.float64],
-    initial_state: NDArray[np.float64],
+    p: Floats,
+    initial_state: Floats,
     n_samples: int,
     accuracy: float = DEFAULT_ACCURACY,
     taken: NDArray[np.intc] | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return the outputs of one parameter set, shape (n_samples, n_outputs).
 
     If `taken` is given, shape (n_pieces,), the number of steps in each piece of the input is written to it.
@@ -220,14 +212,12 @@ def simulate_outputs(
     return as_measured(structure, p[:, None], out[:, :, None], held)[:, :, 0]
 
 
-def state_vector(structure: Structure, state: NDArray[np.float64]) -> NDArray[np.float64]:
+def state_vector(structure: Structure, state: Floats) -> Floats:
     """Return the initial states in the form that a kernel takes."""
     return np.asarray(state, dtype=np.float64)[: max(1, len(structure.states))]
 
 
-def as_measured(
-    structure: Structure, p: NDArray[np.float64], out: NDArray[np.float64], held: HeldInput
-) -> NDArray[np.float64]:
+def as_measured(structure: Structure, p: Floats, out: Floats, held: HeldInput) -> Floats:
     """Shift outputs by the delays of their sensors; beyond its ends the record is continued with its rates there."""
     if not structure.is_shifted:
         return out
@@ -244,9 +234,7 @@ def as_measured(
     return visible
 
 
-def _shifted(
-    value: NDArray[np.float64], rise: NDArray[np.float64], delays: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _shifted(value: Floats, rise: Floats, delays: Floats) -> Floats:
     """Return values, shape (n_samples, n_sets), delayed by numbers of samples (n_sets,); `rise` is their slope per sample."""
     shifted = np.empty_like(value)
     for i, delay in enumerate(delays):
@@ -254,7 +242,7 @@ def _shifted(
     return shifted
 
 
-def _delayed(value: NDArray[np.float64], rise: NDArray[np.float64], delay: float) -> NDArray[np.float64]:
+def _delayed(value: Floats, rise: Floats, delay: float) -> Floats:
     if not np.isfinite(delay):
         return np.full_like(value, np.nan)
     n_samples = value.size

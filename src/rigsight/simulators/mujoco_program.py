@@ -73,7 +73,7 @@ class MujocoProgram(Program):
             )
         return int(self._model.jnt_qposadr[index]), int(self._model.jnt_dofadr[index])
 
-    def _field(self, name: str) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    def _field(self, name: str) -> tuple[Floats, tuple[int, ...]]:
         """Return the array of a field, and the place in it: of ``body_ipos hand 2`` the row of the body, and 2."""
         wanted = (
             f"{self._bodies.file}: '{name}' is not a number of the model. Write a field, the name of its element and, for a "
@@ -107,7 +107,7 @@ class MujocoProgram(Program):
             )
         return field, place
 
-    def _is_kept(self, field: NDArray[np.float64], place: tuple[int, ...]) -> bool:
+    def _is_kept(self, field: Floats, place: tuple[int, ...]) -> bool:
         """Return True for a number that can be set and affects the bodies."""
         import mujoco
 
@@ -192,7 +192,7 @@ def has_constraints(model: mujoco.MjModel) -> bool:
     )
 
 
-def _address(field: NDArray[np.float64], place: tuple[int, ...]) -> int:
+def _address(field: Floats, place: tuple[int, ...]) -> int:
     return int(field.ctypes.data) + sum(int(s) * i for s, i in zip(field.strides, place, strict=True))
 
 

@@ -277,11 +277,7 @@ def printable(text: str) -> str:
 
 
 def columns_of(
-    name: str,
-    shape: tuple[int, ...],
-    read: Load,
-    unit: str | None = None,
-    stored: Stored = AS_STORED,
+    name: str, shape: tuple[int, ...], read: Load, unit: str | None = None, stored: Stored = AS_STORED
 ) -> list[Channel | Refused]:
     """Return the channels of a stored array, one of a vector, one per column of a table, or why it has none."""
     long, size = [length for length in shape if length != 1], math.prod(shape)

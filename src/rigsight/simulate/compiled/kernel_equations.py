@@ -242,10 +242,7 @@ class KernelEquations:
 
     def _slope(self, expression: sp.Expr) -> sp.Expr:
         """Return the total derivative of an expression with respect to time, between events."""
-        along = {
-            **dict(zip(self.structure.states, self._rate_symbols, strict=True)),
-            TIME: sp.Integer(1),
-        }
+        along = {**dict(zip(self.structure.states, self._rate_symbols, strict=True)), TIME: sp.Integer(1)}
         for i in range(self.structure.n_inputs):
             value, rate, curvature = input_symbols(i)
             along |= {value: rate, rate: curvature}

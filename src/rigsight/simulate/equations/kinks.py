@@ -232,10 +232,7 @@ class Jumps:
     """
 
     def __init__(
-        self,
-        elimination: Elimination,
-        steps: Mapping[sp.Symbol, sp.Expr],
-        still: Mapping[sp.Symbol, sp.Expr],
+        self, elimination: Elimination, steps: Mapping[sp.Symbol, sp.Expr], still: Mapping[sp.Symbol, sp.Expr]
     ) -> None:
         self._elimination, self._steps = elimination, steps
         known = set().union(*(e.free_symbols for e in (*steps.values(), *still.values(), *still))) - set(

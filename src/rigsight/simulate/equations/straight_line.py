@@ -31,9 +31,7 @@ class StraightLine:
 
 
 def straight_line(
-    expressions: Iterable[sp.Expr],
-    steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
-    name: str = "shared",
+    expressions: Iterable[sp.Expr], steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS, name: str = "shared"
 ) -> StraightLine:
     """Return expressions in parts."""
     expressions = tuple(map(sp.sympify, expressions))
