@@ -29,8 +29,7 @@ from rigsight.records.formats.table_head import (
     LAST_LINES,
     MOST_HEAD,
     Dialect,
-    UnclearHeadError,
-    find_head,
+    HeadedText,
     is_comment,
     looks_like_names,
     sniff,
@@ -121,10 +120,7 @@ def find_layout(
     examined = [lines[number - 1] for number in kept[:MOST_HEAD]]
     last = [lines[number - 1] for number in kept[MOST_HEAD:][-LAST_LINES:]]
     dialect = sniff([*examined, *last], separator, decimal)
-    try:
-        head = find_head(dialect, [*examined, *last], wanted, header, lambda i: kept[i])
-    except UnclearHeadError as error:
-        raise InputError(f"{path.name}: {error}") from None
+    head = HeadedText(path.name, dialect, [*examined, *last], wanted, lambda i: kept[i]).head(header)
     first_row = kept[min(head.first_row, len(kept) - 1)]
     widest = lines[(first_row if head.names is None else kept[head.names]) - 1]
     width = len(dialect.cells(lines[first_row - 1]))
