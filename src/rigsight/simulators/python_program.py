@@ -10,8 +10,7 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.libraries.templates import template
-from rigsight.simulators.bodies import Bodies, Program
-from rigsight.simulators.leaf import forget
+from rigsight.simulators.bodies import Bodies, Program, forget
 
 Accelerations = Callable[..., Any]
 """``accelerations(q, v, forces, parameters)``: coordinates, rates and forces along coordinates, shape (n,) each, and parameters
