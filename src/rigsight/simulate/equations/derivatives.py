@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -253,7 +253,11 @@ class LinearForms:
 
     # Symbol -> the derivative that it denotes; they are the same for all changes.
     factors: Mapping[sp.Symbol, sp.Expr]
-    sums: tuple[sp.Expr, ...]  # change of each expression, in terms of factors, constants and changes
+    sums: tuple[sp.Expr, ...]  # change of each expression, in terms of factors, constants, changes and steps
+    # Of expressions that contain accelerations: symbols in the factors -> their expressions, in any order; and symbols in the
+    # sums -> theirs in factors, constants and changes, which are the changes of the accelerations.
+    parts: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    steps: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
 
 def linear_forms(
