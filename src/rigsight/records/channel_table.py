@@ -119,7 +119,8 @@ class _Selection:
         self, path: Path, file: ChannelFile, columns: Mapping[str, ColumnMapping], optional: Sequence[str]
     ) -> None:
         self._path, self._file, self._columns = path, file, columns
-        self._names = [channel.name for channel in file.channels]
+        # As the file has them: a number behind a name would hide its unit.
+        self._names = [channel.label for channel in file.channels]
         self._axes: dict[TimeAxis, Clock] = {}
         self.found = {
             signal: number
@@ -149,7 +150,7 @@ class _Selection:
         if len(matches) == 1:
             return matches[0]
         if matches:
-            listed = ", ".join(f"'{self._names[i]}'" for i in matches[:_LISTED])
+            listed = ", ".join(f"'{self._file.channels[i].name}'" for i in matches[:_LISTED])
             by = "with its group" if self._file.lines is None else "by its number, counted from 1"
             raise InputError(
                 f"{path.name}: {len(matches)} {word}s are called '{name}': {listed}; name the one for signal '{signal}' {by}."
