@@ -246,8 +246,8 @@ def test_columns_of_time_with_one_name_and_a_unit_are_clocks_of_their_own(tmp_pa
     header = "Time [s],Force [N],Time [s],Pos [m]"
     (tmp_path / "a.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
     record = read(tmp_path / "a.csv", {"u": "Force [N]", "x": "Pos [m]"})
-    assert "'Time [s]'" in record.notes[0]
-    assert "'Time [s]_2'" in record.notes[0]
+    assert "'Time [s]'" in " ".join(record.notes)
+    assert "'Time [s]_2'" in " ".join(record.notes)
 
 
 def test_a_waveform_without_a_start_beside_one_with_it_is_refused(tmp_path: Path) -> None:
