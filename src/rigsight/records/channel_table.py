@@ -47,7 +47,7 @@ def read_columns(
     """
     with _opened(path, columns, dialect or {}) as file:
         selection = _Selection(path, file, columns, optional)
-        possible = selection.possible_times(time_is_mapped) if dt is None else selection.shown_times()
+        possible = selection.possible_times(time_is_mapped) if dt is None else selection.shown_times(dt)
         times = {f"time {number}": number for numbers in possible.values() for number in numbers}
         # Signals of other rates end in other rows of a text, and blank cells fill the rest.
         file.ahead({**selection.found, **times}, len(times) > 1)
@@ -151,9 +151,9 @@ class _Selection:
             return matches[0]
         if matches:
             listed = ", ".join(f"'{self._file.channels[i].name}'" for i in matches[:_LISTED])
-            by = "with its group" if self._file.lines is None else "by its number, counted from 1"
+            by = f"with its group: {listed}" if self._file.lines is None else "by its number, counted from 1"
             raise InputError(
-                f"{path.name}: {len(matches)} {word}s are called '{name}': {listed}; name the one for signal '{signal}' {by}."
+                f"{path.name}: {len(matches)} {word}s are called '{name}'; name the one for signal '{signal}' {by}."
             )
         for refused in self._file.refused:
             if name in (refused.name, refused.name.rpartition("/")[2]):
@@ -220,17 +220,24 @@ class _Selection:
         finite = np.isfinite(samples)
         if finite.all():
             return
-        first, file = int(np.argmin(finite)), self._file
-        where = f"{file.row} {first + 1 if file.lines is None else file.lines[first]}"
-        count, cell = int(np.count_nonzero(~finite)), "sample" if file.lines is None else "cell"
+        first, count, lines = int(np.argmin(finite)), int(np.count_nonzero(~finite)), self._file.lines
+        if lines is None:
+            where, cell = f"channel '{label}', sample {first + 1}", "sample"
+        else:
+            where, cell = f"line {lines[first]}, column '{label}'", "cell"
         raise InputError(
-            f"{self._path.name}, {file.word} '{label}', {where}: {samples[first]} is not a finite number "
+            f"{self._path.name}, {where}: {samples[first]} is not a finite number "
             f"({count} such {cell}{'s' if count > 1 else ''}). Cut the record there or fill the gap before reading."
         )
 
-    def shown_times(self) -> dict[str, list[int]]:
+    def shown_times(self, dt: float) -> dict[str, list[int]]:
         """Return the times that the file shows to be those of its signals, if it shows one for each; else none."""
         shown = possible_clocks(self._names, self.found, {}, None)
+        if self._file.lines is not None:
+            # What the sample time replaces may be dates or other text, and is not read.
+            if len({tuple(own) for own in shown.values()}) > 1:
+                refuse_one_dt(self._path.name, dt, "clocks of their own")
+            return {}
         return shown if self.found and self._every_one(shown) else {}
 
     def _every_one(self, shown: Mapping[str, list[int]]) -> bool:

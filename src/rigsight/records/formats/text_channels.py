@@ -188,8 +188,7 @@ class TextColumns:
         self._path = path
         self._layout = find_layout(path, lines, kept, separator, decimal, header, comment, wanted)
         self._rows = kept[self._layout.n_above :]
-        if not self._rows:
-            raise InputError(f"{path.name} has a header but no rows of numbers below line {kept[-1]}.")
+        self._last = kept[-1]
         self._texts = [lines[number - 1] for number in self._rows]
         self._read: dict[int, Floats] = {}
 
@@ -206,6 +205,7 @@ class TextColumns:
 
     def tolerant(self) -> ChannelFile:
         """Return the columns for a look: a cell that is no number becomes NaN, so that it can be counted."""
+        self._check_rows()
         path, layout, n_rows = self._path, self._layout, len(self._rows)
         if n_rows * len(layout.names) > sum(map(len, self._texts)) + n_rows:
             raise InputError(
@@ -259,6 +259,7 @@ class TextColumns:
 
     def _ahead(self, needed: Mapping[str, int], blank: bool) -> None:
         """Read the columns that are needed at once; a cell may be blank if that is said."""
+        self._check_rows()
         if not needed:
             return
         self._check_widths()
@@ -310,6 +311,12 @@ class TextColumns:
                 f"{self._path.name}, line {number}, column '{self._layout.names[position]}': '{cell}' has a '{sign}' between "
                 f"thousands: in all {len(grouped)} numbers with a '{sign}' three digits follow, and others have none. Export the "
                 "column without signs between thousands."
+            )
+
+    def _check_rows(self) -> None:
+        if not self._rows:
+            raise InputError(
+                f"{self._path.name} has a header but no rows of numbers below line {self._last}."
             )
 
     def _check_widths(self) -> None:
