@@ -23,7 +23,7 @@ from rigsight.identify.fit import fit_problem
 from rigsight.identify.fit.coordinates import FINE_STEP, STEP, Coordinates
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.libraries import library_cache
-from rigsight.libraries.compiler import c_compilers, library
+from rigsight.libraries.library_cache import c_compilers, library
 from rigsight.records import Record
 from rigsight.records.record import Hold
 from rigsight.rigs import RUNNING_GEAR
@@ -33,7 +33,7 @@ from rigsight.simulate import (
     compose,
     record_input,
 )
-from rigsight.simulate.compiled import kernel_cache
+from rigsight.simulate.compiled import kernel
 from rigsight.simulate.compiled.kernel import Kernel
 from rigsight.simulate.compiled.kernel_source import KernelEquations, kernel_source
 from rigsight.units import characteristic_value
@@ -72,12 +72,12 @@ def carried(chosen: bool | None) -> Iterator[None]:
     rule = KernelEquations.carries_tangents
     if chosen is not None:
         KernelEquations.carries_tangents = property(lambda _: chosen)  # type: ignore[assignment]
-    kernel_cache._by_identity.clear()
+    kernel._by_identity.clear()
     try:
         yield
     finally:
         KernelEquations.carries_tangents = rule  # type: ignore[method-assign]
-        kernel_cache._by_identity.clear()
+        kernel._by_identity.clear()
 
 
 class Case:
@@ -103,7 +103,7 @@ class Case:
         self.kernels: dict[bool, Kernel] = {}
         for kind in (False, True):
             with carried(kind):
-                self.kernels[kind] = kernel_cache.kernel_of(structure)
+                self.kernels[kind] = kernel.kernel_of(structure)
         p, x0 = self.place(self.theta)
         chosen = choose_substeps(structure, self.held, p, x0, N_SAMPLES, 1e-4)
         self.substeps = chosen.per_piece(self.held.n_pieces)

@@ -11,7 +11,7 @@ from rigsight.effects import Effect
 from rigsight.identify import OpenFactor, open_factor, weighed_spring
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.simulate.drift import can_drift
+from rigsight.simulate.equilibrium import can_drift
 
 
 @dataclass(frozen=True, eq=False)

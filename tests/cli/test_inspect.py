@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from rigsight.records import ColumnMapping
+from rigsight.records.channel_table import read_columns
 from rigsight.records.formats.channel import Channel, ChannelFile
 from rigsight.records.formats.known import FORMATS as KNOWN
-from rigsight.records.formats.read_csv import read_csv
 from rigsight.rigs import RIGS
 
 from ..records.formats import FORMATS, Write, write_matlab, write_tdms, write_text
@@ -66,7 +66,8 @@ def test_channels_are_listed_by_names_that_a_campaign_takes(tmp_path: Path, run:
     assert code == 0, stderr
     names = [channel["name"] for channel in json.loads(stdout)["channels"]]
     for column, name in enumerate(names):
-        read = read_csv(file, {"x": ColumnMapping(name)})
+        columns = {"t": ColumnMapping(1), "x": ColumnMapping(name)}
+        read = read_columns(file, columns, time_is_mapped=True)
         np.testing.assert_allclose(read.values["x"], rows[:, column])
     assert len(set(names)) == 4
 

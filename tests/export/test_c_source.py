@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.export import export_model
-from rigsight.libraries.compiler import c_compilers
-from rigsight.libraries.library_cache import kernel_options
+from rigsight.libraries.library_cache import c_compilers, kernel_options
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.kernel_source import accurate_integrator
 

@@ -13,10 +13,10 @@ from rigsight.effects.symbols import v, x
 from rigsight.export import TARGETS, export_model
 from rigsight.export.equations import exported
 from rigsight.export.targets import RESERVED
+from rigsight.libraries.templates import template
 from rigsight.parameters import Parameter
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
-from rigsight.simulate.compiled.c_functions import template
 from rigsight.simulate.compiled.kernel_source import ACCURATE
 from rigsight.simulate.model import Model
 
@@ -52,7 +52,7 @@ def test_names_are_words_that_no_language_has_and_occur_once():
 
 
 def test_no_name_is_a_macro_of_the_c_text():
-    kernel = [template(name) for name in ("equations.c.txt", *ACCURATE)]
+    kernel = [template("simulate", name) for name in ("equations.c.txt", *ACCURATE)]
     own = [
         files("rigsight.export").joinpath("templates", f"{name}.c.txt").read_text("utf-8")
         for name in ("model", "fmi", "fmi2", "fmi3")

@@ -11,8 +11,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.export import export_model
-from rigsight.libraries.compiler import c_compilers
-from rigsight.libraries.library_cache import kernel_options
+from rigsight.libraries.library_cache import c_compilers, kernel_options
 
 from ..tiers import slow_but
 
@@ -269,7 +268,7 @@ def test_its_binary_is_for_every_processor_of_its_kind(case_named, monkeypatch: 
 @pytest.mark.parametrize("target", VERSIONS)
 def test_without_a_compiler_the_way_out_is_named(target: str, case_named, monkeypatch: pytest.MonkeyPatch):
     model = case_named("linear axis").model
-    monkeypatch.setattr("rigsight.libraries.compiler.c_compilers", lambda: ())
+    monkeypatch.setattr("rigsight.libraries.library_cache.c_compilers", lambda: ())
     with pytest.raises(InputError, match=r"No C compiler was found.*--source-only"):
         export_model(model, target, source="model.json")
     monkeypatch.undo()

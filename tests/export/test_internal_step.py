@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.export.internal_step import LONGEST, OSCILLATION, internal_step
+from rigsight.export.fixed_step import LONGEST, OSCILLATION, internal_step
 from rigsight.simulate.model import Model
 
 

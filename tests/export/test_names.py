@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rigsight.effects import effect_named, placed
 from rigsight.export import TARGETS, export_model
 from rigsight.export.python_function import WORDS
-from rigsight.libraries.compiler import c_compilers
+from rigsight.libraries.library_cache import c_compilers
 from rigsight.records import Record
 from rigsight.rigs import Rig, read_rig_file
 from rigsight.rigs.reading.expressions import FUNCTIONS

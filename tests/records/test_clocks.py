@@ -241,6 +241,15 @@ def test_one_sample_time_is_refused_for_columns_of_several_clocks(tmp_path: Path
         read(tmp_path / "a.csv", {"u": ColumnMapping("Force", time=1), "x": "Pos"}, dt=0.01)
 
 
+def test_columns_of_time_with_one_name_and_a_unit_are_clocks_of_their_own(tmp_path: Path) -> None:
+    rows = [f"{t},{force(t)},{t + 0.003},{position(t)}" for t in DRIVE]
+    header = "Time [s],Force [N],Time [s],Pos [m]"
+    (tmp_path / "a.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    record = read(tmp_path / "a.csv", {"u": "Force [N]", "x": "Pos [m]"})
+    assert "'Time [s]'" in " ".join(record.notes)
+    assert "'Time [s]_2'" in " ".join(record.notes)
+
+
 def test_a_waveform_without_a_start_beside_one_with_it_is_refused(tmp_path: Path) -> None:
     nptdms = pytest.importorskip("nptdms")
     start = {"wf_start_time": np.datetime64("2024-03-01T12:00:00", "us")}
@@ -285,7 +294,7 @@ CASES = Path(__file__).parents[3] / "shared" / "cases"
 )
 def test_reported_files_are_joined_by_their_clocks(case: str, late: int) -> None:
     """Both signals are as the file holds them, shifted against each other by the offset of their clocks."""
-    from rigsight.records.formats.csv_channels import open_measurement
+    from rigsight.records.channel_summary import open_measurement
 
     record = read_campaign(CASES / case).records[0]
     with open_measurement(record.source) as file:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -453,6 +453,7 @@ def test_too_many_samples_are_refused_before_they_are_read(
 
 def test_too_large_a_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_matlab(tmp_path / "run.mat", rows(), {})
-    monkeypatch.setattr("rigsight.records.formats.channel_file.LARGEST_FILE", 10)
+    small = tuple(replace(known, largest=10) for known in KNOWN)
+    monkeypatch.setattr("rigsight.records.formats.known.FORMATS", small)
     with pytest.raises(InputError, match="more than the 1e-08 GB"):
         read(tmp_path / "run.mat")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.records.periods import repeated_period, same_signal
+from rigsight.records.signals import repeated_period, same_signal
 
 
 def test_a_repeated_noise_has_its_period() -> None:

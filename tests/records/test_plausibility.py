@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.records.plausibility import clipping, is_constant
+from rigsight.records.signals import clipping, is_constant
 
 T = 0.005 * np.arange(4000)
 SWEEP = np.sin(2 * np.pi * (0.5 * T + 0.05 * T**2))

@@ -7,7 +7,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping
-from rigsight.records.formats.read_csv import read_csv
+from rigsight.records.channel_table import read_columns
 
 ROWS = np.array([[0.0, 1.5, -2.25], [0.1, 1e-3, 3.5], [0.2, -7.0, 4.125], [0.3, 0.5, 1.0]])
 BY_NAME = {name: ColumnMapping(name) for name in "tux"}
@@ -24,7 +24,9 @@ def read(
 ) -> np.ndarray:
     path = tmp_path / "log.csv"
     path.write_bytes(content.encode() if isinstance(content, str) else content)
-    return np.column_stack(list(read_csv(path, columns, **options).values.values()))
+    return np.column_stack(
+        list(read_columns(path, columns, time_is_mapped=True, dialect=options).values.values())
+    )
 
 
 SEPARATORS = [",", ";", "\t", "|", " ", "  ", ", ", " ; "]
@@ -64,7 +66,8 @@ def test_dialects_give_the_same_numbers(tmp_path: Path, content: str | bytes) ->
 
 def test_columns_of_a_file_without_header_go_by_number(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(tmp_path, text(header=""), BY_NUMBER), ROWS)
-    np.testing.assert_allclose(read(tmp_path, text(header=""), {"u": ColumnMapping("2")}), ROWS[:, [1]])
+    two = {"t": ColumnMapping(1), "u": ColumnMapping("2")}
+    np.testing.assert_allclose(read(tmp_path, text(header=""), two), ROWS[:, :2])
 
 
 def test_a_header_of_numbers_can_be_told(tmp_path: Path) -> None:
@@ -75,13 +78,15 @@ def test_a_header_of_numbers_can_be_told(tmp_path: Path) -> None:
 
 def test_columns_that_nobody_asked_for_may_hold_anything(tmp_path: Path) -> None:
     content = "t,state,u\n" + "".join(f"{i},run {i},{i}\n" for i in range(5))
-    np.testing.assert_allclose(read(tmp_path, content, {"u": ColumnMapping("u")})[:, 0], np.arange(5))
+    np.testing.assert_allclose(
+        read(tmp_path, content, {"t": ColumnMapping("t"), "u": ColumnMapping("u")})[:, 1], np.arange(5)
+    )
 
 
 def test_units_row_is_noted(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(text(header="t,u,x\ns,mA,mm\n"))
-    (note,) = read_csv(path, BY_NAME).notes
+    (note,) = read_columns(path, BY_NAME, time_is_mapped=True).notes
     assert "line 2" in note
     assert "mA" in note
 
@@ -89,7 +94,7 @@ def test_units_row_is_noted(tmp_path: Path) -> None:
 def test_rows_know_their_line_in_the_file(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(text(header="# remark\n\nt,u,x\n"))
-    np.testing.assert_array_equal(read_csv(path, BY_NAME).lines, [4, 5, 6, 7])
+    np.testing.assert_array_equal(read_columns(path, BY_NAME, time_is_mapped=True).lines, [4, 5, 6, 7])
 
 
 def test_scale_and_offset_give_si() -> None:
@@ -102,7 +107,7 @@ def test_long_files_keep_every_row(tmp_path: Path) -> None:
     block = "".join(f"{i},{i % 7},{i % 11}\n" for i in range(1000))
     path = tmp_path / "long.csv"
     path.write_text("t,u,x\n" + block * 300)
-    assert read_csv(path, BY_NAME).values["u"].size == 300_000
+    assert read_columns(path, BY_NAME, time_is_mapped=True).values["u"].size == 300_000
 
 
 BROKEN: list[tuple[str, str | bytes, dict[str, object], list[str]]] = [
@@ -151,15 +156,15 @@ def test_column_number_beyond_the_last_is_refused(tmp_path: Path) -> None:
 
 def test_missing_file_and_folder_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
-        read_csv(tmp_path / "none.csv", BY_NAME)
+        read_columns(tmp_path / "none.csv", BY_NAME, time_is_mapped=True)
     with pytest.raises(InputError, match="is a folder"):
-        read_csv(tmp_path, BY_NAME)
+        read_columns(tmp_path, BY_NAME, time_is_mapped=True)
 
 
 def test_too_large_a_file_is_refused_before_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rigsight.records.formats.text_file.LARGEST_FILE", 10)
+    monkeypatch.setattr("rigsight.records.formats.text_channels.LARGEST_FILE", 10)
     with pytest.raises(InputError, match="more than the 1e-08 GB"):
         read(tmp_path, text())
 

@@ -11,8 +11,8 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping, ReadingOptions, Record, read_record
+from rigsight.records.formats.channel import Stored, stored_by
 from rigsight.records.formats.channel_file import open_channels
-from rigsight.records.formats.stored_numbers import Stored, stored_by
 
 from ..tiers import slow_but
 

@@ -9,9 +9,9 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping
+from rigsight.records.channel_summary import open_measurement
+from rigsight.records.channel_table import read_columns
 from rigsight.records.column_mapping import Columns
-from rigsight.records.formats.csv_channels import open_measurement
-from rigsight.records.formats.read_csv import read_csv
 
 T = 0.01 * np.arange(80)
 TABLE = {"t": T, "u": np.sin(9.0 * T), "x": 1.0 + np.cos(7.0 * T)}
@@ -31,7 +31,7 @@ def read(
     path = tmp_path / "log.csv"
     path.write_text(text, encoding="utf-8")
     columns = {signal: ColumnMapping(name) for signal, name in zip(TABLE, names, strict=True)}
-    return read_csv(path, columns, **options)  # type: ignore[arg-type]
+    return read_columns(path, columns, time_is_mapped=True, dialect=options)
 
 
 def agrees(found: Columns) -> bool:

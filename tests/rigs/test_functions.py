@@ -12,7 +12,7 @@ import sympy as sp
 from rigsight.discover.joints.linearized_motion import MotionEquations
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
-from rigsight.export.internal_step import internal_step
+from rigsight.export.fixed_step import internal_step
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.start.linearized_responses import LinearizedResponses
 from rigsight.identify.start.weak_equations import WeakEquations
@@ -22,8 +22,8 @@ from rigsight.rigs.evaluation import array_function
 from rigsight.rigs.reading.expressions import FUNCTIONS
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
-from rigsight.simulate.drift import can_drift
 from rigsight.simulate.equations.derivatives import slope_functions
+from rigsight.simulate.equilibrium import can_drift
 from rigsight.simulate.model import Model
 from rigsight.workflow.run.variation_sweep import Pair, variation_sweep
 

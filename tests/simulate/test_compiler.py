@@ -14,8 +14,8 @@ from types import SimpleNamespace
 import pytest
 
 from rigsight.errors import InputError, MachineError
-from rigsight.libraries import compiler as compiling
-from rigsight.libraries.compiler import Compiler, c_compilers, first_library, library
+from rigsight.libraries import library_cache as compiling
+from rigsight.libraries.library_cache import Compiler, c_compilers, first_library, library
 
 TEXT = {"one.c": '#include "two.h"\nint one(void) { return TWO - 1; }\n', "two.h": "#define TWO 2\n"}
 on_posix = pytest.mark.skipif(os.name == "nt", reason="a shell script stands for the compiler")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigsight.rigs import RIGS
-from rigsight.simulate.drift import can_drift
+from rigsight.simulate.equilibrium import can_drift
 
 ROLLS_AWAY = {"cart_pendulum"}
 

@@ -19,10 +19,10 @@ import rigsight
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.libraries import library_cache
-from rigsight.libraries.compiler import c_compilers, library
+from rigsight.libraries.library_cache import c_compilers, library
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
-from rigsight.simulate.compiled import kernel_cache
+from rigsight.simulate.compiled import kernel
 from rigsight.simulate.compiled.kernel_source import kernel_source
 
 MOTION = """
@@ -35,7 +35,7 @@ from rigsight.records.record import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
 from rigsight.libraries import library_cache
-from rigsight.simulate.compiled import kernel_cache
+from rigsight.simulate.compiled import kernel
 def motion():
     t = 5e-3 * np.arange(4000)
     record = Record(name="r", dt=5e-3, signals={"u": 0.5 * np.sin(t + 0.6 * t**2)}, units={})
@@ -43,7 +43,7 @@ def motion():
         v=1.0, r_0=0.1, b=0.3, k_tau=0.27, J_z=0.56, k_c=81.0, k_d=2.0, l_0=0.25, c_y=0.98, psi_off=1e-3, y_off=1e-3
     )
     structure = compose(RUNNING_GEAR, [effect_named("coulomb_friction")])
-    before = kernel_cache.compiled(structure)
+    before = kernel.compiled(structure)
     psi = simulate(structure, {**values, "T_c": 0.02}, record)["psi"]
     return f"{before} {hashlib.sha256(psi.tobytes()).hexdigest()}"
 """
@@ -51,7 +51,7 @@ ONCE = f"{MOTION}print(motion())"
 WITH_EACH_CACHE = f"""{MOTION}
 for folder in sys.argv[1:]:
     os.environ[library_cache.CACHE_VARIABLE] = folder
-    kernel_cache._kernels.clear()
+    kernel._kernels.clear()
     print(motion())
 """
 
@@ -86,7 +86,7 @@ def motion_here() -> list[str]:
 def fresh_cache(tmp_path, monkeypatch):
     """Point at an empty folder and forget what is loaded in this process."""
     monkeypatch.setenv(library_cache.CACHE_VARIABLE, str(tmp_path / "kernels"))
-    monkeypatch.setattr(kernel_cache, "_kernels", {})
+    monkeypatch.setattr(kernel, "_kernels", {})
     return tmp_path / "kernels"
 
 
@@ -128,7 +128,7 @@ def test_other_equations_are_another_file(fresh_cache):
     halved = replace(delay, delay=delay.delay / 2)
     texts = {kernel_source(compose(AXIS, effects)) for effects in ((), (delay,), (halved,))}
     assert len(texts) == 3
-    files = {kernel_cache.kernel_of(compose(AXIS, effects)).path for effects in ((), (delay,), (halved,))}
+    files = {kernel.kernel_of(compose(AXIS, effects)).path for effects in ((), (delay,), (halved,))}
     assert len(files) == 3
 
 
@@ -148,7 +148,7 @@ def test_other_kernels_do_not_wait_for_one_that_is_compiled_and_the_same_one_is_
     delay = effect_named("input_delay")
     structures = [compose(AXIS), replace(compose(AXIS)), compose(AXIS, [delay]), compose(AXIS, [delay])]
     with ThreadPoolExecutor(len(structures)) as threads:
-        kernels = list(threads.map(kernel_cache.kernel_of, structures))
+        kernels = list(threads.map(kernel.kernel_of, structures))
     assert len(started) == 2
     assert kernels[0] is kernels[1]
     assert kernels[2] is kernels[3]
@@ -157,11 +157,11 @@ def test_other_kernels_do_not_wait_for_one_that_is_compiled_and_the_same_one_is_
 
 def test_the_code_of_another_processor_is_not_run(fresh_cache, monkeypatch):
     structure = compose(AXIS)
-    own = kernel_cache.kernel_of(structure).path
-    kernel_cache._kernels.clear()
+    own = kernel.kernel_of(structure).path
+    kernel._kernels.clear()
     monkeypatch.setattr(library_cache, "processor", lambda: "another")
-    assert not kernel_cache.compiled(compose(AXIS))
-    assert kernel_cache.kernel_of(structure).path != own
+    assert not kernel.compiled(compose(AXIS))
+    assert kernel.kernel_of(structure).path != own
 
 
 @pytest.mark.slow
@@ -193,9 +193,9 @@ def test_cache_that_cannot_be_written_is_explained(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder", "utf-8")
     monkeypatch.setenv(library_cache.CACHE_VARIABLE, str(blocked / "kernels"))
-    monkeypatch.setattr(kernel_cache, "_kernels", {})
+    monkeypatch.setattr(kernel, "_kernels", {})
     with pytest.raises(InputError, match=library_cache.CACHE_VARIABLE):
-        kernel_cache.kernel_of(compose(AXIS))
+        kernel.kernel_of(compose(AXIS))
 
 
 def test_a_full_disk_leaves_no_part_of_a_kernel(fresh_cache, monkeypatch):
@@ -204,7 +204,7 @@ def test_a_full_disk_leaves_no_part_of_a_kernel(fresh_cache, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(InputError, match=r"No space left.*RIGSIGHT_CACHE_DIR"):
-        kernel_cache.kernel_of(compose(AXIS, [effect_named("cubic_stiffness")]))
+        kernel.kernel_of(compose(AXIS, [effect_named("cubic_stiffness")]))
     assert [path for path in fresh_cache.rglob("*") if path.is_file()] == []
 
 
@@ -213,12 +213,12 @@ def test_kernels_of_somebody_else_that_may_only_be_read_are_used_and_others_told
         raise OSError(errno.EROFS, "Read-only file system")
 
     structure = compose(AXIS, [effect_named("cubic_stiffness")])
-    kernel_cache.kernel_of(structure)
-    kernel_cache._kernels.clear()
+    kernel.kernel_of(structure)
+    kernel._kernels.clear()
     monkeypatch.setattr("rigsight.libraries.library_cache.tempfile.mkstemp", unwritable)
-    kernel_cache.kernel_of(structure)
+    kernel.kernel_of(structure)
     with pytest.raises(InputError, match=r"Read-only.*Set RIGSIGHT_CACHE_DIR"):
-        kernel_cache.kernel_of(compose(AXIS, [effect_named("end_stop")]))
+        kernel.kernel_of(compose(AXIS, [effect_named("end_stop")]))
 
 
 def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
@@ -235,7 +235,7 @@ def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
 def test_simulation_is_the_same_from_any_cache(fresh_cache, axis_values, make_record):
     record = make_record(np.sin(0.1 * np.arange(100)))
     first = simulate(compose(AXIS), axis_values, record)["x"]
-    kernel_cache._kernels.clear()
+    kernel._kernels.clear()
     np.testing.assert_array_equal(simulate(compose(AXIS), axis_values, record)["x"], first)
 
 

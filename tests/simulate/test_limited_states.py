@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.effects import effect_named
-from rigsight.libraries.compiler import c_compilers, library, library_suffix
+from rigsight.libraries.library_cache import c_compilers, library, library_suffix
 from rigsight.records.record import Record
 from rigsight.rigs import AXIS, ELEMENT
 from rigsight.simulate import compose, parameter_vector, record_input, rest_state, simulate, simulate_sets

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.simulate.input_hold import hold_input
-from rigsight.simulate.linear_prediction import continued
+from rigsight.simulate.input_hold import continued, hold_input
 
 DT = 5e-3
 T = DT * np.arange(-60, 1060)

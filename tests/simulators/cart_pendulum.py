@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from fmpy import platform, sharedLibraryExtension
 
-from rigsight.libraries.compiler import c_compilers, library
+from rigsight.libraries.library_cache import c_compilers, library
 
 GRAVITY = 9.81
 MASSES = {"m_c": 0.8, "m_p": 0.2}

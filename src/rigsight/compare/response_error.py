@@ -21,8 +21,8 @@ from rigsight.identify.transfer.record_response import Method, driven_band, reco
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.metrics import rms
 from rigsight.records import Record
-from rigsight.records.plausibility import is_constant, moves_beyond_noise
 from rigsight.records.record import Hold
+from rigsight.records.signals import is_constant, moves_beyond_noise
 from rigsight.rigs import Rig
 
 _CUTS = (80.0, 30.0)

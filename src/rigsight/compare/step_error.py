@@ -17,8 +17,7 @@ from scipy.stats import norm
 from rigsight.errors import InputError
 from rigsight.metrics import rms
 from rigsight.records import Record
-from rigsight.records.periods import roughness
-from rigsight.records.plausibility import is_constant
+from rigsight.records.signals import is_constant, roughness
 
 DEFAULT_SECONDS = 4.0
 _BEFORE = 5.0

@@ -17,13 +17,12 @@ from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, T
 from rigsight.discover.selection import Selection, criterion, next_terms
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
-from rigsight.records.periods import same_signal
 from rigsight.records.record import Record
+from rigsight.records.signals import same_signal
 from rigsight.simulate import Structure
 from rigsight.simulate.model import Model
-from rigsight.simulate.printing.latex import latex_equation
+from rigsight.simulate.printing.notation import latex_equation, text_equation
 from rigsight.simulate.printing.shown import ShownEquation, flat_equations
-from rigsight.simulate.printing.text import text_equation
 
 _DIGITS = 4
 """Significant digits of numbers in an effect's equation; parameters are written as symbols."""

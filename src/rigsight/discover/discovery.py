@@ -30,8 +30,8 @@ from rigsight.identify import (
     swallowed_by_offsets,
     without_offsets,
 )
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, special_values
 

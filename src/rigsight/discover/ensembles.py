@@ -36,7 +36,7 @@ from rigsight.effects.symbols import derivative
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats
 from rigsight.rigs import evaluated
-from rigsight.simulate.printing.text import TermPrinter
+from rigsight.simulate.printing.notation import TermPrinter
 
 _FORCE = sp.Symbol("F", real=True)
 _RATE = sp.Symbol("x'", real=True)

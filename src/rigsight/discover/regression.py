@@ -22,8 +22,8 @@ from rigsight.campaign import Campaign
 from rigsight.discover.motion import Motion, Rows
 from rigsight.errors import InputError
 from rigsight.identify import IdleThreads
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Floats, Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 
 _WINDOW = 0.75

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-
 import sympy as sp
 
-from rigsight.export.at_rest import state_at_rest
-from rigsight.export.description import filled, header_lines, indented
+from rigsight.export.description import header_lines, indented
 from rigsight.export.equations import Exported
+from rigsight.export.fixed_step import state_at_rest
 from rigsight.export.python_function import (
     code_names,
     parameter_entries,
@@ -17,6 +15,7 @@ from rigsight.export.python_function import (
     unpacked_parameters,
     unpacked_states,
 )
+from rigsight.libraries.templates import filled, template
 from rigsight.simulate.printing.language import PYTHON
 
 _KINKS = (
@@ -31,9 +30,8 @@ def control_system(exported: Exported, source: str, name: str) -> str:
     structure = exported.structure
     inputs = [quantity.name for quantity in exported.inputs]
     unpack = indented(unpacked_parameters(exported, _own_words(exported)))
-    template = files("rigsight.export").joinpath("templates/control.py.txt").read_text("utf-8")
     return filled(
-        template,
+        template("export", "control.py.txt"),
         {
             "TITLE": exported.title[0].upper() + exported.title[1:],
             "HEADER": "\n".join(header_lines(exported, source, with_parameters=False)),

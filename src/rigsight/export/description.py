@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import Any
 
 from rigsight.export.equations import Exported
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.printing.names import rate_symbol
+from rigsight.simulate.printing.notation import text, text_equation
 from rigsight.simulate.printing.shown import shown_equations
-from rigsight.simulate.printing.text import text, text_equation
 
-HOLDS: dict[Hold, str] = {
-    "zoh": "constant from each sample to the next",
-    "foh": "linear between samples",
-}
+HOLDS: dict[Hold, str] = {"zoh": "constant from each sample to the next", "foh": "linear between samples"}
 MOTION_HOLD = "the cubic through values and rates at both ends of a sample time"
 
 
@@ -97,13 +93,6 @@ def header_lines(exported: Exported, source: str, *, with_parameters: bool = Tru
     if with_parameters:
         lines += ["", "Parameters:", *(f"  {line}" for line in parameter_lines(exported))]
     return lines
-
-
-def filled(template: str, fragments: dict[str, Any]) -> str:
-    """Return a template with its marks ``<<NAME>>`` replaced."""
-    for key, fragment in fragments.items():
-        template = template.replace(f"<<{key}>>", str(fragment))
-    return template
 
 
 def indented(lines: list[str], level: int = 1) -> str:

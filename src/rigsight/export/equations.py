@@ -1,4 +1,4 @@
-"""Equations, parameters and names that every export contains, independent of its language."""
+"""Equations, parameters and names that every export contains, independent of its language, and its equilibrium."""
 
 from __future__ import annotations
 
@@ -9,19 +9,53 @@ from dataclasses import dataclass
 import sympy as sp
 
 from rigsight.effects import Place
+from rigsight.effects.symbols import clamp
 from rigsight.errors import InputError
-from rigsight.export.equilibrium import Balance, balance
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector
 from rigsight.simulate.equations.binder import state_symbol
 from rigsight.simulate.equations.composition import without_vanished_effects
+from rigsight.simulate.equations.derivatives import slope
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
+from rigsight.simulate.equilibrium import has_raisable_damping, residuals_at_rest
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
-from rigsight.simulate.rest import has_raisable_damping
 from rigsight.units import unit_text
+
+NO_START = "with friction or hysteresis the equilibrium is known only for zero inputs: begin with these, or give initial_state"
+"""Message of a file if another equilibrium is requested."""
+
+
+def words(text: str) -> frozenset[str]:
+    """Return the words of a text."""
+    return frozenset(text.split())
+
+
+_C_WORDS = words(
+    """auto break case char const continue default do double else enum extern float for goto if inline int long register
+    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"""
+)
+
+_OF_TEMPLATES = words(
+    """input_value input_rate input_curvature friction_sign sign_of rates switches outputs limits modes state math np control
+    numbers given max min abs sign pi eps delay"""
+)
+
+_C_MACROS = words(
+    """BUFSIZ EOF EXIT_FAILURE EXIT_SUCCESS EXPORTED FILENAME_MAX FOPEN_MAX FP_INFINITE FP_NAN FP_NORMAL FP_SUBNORMAL FP_ZERO
+    HUGE_VAL HUGE_VALF HUGE_VALL INFINITY L_tmpnam MATH_ERREXCEPT MATH_ERRNO NAN NULL RAND_MAX SEEK_CUR SEEK_END SEEK_SET
+    TMP_MAX bool linux math_errhandling stderr stdin stdout unix
+    DEPENDENT_MODES DIFFERENCE HAS_DELAY HAS_LIMITS LEAST_DIFFERENCE MAX_STEPS MOST_DEFECT OFTEN RARE ROLLED SHORTEST_DEFECT
+    N_COMPUTED N_DEPENDENT N_IN N_INPUTS N_MODES N_OUT N_PARAMETERS N_SLOPES N_STATES N_UNKNOWN N_VALUES N_WATCHED ROUNDING
+    SIZE_CONSTANTS SIZE_INPUTS SIZE_MODES SIZE_STATES SIZE_WATCHED VELOCITY AGREED FRICTION_IS_SHOWN FRICTION_MODES
+    FRICTION_VELOCITIES GENERATIONS INDEPENDENT MOST_REPEATS NOISE N_DEGREES N_FRICTIONS N_LATE PROBE READS_LATE_RATE
+    SIZE_FRICTIONS"""
+)
+
+SHARED = _C_WORDS | _C_MACROS | _OF_TEMPLATES
+"""What the text of the engine and the templates use; the words of a language stand in the module that writes it."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +91,11 @@ class Rest:
     stiffness: sp.Expr
     damping: str  # name of the damping parameter, raised to the critical value on the way to rest
     silenced: tuple[str, ...]  # names of the parameters of disturbances, zero on the way to rest
+
+    @property
+    def expressions(self) -> list[sp.Expr]:
+        """Rest position, inertia and stiffness."""
+        return [self.displacement, self.inertia, self.stiffness]
 
 
 @dataclass(frozen=True)
@@ -242,3 +281,46 @@ def harmless(text: str) -> str:
     """Return text that ends no comment and no string of any target, on one line."""
     plain = "".join(c if c.isprintable() else " " for c in text).replace('"', "'").replace("\\", "/")
     return " ".join(plain.replace("*/", "* /").split())
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What is zero at the static equilibrium, of unknown states, inputs and parameters."""
+
+    # Indices of the states that are sought: all but the velocities and those that the rig's file gives.
+    unknown: tuple[int, ...]
+    residuals: tuple[sp.Expr, ...]  # for each of them what has to vanish at rest
+    slopes: tuple[tuple[sp.Expr, ...], ...]  # derivatives of the residuals by the unknown states, row by row
+    # Expression of parameters of each state that is given, by its index; the others start at 0.
+    start: dict[int, sp.Expr]
+    # True where friction or hysteresis holds what the way of the inputs left: then only that without input is
+    # known.
+    remembers: bool
+
+    @property
+    def expressions(self) -> list[sp.Expr]:
+        """The residuals, then their derivatives row by row."""
+        return [*self.residuals, *(slope for row in self.slopes for slope in row)]
+
+
+def balance(structure: Structure) -> Balance | None:
+    """Return what is zero at the equilibrium of a rig, as `rigsight.simulate.equilibrium` has it; None without a state."""
+    states = structure.states
+    if not states:
+        return None
+    own = dict(zip(structure.names, structure.parameter_symbols, strict=True))
+    start = {
+        states.index(symbol): value.xreplace({s: own[s.name] for s in value.free_symbols})
+        for symbol, value in structure.rig.mechanism.initial.items()
+        if symbol in states
+    }
+    before = [start.get(i, sp.S.Zero) for i in range(len(states))]
+    residuals, memories = residuals_at_rest(structure, before, clamp)
+    unknown = tuple(i for i in residuals if i not in start)
+    return Balance(
+        unknown,
+        tuple(residuals[i] for i in unknown),
+        tuple(tuple(slope(residuals[row], states[i]) for i in unknown) for row in unknown),
+        start,
+        bool(memories.intersection(unknown) or freeze(structure).frictions),
+    )

@@ -8,16 +8,15 @@ import uuid
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from typing import Literal
 from xml.etree import ElementTree as ET
 
 from rigsight.errors import InputError
 from rigsight.export.c_source import c_source
-from rigsight.export.description import equation_lines, filled, hold_text, made_by
+from rigsight.export.description import equation_lines, hold_text, made_by
 from rigsight.export.equations import Exported
-from rigsight.libraries.compiler import first_library, library_suffix
-from rigsight.libraries.library_cache import OPTIONS
+from rigsight.libraries.library_cache import OPTIONS, first_library, library_suffix
+from rigsight.libraries.templates import filled, template
 
 _NO_UNIT = "1"
 
@@ -56,7 +55,9 @@ def fmu(
         "UPPER": name.upper(),
         "NAME": name,
     }
-    wrapper = filled(_template(f"fmi{version}.c.txt"), {"UNIT": _template("fmi.c.txt"), **fragments})
+    wrapper = filled(
+        template("export", f"fmi{version}.c.txt"), {"UNIT": template("export", "fmi.c.txt"), **fragments}
+    )
     sources = {f"fmi{version}_{name}.c": wrapper, f"{name}.c": model}
     members: dict[str, str | bytes] = {
         "modelDescription.xml": model_description(exported, source, name, guid, version),
@@ -67,10 +68,6 @@ def fmu(
     if not source_only:
         members[f"binaries/{_folder(version)}/{name}{library_suffix()}"] = _binary(sources)
     return _zipped(members)
-
-
-def _template(name: str) -> str:
-    return files("rigsight.export").joinpath("templates", name).read_text("utf-8")
 
 
 def _binary(sources: Mapping[str, str]) -> bytes:

@@ -6,7 +6,7 @@ import re
 
 from rigsight.export.description import made_by
 from rigsight.export.equations import Exported
-from rigsight.simulate.printing.latex import LatexPrinter, latex_equation, latex_name, latex_text
+from rigsight.simulate.printing.notation import LatexPrinter, latex_equation, latex_name, latex_text
 from rigsight.simulate.printing.shown import ShownEquations, shown_equations
 
 _THIN = r"\,"

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 
-from rigsight.export.at_rest import state_at_rest
 from rigsight.export.description import header_lines
-from rigsight.export.equations import Exported, Quantity
-from rigsight.export.reserved_words import words
+from rigsight.export.equations import Exported, Quantity, words
+from rigsight.export.fixed_step import state_at_rest
 from rigsight.simulate.equations.straight_line import StraightLine, straight_line
 from rigsight.simulate.equations.structure import INPUT
 from rigsight.simulate.printing.language import MODELICA, part_name

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Mapping, Set
-from importlib.resources import files
 
 import sympy as sp
 
-from rigsight.export.description import filled, header_lines, hold_text, indented
-from rigsight.export.equations import Exported
-from rigsight.export.equilibrium import NO_START, Balance
-from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
-from rigsight.export.internal_step import is_linear
-from rigsight.export.precomputed import constant_names, equations_of
-from rigsight.export.reserved_words import words
+from rigsight.export.description import header_lines, hold_text, indented
+from rigsight.export.equations import NO_START, Balance, Exported, words
+from rigsight.export.fixed_step import (
+    constant_names,
+    equations_of,
+    friction_mode,
+    friction_sign,
+    held_velocity,
+    is_linear,
+    slip_rate,
+    slope_symbol,
+)
+from rigsight.libraries.templates import filled, template, template_parts
 from rigsight.simulate.equations.structure import input_symbols
 from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.language import PYTHON
@@ -28,77 +33,10 @@ MIN_STEPS = 4
 MIN_STEPS_PRESCRIBED = 32
 """The same if the motion is prescribed: the model has no time scale that requires more."""
 
-_PIECES = {
-    "zoh": "_steps({name})",
-    "foh": "_lines({name}, dt)",
-}
+_PIECES = {"zoh": "_steps({name})", "foh": "_lines({name}, dt)"}
 _CUBIC = "_cubics({value}, {rate}, dt)"
-_HOLDS = {
-    "zoh": """def _steps(samples):
-    return [(float(value), 0.0, 0.0, 0.0) for value in samples]""",
-    "foh": """def _lines(samples, dt):
-    samples = [float(value) for value in samples]
-    slopes = [(b - a) / dt for a, b in zip(samples, samples[1:])] + [0.0]
-    return [(value, slope, 0.0, 0.0) for value, slope in zip(samples, slopes)]""",
-}
-_CUBICS = """def _cubics(values, rates, dt):
-    x, v = np.append(np.asarray(values, dtype=float), 0.0), np.append(np.asarray(rates, dtype=float), 0.0)
-    rise, first, last = np.diff(x), v[:-1] * dt, v[1:] * dt
-    c2 = (3.0 * rise - 2.0 * first - last) / dt**2
-    c3 = (first + last - 2.0 * rise) / dt**3
-    return list(zip(x[:-1].tolist(), v[:-1].tolist(), c2.tolist(), c3.tolist()))"""
-_ALL_PIECES = '''def _pieces(n, dt{inputs}):
-    """Return the inputs between samples, each as a cubic (c0, c1, c2, c3) of the time since the sample [s]."""
-    {body}
-
-
-{functions}'''
-_REST = '''def _rest(numbers, given):
-    """Return the static equilibrium at the first input, reached slowly from rest without memory."""
-    first = given[0]
-{unpack}
-    state = [0.0] * N_STATES
-{values}
-    if stiffness <= 0.0:
-        return state
-    damping = max(numbers["{damping}"], 2.0 * math.sqrt(stiffness * inertia))
-    quiet = {{**numbers, "{damping}": damping{silenced}}}
-    length = 40.0 * math.pi * math.sqrt(inertia / stiffness)
-    for last in (0.0, first) if first != 0.0 else (0.0,):
-        try:
-            state = _settled(quiet, state, last, length)
-        except ArithmeticError:
-            break
-    return state
-
-
-def _settled(numbers, state, last, length):
-    """Return the states after a ramp of the input from zero, and waits until nothing moves."""
-    piece, duration = [(0.0, last / length, 0.0, 0.0)], length
-    for wait in range(7):
-        motion = _Motion(numbers, state)
-        motion.read_signs(piece, 0.0, 0.0)
-        if last == 0.0 and not any(motion.slopes(piece, 0.0, 0.0, motion.x)):
-            return state
-        motion.advance(piece, 0.0, 0.0, duration)
-        if not all(map(math.isfinite, motion.x)):
-            raise ArithmeticError("no equilibrium")
-        still = all(
-            abs(new - old) <= 1e-9 * abs(new)
-            for i, (new, old) in enumerate(zip(motion.x, state))
-            if i != {velocity}
-        )
-        state = motion.x
-        if still:
-            break
-        piece, duration = [(last, 0.0, 0.0, 0.0)], length * 2.0**wait
-    state[{velocity}] = 0.0
-    return state'''
 _OWN_WORDS_OF_REST = words("first inertia stiffness")
 """Of `_REST` where parameters stand, beside what no name in any export is."""
-_NO_REST = '''def _rest(numbers, given):
-    """Return the states without memory."""
-    return [0.0] * N_STATES'''
 _OWN_WORDS_OF_START = words("x any len ValueError")
 """The same of the template of the equilibrium of several motions."""
 
@@ -121,7 +59,6 @@ def python_function(exported: Exported, source: str) -> str:
     inputs = [quantity.name for quantity in exported.inputs]
     unpack = unpacked_states(exported, own)
     limits = [PYTHON.expression(limit, names) for limit in exported.limits.values()]
-    template = files("rigsight.export").joinpath("templates/model.py.txt").read_text("utf-8")
     fragments = {
         "TITLE": f"Simulation of {exported.title}",
         "HEADER": "\n".join(header_lines(exported, source, with_parameters=False)),
@@ -165,7 +102,7 @@ def python_function(exported: Exported, source: str) -> str:
         "OUTPUT_NAMES": sequence([repr(output.name) for output in exported.outputs]),
         "FIRST_OUTPUT": repr(exported.outputs[0].name),
     }
-    text = filled(template, fragments)
+    text = filled(template("export", "model.py.txt"), fragments)
     return text.replace("else before\n\n        motion", "else before\n        motion")
 
 
@@ -242,39 +179,43 @@ def _slopes(exported: Exported) -> dict[sp.Symbol, str]:
 
 
 def _pieces(exported: Exported, inputs: list[str]) -> str:
-    lines: list[str] = []
+    parts, lines = template_parts("export", "model_parts.py.txt"), list[str]()
     functions: dict[str, str] = {}
     for source in exported.sources:
         if source.rate is None:
             lines.append(_PIECES[exported.hold].format(name=source.value.name))
-            functions[exported.hold] = _HOLDS[exported.hold]
+            functions[exported.hold] = parts[exported.hold]
         else:
             lines.append(_CUBIC.format(value=source.value.name, rate=source.rate.name))
-            functions["cubic"] = _CUBICS
+            functions["cubic"] = parts["cubic"]
     body = f"return list(zip({', '.join(lines)}))" if lines else "return [()] * n"
-    more = "".join(f", {name}" for name in inputs)
-    return _ALL_PIECES.format(inputs=more, body=body, functions="\n\n\n".join(functions.values())).rstrip()
+    own = {
+        "INPUTS": "".join(f", {name}" for name in inputs),
+        "BODY": body,
+        "FUNCTIONS": "\n\n\n".join(functions.values()),
+    }
+    return filled(parts["ALL_PIECES"], own).rstrip()
 
 
 def _rest(exported: Exported) -> str:
-    rest = exported.rest
+    rest, parts = exported.rest, template_parts("export", "model_parts.py.txt")
     if rest is None:
-        return _NO_REST
+        return parts["NO_REST"]
     if isinstance(rest, Balance):
         return _balance(exported, rest)
-    wanted = {"state[0]": rest.displacement, "inertia": rest.inertia, "stiffness": rest.stiffness}
     names, local = exported.names(), local_names(exported, _OWN_WORDS_OF_REST)
-    used = sorted({names[s] for expression in wanted.values() for s in expression.free_symbols})
-    return _REST.format(
-        unpack=indented([f'{local[name]} = numbers["{name}"]' for name in used]),
-        values=indented(
-            PYTHON.statements(
-                list(wanted), list(wanted.values()), {s: local.get(name, name) for s, name in names.items()}
-            )
-        ),
-        damping=rest.damping,
-        velocity=exported.structure.velocity_index,
-        silenced="".join(f', "{name}": 0.0' for name in rest.silenced),
+    used = sorted({names[s] for expression in rest.expressions for s in expression.free_symbols})
+    called = {s: local.get(name, name) for s, name in names.items()}
+    values = PYTHON.statements(["state[0]", "inertia", "stiffness"], rest.expressions, called)
+    return filled(
+        parts["REST"],
+        {
+            "UNPACK": indented([f'{local[name]} = numbers["{name}"]' for name in used]),
+            "VALUES": indented(values),
+            "DAMPING": rest.damping,
+            "VELOCITY": exported.structure.velocity_index,
+            "SILENCED": "".join(f', "{name}": 0.0' for name in rest.silenced),
+        },
     )
 
 
@@ -282,19 +223,14 @@ def _balance(exported: Exported, rest: Balance) -> str:
     n = len(rest.unknown)
     targets = [f"r{i}" for i in range(n)] + [f"s{i}" for i in range(n * n)]
     own = frozenset(targets)
-    lines = PYTHON.statements(
-        targets,
-        [*rest.residuals, *(slope for row in rest.slopes for slope in row)],
-        code_names(exported, own),
-    )
+    lines = PYTHON.statements(targets, rest.expressions, code_names(exported, own))
     rows = ", ".join(f"[{', '.join(targets[n * (i + 1) : n * (i + 2)])}]" for i in range(n))
     result = f"return np.array([{', '.join(targets[:n])}]), np.array([{rows}])"
     starts = PYTHON.statements(
         [f"x[{i}]" for i in rest.start], list(rest.start.values()), code_names(exported, _OWN_WORDS_OF_START)
     )
-    text = files("rigsight.export").joinpath("templates/equilibrium.py.txt").read_text("utf-8")
     return filled(
-        text,
+        template("export", "equilibrium.py.txt"),
         {
             "UNBALANCED": indented(
                 [*unpacked_parameters(exported, own), *unpacked_states(exported, own), *lines, result]

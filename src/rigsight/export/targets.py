@@ -13,9 +13,9 @@ from rigsight.effects import symbols
 from rigsight.errors import InputError, check_in_range, check_option
 from rigsight.export.c_source import c_source, macros
 from rigsight.export.control_system import control_system
-from rigsight.export.equations import Exported, exported, harmless
+from rigsight.export.equations import SHARED, Exported, exported, harmless
+from rigsight.export.fixed_step import LONGEST, internal_step
 from rigsight.export.fmu import Version, fmu
-from rigsight.export.internal_step import LONGEST, internal_step
 from rigsight.export.latex import latex
 from rigsight.export.matlab_function import INPUT_WORDS as MATLAB_INPUTS
 from rigsight.export.matlab_function import WORDS as MATLAB
@@ -26,7 +26,6 @@ from rigsight.export.modelica import modelica
 from rigsight.export.python_function import INPUT_WORDS as PYTHON_INPUTS
 from rigsight.export.python_function import WORDS as PYTHON
 from rigsight.export.python_function import python_function
-from rigsight.export.reserved_words import SHARED
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import input_symbols
@@ -57,7 +56,7 @@ class Target:
     lacks
         What it is written without.
     words
-        Words of its language, which no name in any export is; those of C are in `rigsight.export.reserved_words`.
+        Words of its language, which no name in any export is; those of C are in `rigsight.export.equations`.
     own_words
         From its own name: words that its text uses itself, which no name in this export is.
     input_words

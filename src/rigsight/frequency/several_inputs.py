@@ -23,9 +23,8 @@ from rigsight.errors import InputError
 from rigsight.frequency.frequency_response import FrequencyResponse
 from rigsight.frequency.local_model import SPARE, LocalFit
 from rigsight.frequency.signal_pair import excited, hold_response, line_frequencies, pair_unit
-from rigsight.records.periods import mean_period
-from rigsight.records.plausibility import moves_beyond_noise
 from rigsight.records.record import Hold, Record
+from rigsight.records.signals import mean_period, moves_beyond_noise
 
 _OWN_SHARE = 1e-4
 """Share of an input's power not explained by other inputs, from which its response can be separated: -40 dB, as for silence."""

@@ -9,8 +9,8 @@ from scipy.stats import chi2
 
 from rigsight.identify.identification import RecordIdentification
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 
 _CHANCE = 1e-3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigsight.records.record import Record
-from rigsight.records.reference import REFERENCE, instrument_of, signals_beside
+from rigsight.records.signals import REFERENCE, instrument_of, signals_beside
 from rigsight.rigs import Rig
 
 _LISTED = 5

@@ -22,8 +22,8 @@ from rigsight.identify.start.linear_start import linear_start
 from rigsight.identify.start.scales import characteristic_scales
 from rigsight.identify.undetermined import listed
 from rigsight.parameters import Parameter
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, evaluated
 from rigsight.rigs.reading.dimensions import UnitError, dimension
 from rigsight.simulate import compose

@@ -14,8 +14,8 @@ from rigsight.identify.information import Information
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.transfer.record_response import Method
 from rigsight.identify.undetermined import POORLY_KNOWN
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Floats, Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure
 from rigsight.simulate.linearization import Linearization, linearize

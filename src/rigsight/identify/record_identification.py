@@ -31,7 +31,7 @@ from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_r
 from rigsight.identify.transfer.transfer_step import fit_step, input_at_rest
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
-from rigsight.records.reference import instrument_of
+from rigsight.records.signals import instrument_of
 from rigsight.rigs import Rig, evaluated
 
 _SURE = 0.1

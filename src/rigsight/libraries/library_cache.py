@@ -1,4 +1,4 @@
-"""Cache of libraries on disk, under the hash of everything on which the machine code depends.
+"""Libraries of C source: built by a compiler of this machine, and kept under the hash of everything they depend on.
 
 A stale library is impossible, because its name is the hash of its C source, the compiler, its options and the processor. A
 damaged one is detected by a checksum before it is loaded, and rebuilt.
@@ -7,17 +7,37 @@ damaged one is detected by a checksum before it is loaded, and rebuilt.
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
+import importlib.util
 import os
 import platform
+import shlex
+import shutil
+import signal
+import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
-from functools import cache
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
 from pathlib import Path
 
 from rigsight.errors import InputError, MachineError
-from rigsight.libraries.compiler import Compiler, c_compilers, first_library, library_suffix
+
+VARIABLE = "CC"
+_COMMON = ("cc", "gcc", "clang")
+_ROOM = 1_000_000
+"""Disk space that a compiler needs [bytes]; with less, a failure is attributed to the disk."""
+_SHARED = {
+    "Linux": (".so", ("-shared", "-fPIC", "-fvisibility=hidden")),
+    "Darwin": (".dylib", ("-dynamiclib", "-fPIC", "-fvisibility=hidden")),
+    "Windows": (".dll", ("-shared",)),
+}
+NO_COMPILER = (
+    "No C compiler was found, which simulations need. Install one: 'pip install rigsight[compiler]' (without root), or on "
+    f"Debian 'apt-get install gcc', or name one in the environment variable {VARIABLE}."
+)
 
 CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
 FLAGS_VARIABLE = "RIGSIGHT_CFLAGS"
@@ -39,14 +59,142 @@ _OWN_PROCESSOR = {
 _CHECKSUM_SIZE = 64
 
 
-def cache_folder() -> Path:
-    """Return the folder of compiled kernels: $RIGSIGHT_CACHE_DIR, else the platform's cache folder of the user.
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler."""
 
-    Raises
-    ------
-    InputError
-        If the variable is not set and there is no home folder.
+    command: tuple[str, ...]  # program and arguments that stand before all others
+    identity: str  # what changes when the program does: its path, size and time of change
+
+    @property
+    def name(self) -> str:
+        """The command as text."""
+        return shlex.join(self.command)
+
+
+def c_compilers() -> tuple[Compiler, ...]:
+    """Return the C compilers of this machine, best first: the one that the variable CC names alone, or all that are found."""
+    return _found(os.environ.get(VARIABLE, ""), os.environ.get("PATH", ""))
+
+
+@lru_cache(maxsize=8)
+def _found(named: str, path: str) -> tuple[Compiler, ...]:
+    if named.strip():
+        try:
+            words = shlex.split(named)
+        except ValueError as error:
+            raise InputError(f"The variable {VARIABLE} is not a command ({error}): {named!r}.") from None
+        program = shutil.which(words[0], path=path)
+        if program is None:
+            raise InputError(
+                f"The variable {VARIABLE} names '{words[0]}', which was not found. Name a C compiler there, or unset it."
+            )
+        return (Compiler((program, *words[1:]), _identity(program)),)
+    programs = dict.fromkeys(shutil.which(name, path=path) for name in _COMMON)
+    found = [Compiler((program,), _identity(program)) for program in programs if program is not None]
+    zig = importlib.util.find_spec("ziglang")
+    if zig is not None and zig.origin is not None:
+        found.append(Compiler((sys.executable, "-m", "ziglang", "cc"), _identity(zig.origin)))
+    return tuple(found)
+
+
+def _identity(program: str) -> str:
+    real = Path(program).resolve()
+    try:
+        status = real.stat()
+    except OSError:
+        return str(real)
+    return f"{real} {status.st_size} {status.st_mtime_ns}"
+
+
+def library_suffix() -> str:
+    """Return the suffix of a shared library on this system."""
+    return _system()[0]
+
+
+def _system() -> tuple[str, tuple[str, ...]]:
+    system = platform.system()
+    if system not in _SHARED:
+        raise InputError(f"Libraries cannot be built for {system}; rigsight runs on {', '.join(_SHARED)}.")
+    return _SHARED[system]
+
+
+def first_library(sources: Mapping[str, str], flags: Sequence[str]) -> tuple[Compiler, bytes]:
+    """Return a shared library and the first of this machine's compilers that can make it."""
+    failed: MachineError | None = None
+    for compiler in c_compilers():
+        try:
+            return compiler, library(compiler, sources, flags)
+        except MachineError as error:
+            failed = failed or error
+    raise failed or InputError(NO_COMPILER)
+
+
+def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]) -> bytes:
+    """Return the bytes of a shared library; the same text gives the same bytes with the same compiler."""
+    suffix, shared = _system()
+    try:
+        with tempfile.TemporaryDirectory(prefix="rigsight-", ignore_cleanup_errors=True) as place:
+            for file, text in sources.items():
+                Path(place, file).write_text(text, encoding="utf-8")
+            target = Path(place, f"library{suffix}")
+            # By default zig writes the path of the build folder for debuggers, so that the bytes differ each time.
+            options = ("-g0", *flags, *shared)
+            command = [*compiler.command, *options, "-o", target.name, next(iter(sources)), "-lm"]
+            code, said = _run(command, place)
+            if code == 0 and target.is_file():
+                return target.read_bytes()
+            if shutil.disk_usage(place).free < _ROOM:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), place)
+            first = next(
+                (line for line in said.splitlines() if "error" in line), said.strip() or "no message"
+            )
+    except OSError as error:
+        raise MachineError(
+            f"The C compiler {compiler.name} cannot be run in {tempfile.gettempdir()} ({error.strerror or error}). "
+            "Free some space there, or set TMPDIR to a folder with enough space."
+        ) from error
+    raise MachineError(
+        f"The C compiler {compiler.name} failed: {first.strip()}. "
+        f"Name another one in the variable {VARIABLE}, or install 'rigsight[compiler]'."
+    )
+
+
+def _run(command: Sequence[str], place: str) -> tuple[int, str]:
+    """Run a compiler in a folder that holds its own temporary files too; return its exit code and output.
+
+    It runs programs of its own, which end with it when we are interrupted.
     """
+    with subprocess.Popen(
+        command,
+        cwd=place,
+        env={**os.environ, **dict.fromkeys(("TMPDIR", "TMP", "TEMP"), place)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    ) as process:
+        try:
+            _, said = process.communicate()
+        except BaseException:
+            _end(process)
+            raise
+    return process.returncode, said
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a program and its child processes."""
+    if os.name == "nt":
+        process.kill()
+        return
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled kernels: $RIGSIGHT_CACHE_DIR, else the platform's cache folder of the user."""
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
         return Path(chosen)
@@ -69,19 +217,7 @@ def _caches_at_home() -> Path:
 def library_file(text: str, included: Sequence[str] = ()) -> Path:
     """Return an intact library of a C text, of the first compiler for which one is cached or can be compiled.
 
-    Parameters
-    ----------
-    text
-        C, which is a library by itself.
-    included
-        Folders of headers that are not the compiler's.
-
-    Raises
-    ------
-    InputError
-        If there is no C compiler.
-    MachineError
-        If the cache folder cannot be written, or the compiler fails.
+    The folders hold headers that are not the compiler's.
     """
     for compiler in c_compilers():
         path = _path(text, compiler)

@@ -1,16 +1,20 @@
-"""Summary of a channel: length, sample rate, range, and missing samples."""
+"""Which channels does a file of any format hold, delimited text included, and what do they look like: rate, range, gaps?"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.records.formats.channel import Channel, as_floats, as_stamps
-from rigsight.records.plausibility import clipping
+from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
+from rigsight.records.formats.channel_file import file_format, open_channels
+from rigsight.records.formats.text_channels import TextColumns
 from rigsight.records.sensor_signs import FULL_TURNS, codes, held, is_wrapped, wrapping_counter
+from rigsight.records.signals import clipping
 
 # Of the median step: a longer one is a gap.
 _GAP = 1.5
@@ -101,3 +105,8 @@ def step_and_gaps(stamps: NDArray[np.float64]) -> tuple[float | None, int | None
 def time_summary(channel: Channel) -> tuple[float | None, int | None]:
     """Return median step and number of gaps of a channel that holds time, see `step_and_gaps`."""
     return step_and_gaps(as_stamps(channel.load()))
+
+
+def open_measurement(path: Path) -> AbstractContextManager[ChannelFile]:
+    """Open a file of any format, delimited text included; its channels can be read inside this context."""
+    return nullcontext(TextColumns(path).tolerant()) if file_format(path) is None else open_channels(path)

@@ -1,8 +1,9 @@
-"""Selection of the channels of a measurement file for the requested signals, with their time axis."""
+"""Selection of the channels of a file of any format for the requested signals, with their time axis."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError, nearest
 from rigsight.records.channel_units import UnknownUnitError, factor
 from rigsight.records.clocks import (
+    TIME,
     Clock,
     increases,
     possible_clocks,
@@ -20,66 +22,71 @@ from rigsight.records.clocks import (
 )
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.formats.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
-from rigsight.records.formats.channel_file import open_channels
+from rigsight.records.formats.channel_file import file_format, open_channels
+from rigsight.records.formats.text_channels import TextColumns
 
 _LISTED = 30
 """Channels that a message lists; a logger may record thousands."""
 _OWN_AXIS = "its own time axis"
+Floats = NDArray[np.float64]
 
 
-def read_channels(
+def read_columns(
     path: Path,
     columns: Mapping[str, ColumnMapping],
-    time: str,
     *,
     time_is_mapped: bool,
     optional: Sequence[str] = (),
     dt: float | None = None,
+    dialect: Mapping[str, object] | None = None,
 ) -> Columns:
-    """Read the channels that `columns` asks for, and their time.
+    """Read the columns or channels that `columns` asks for, and their time, as they stand there; others may hold anything.
 
     Time is, in this order: `dt`; the channel that a signal's mapping names as its time; the time that the file shows to be the
     signal's own; the channel that was mapped to time, or has its name; the axis of the channel.
     """
-    with open_channels(path) as file:
-        found = {
-            signal: channel
-            for signal, mapping in columns.items()
-            if signal != time
-            and (channel := _find(path, file, signal, mapping.name, signal in optional)) is not None
-        }
-        values = {
-            signal: _finite(path, channel, _quantity(path, channel, columns[signal]))
-            for signal, channel in found.items()
-        }
-        names = tuple(channel.name for channel in file.channels)
-        unread: list[str] = []
-        if dt is None:
-            clocks = _clocks(path, file, found, columns, time, time_is_mapped)
-        else:
-            unread = [channel.name for channel in _named(file.channels, time)]
-            if not unread and any(channel.axis is not None for channel in found.values()):
+    with _opened(path, columns, dialect or {}) as file:
+        selection = _Selection(path, file, columns, optional)
+        possible = selection.possible_times(time_is_mapped) if dt is None else selection.shown_times(dt)
+        times = {f"time {number}": number for numbers in possible.values() for number in numbers}
+        # Signals of other rates end in other rows of a text, and blank cells fill the rest.
+        file.ahead({**selection.found, **times}, len(times) > 1)
+        values = {signal: selection.quantity(signal) for signal in selection.found}
+        clocks = {signal: selection.clock(signal, own, values) for signal, own in possible.items()}
+        if dt is not None:
+            unread = [file.channels[number].name for number in selection.named(TIME)]
+            if not unread and any(file.channels[i].axis is not None for i in selection.found.values()):
                 unread = [_OWN_AXIS]
-            _refuse_other_clocks(path, file, found, columns, time, dt)
-            clocks = {
-                signal: Clock("dt", dt * np.arange(channel.n_samples, dtype=np.float64))
-                for signal, channel in found.items()
-            }
-        labels = {signal: channel.name for signal, channel in found.items()}
-        units = {signal: channel.unit for signal, channel in found.items()}
-    table = Columns(
-        values,
-        labels,
-        np.arange(1, max((v.size for v in values.values()), default=0) + 1, dtype=np.int64),
-        (*_notes(path, found), *(() if dt is None else unread_time(path, dt, unread))),
-        units={signal: unit for signal, unit in units.items() if unit is not None},
-        row="sample",
-        names=names,
-    )
-    return with_clocks(path.name, time, table, clocks)
+            lengths = {samples.size for samples in values.values()}
+            if len(lengths) > 1 or (clocks and shared_clock(clocks.values()) is None):
+                refuse_one_dt(path.name, dt, "clocks of their own or other lengths")
+            n_samples = max(lengths, default=max((one.n_samples for one in file.channels), default=0))
+            clocks = dict.fromkeys(
+                selection.found or [TIME], Clock("dt", dt * np.arange(n_samples, dtype=np.float64))
+            )
+        values = {signal: samples[: clocks[signal].stamps.size] for signal, samples in values.items()}
+        for signal, clock in clocks.items():
+            if signal in values:
+                selection.check_finite(file.channels[selection.found[signal]].label, values[signal])
+            selection.check_finite(clock.label, clock.stamps)
+        n_rows = max((samples.size for samples in values.values()), default=0)
+        table = Columns(
+            values,
+            {signal: file.channels[number].label for signal, number in selection.found.items()},
+            np.arange(1, n_rows + 1, dtype=np.int64) if file.lines is None else file.lines,
+            (*file.notes, *selection.notes(), *(() if dt is None else _unread_time(path, dt, unread))),
+            units={
+                signal: unit
+                for signal, number in selection.found.items()
+                if (unit := file.channels[number].unit) is not None
+            },
+            row=file.row,
+            names=tuple(channel.label for channel in file.channels),
+        )
+    return with_clocks(path.name, TIME, table, clocks)
 
 
-def unread_time(path: Path, dt: float, unread: Sequence[str]) -> tuple[str, ...]:
+def _unread_time(path: Path, dt: float, unread: Sequence[str]) -> tuple[str, ...]:
     """Return a note that a sample time that was given replaces the time in a file, none where it has no time."""
     if not unread:
         return ()
@@ -89,179 +96,226 @@ def unread_time(path: Path, dt: float, unread: Sequence[str]) -> tuple[str, ...]
     )
 
 
-def _find(
-    path: Path, file: ChannelFile, signal: str, name: str | int, optional: bool = False
-) -> Channel | None:
-    """Return the channel of a mapping, by full name, by name without group, or by number."""
-    channels = file.channels
-    if isinstance(name, int):
-        if 1 <= name <= len(channels):
-            return channels[name - 1]
-        raise InputError(
-            f"{path.name}: signal '{signal}' is mapped to channel {name}, but there are {len(channels)}: {_listed(file)}."
-        )
-    matches = _named(channels, name)
-    if len(matches) == 1:
-        return matches[0]
-    if matches:
-        listed = ", ".join(f"'{channel.name}'" for channel in matches[:_LISTED])
-        raise InputError(
-            f"{path.name}: {len(matches)} channels are called '{name}': {listed}; name the one for signal '{signal}' "
-            "with its group."
-        )
-    for refused in file.refused:
-        if name in (refused.name, refused.name.rpartition("/")[2]):
+@contextmanager
+def _opened(
+    path: Path, columns: Mapping[str, ColumnMapping], dialect: Mapping[str, object]
+) -> Iterator[ChannelFile]:
+    if file_format(path) is None:
+        names = {name for mapping in columns.values() for name in (mapping.name, mapping.time)}
+        wanted = {name for name in names if isinstance(name, str)}
+        yield TextColumns(path, wanted, **dialect).strict()  # type: ignore[arg-type]
+        return
+    for key, value in dialect.items():
+        if value is not None:
+            raise InputError(f"{path.name} is not delimited text, so {key} does not apply; remove {key}.")
+    with open_channels(path) as file:
+        yield file
+
+
+class _Selection:
+    """The channels of an open file for signals, and the times by which they go."""
+
+    def __init__(
+        self, path: Path, file: ChannelFile, columns: Mapping[str, ColumnMapping], optional: Sequence[str]
+    ) -> None:
+        self._path, self._file, self._columns = path, file, columns
+        # As the file has them: a number behind a name would hide its unit.
+        self._names = [channel.label for channel in file.channels]
+        self._axes: dict[TimeAxis, Clock] = {}
+        self.found = {
+            signal: number
+            for signal, mapping in columns.items()
+            if signal != TIME and (number := self._find(signal, mapping.name, signal in optional)) is not None
+        }
+        """Signal -> number of its channel, from 0."""
+
+    def named(self, name: str) -> list[int]:
+        """Return the numbers of the channels of a name: as the file has it, as told apart, or without group."""
+        for called in ("label", "name", "short_name"):
+            matches = [i for i, one in enumerate(self._file.channels) if getattr(one, called) == name]
+            if matches:
+                return matches
+        return []
+
+    def _find(self, signal: str, name: str | int, optional: bool = False) -> int | None:
+        """Return the number of the channel of a mapping, by full name, by name without group, or by number."""
+        path, word, count = self._path, self._file.word, len(self._names)
+        if isinstance(name, int):
+            if 1 <= name <= count:
+                return name - 1
             raise InputError(
-                f"{path.name}: '{refused.name}', which signal '{signal}' is mapped to, {refused.reason}."
+                f"{path.name}: signal '{signal}' is mapped to {word} {name}, but the {word}s are 1 to {count}: {self._listed()}."
             )
-    if optional:
-        return None
-    hint = nearest(name, [own for channel in channels for own in (channel.name, channel.short_name)])
-    raise InputError(
-        f"{path.name} has no channel '{name}' for signal '{signal}'.{hint} Its channels: {_listed(file)}. "
-        f'Map it under columns: {signal} = "..." (on a command line --column {signal}=...). See rigsight inspect for details.'
-    )
-
-
-def _quantity(path: Path, channel: Channel, mapping: ColumnMapping) -> NDArray[np.float64]:
-    """Return the samples; whole numbers beside what may be their conversion are taken only as the campaign says."""
-    samples = channel.load()
-    if samples.dtype.kind in "iu" and channel.stored.unclear and mapping.scale is None:
-        raise InputError(
-            f"{path.name}, channel '{channel.name}': whole numbers are stored, beside {', '.join(channel.stored.unclear)}, which "
-            "may convert them; files differ in how. Give the conversion under columns, value = scale * stored number + offset; "
-            "scale = 1.0 takes the numbers as they are."
-        )
-    return as_floats(samples)
-
-
-def _notes(path: Path, found: Mapping[str, Channel]) -> tuple[str, ...]:
-    return tuple(
-        f"{path.name}, channel '{channel.name}': {note}."
-        for channel in found.values()
-        for note in (
-            channel.stored.note and f"values are {channel.stored.note}",
-            channel.stored.unclear
-            and f"has {', '.join(channel.stored.unclear)}, which was not applied; give scale and offset under columns if it is a "
-            "conversion that is still to be done",
-        )
-        if note
-    )
-
-
-def _named(channels: Iterable[Channel], name: str) -> list[Channel]:
-    channels = list(channels)
-    exact = [channel for channel in channels if channel.name == name]
-    return exact or [channel for channel in channels if channel.short_name == name]
-
-
-def _listed(file: ChannelFile) -> str:
-    names = [f"'{channel.name}'" for channel in file.channels]
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    if not names:
-        refused = [f"'{one.name}' {one.reason}" for one in file.refused[:3]]
-        return "no channel is a signal over time" + (f" ({'; '.join(refused)})" if refused else "")
-    return ", ".join(names[:_LISTED]) + more
-
-
-def _finite(path: Path, channel: Channel, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    finite = np.isfinite(samples)
-    if not finite.all():
-        first = int(np.argmin(finite))
-        raise InputError(
-            f"{path.name}, channel '{channel.name}', sample {first + 1}: {samples[first]} is not a finite number "
-            f"({np.count_nonzero(~finite)} such samples). Cut the record there or fill the gap before reading."
-        )
-    return samples
-
-
-def _clocks(
-    path: Path,
-    file: ChannelFile,
-    found: Mapping[str, Channel],
-    columns: Mapping[str, ColumnMapping],
-    time: str,
-    time_is_mapped: bool,
-) -> dict[str, Clock]:
-    """Return the clock of every signal; of a record of nothing but time, that of the time itself."""
-    channels = list(file.channels)
-    numbers = {signal: channels.index(channel) for signal, channel in found.items()}
-    given = {
-        signal: channels.index(channel)
-        for signal in found
-        if (own := columns[signal].time) is not None
-        and (channel := _find(path, file, f"{signal}, time", own)) is not None
-    }
-    names = [channel.name for channel in channels]
-    shown = possible_clocks(names, numbers, given, None)
-    declared = _declared(path, file, found, shown, columns[time], time, time_is_mapped)
-    read: dict[int, Clock] = {}
-
-    def stamps_of(number: int) -> Clock:
-        if number not in read:
-            channel = channels[number]
-            stamps = _finite(path, channel, as_stamps(channel.load()))
-            read[number] = Clock(channel.name, stamps, channel.unit, channel.origin)
-        return read[number]
-
-    if not found:
-        assert declared is not None
-        return {time: stamps_of(declared)}
-    axes: dict[int, Clock] = {}
-    clocks = {}
-    for signal, possible in possible_clocks(names, numbers, given, declared).items():
-        channel = found[signal]
-        foreign = (
-            possible == [declared] and signal not in given and not _around(channels[possible[0]], channel)
-        )
-        if channel.axis is not None and (not possible or foreign):
-            if id(channel.axis) not in axes:
-                stamps = _finite(path, channel, _in_seconds(path, channel, channel.axis))
-                axes[id(channel.axis)] = Clock(_OWN_AXIS, stamps, "s", channel.axis.origin)
-            clocks[signal] = axes[id(channel.axis)]
-            continue
-        tried = [stamps_of(number) for number in possible]
-        clocks[signal] = next((clock for clock in tried if increases(clock.stamps)), tried[-1])
-        if clocks[signal].stamps.size != channel.n_samples:
+        matches = self.named(name)
+        if len(matches) == 1:
+            return matches[0]
+        if matches:
+            listed = ", ".join(f"'{self._file.channels[i].name}'" for i in matches[:_LISTED])
+            by = f"with its group: {listed}" if self._file.lines is None else "by its number, counted from 1"
             raise InputError(
-                f"{path.name}: '{channel.name}' has {channel.n_samples} samples, but the time '{clocks[signal].label}' "
-                f"{clocks[signal].stamps.size}. Give it the time that belongs to it: {signal} = "
+                f"{path.name}: {len(matches)} {word}s are called '{name}'; name the one for signal '{signal}' {by}."
+            )
+        for refused in self._file.refused:
+            if name in (refused.name, refused.name.rpartition("/")[2]):
+                raise InputError(
+                    f"{path.name}: '{refused.name}', which signal '{signal}' is mapped to, {refused.reason}."
+                )
+        if name.isdecimal() and 1 <= int(name) <= count:
+            return int(name) - 1
+        if optional:
+            return None
+        if not self._file.has_names:
+            raise InputError(
+                f"{path.name} has no header, so there is no column '{name}' for signal '{signal}'; "
+                f"name it by its number, 1 to {count}: {signal} = 1, for instance."
+            )
+        known = [own for channel in self._file.channels for own in (channel.label, channel.short_name)]
+        mend = (
+            f'Map it under columns: {signal} = "..." (on a command line --column {signal}=...). See rigsight inspect for details.'
+            if self._file.lines is None
+            else "Map it under columns, or specify the separator if these are not the columns."
+        )
+        raise InputError(
+            f"{path.name} has no {word} '{name}' for signal '{signal}'.{nearest(name, known)} "
+            f"Its {word}s: {self._listed()}. {mend}"
+        )
+
+    def _listed(self) -> str:
+        names = [f"'{channel.label}'" for channel in self._file.channels]
+        more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+        if not names:
+            refused = [f"'{one.name}' {one.reason}" for one in self._file.refused[:3]]
+            return "no channel is a signal over time" + (f" ({'; '.join(refused)})" if refused else "")
+        return ", ".join(names[:_LISTED]) + more
+
+    def quantity(self, signal: str) -> Floats:
+        """Return the samples; whole numbers beside what may be their conversion are taken only as the campaign says."""
+        channel = self._file.channels[self.found[signal]]
+        samples = channel.load()
+        if samples.dtype.kind in "iu" and channel.stored.unclear and self._columns[signal].scale is None:
+            raise InputError(
+                f"{self._path.name}, channel '{channel.name}': whole numbers are stored, beside "
+                f"{', '.join(channel.stored.unclear)}, which may convert them; files differ in how. Give the conversion under "
+                "columns, value = scale * stored number + offset; scale = 1.0 takes the numbers as they are."
+            )
+        return as_floats(samples)
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what the file says of stored numbers."""
+        channels = [self._file.channels[number] for number in self.found.values()]
+        return tuple(
+            f"{self._path.name}, channel '{channel.name}': {note}."
+            for channel in channels
+            for note in (
+                channel.stored.note and f"values are {channel.stored.note}",
+                channel.stored.unclear
+                and f"has {', '.join(channel.stored.unclear)}, which was not applied; give scale and offset under columns if it "
+                "is a conversion that is still to be done",
+            )
+            if note
+        )
+
+    def check_finite(self, label: str, samples: Floats) -> None:
+        """Refuse samples, of which some are no numbers."""
+        finite = np.isfinite(samples)
+        if finite.all():
+            return
+        first, count, lines = int(np.argmin(finite)), int(np.count_nonzero(~finite)), self._file.lines
+        if lines is None:
+            where, cell = f"channel '{label}', sample {first + 1}", "sample"
+        else:
+            where, cell = f"line {lines[first]}, column '{label}'", "cell"
+        raise InputError(
+            f"{self._path.name}, {where}: {samples[first]} is not a finite number "
+            f"({count} such {cell}{'s' if count > 1 else ''}). Cut the record there or fill the gap before reading."
+        )
+
+    def shown_times(self, dt: float) -> dict[str, list[int]]:
+        """Return the times that the file shows to be those of its signals, if it shows one for each; else none."""
+        shown = possible_clocks(self._names, self.found, {}, None)
+        if self._file.lines is not None:
+            # What the sample time replaces may be dates or other text, and is not read.
+            if len({tuple(own) for own in shown.values()}) > 1:
+                refuse_one_dt(self._path.name, dt, "clocks of their own")
+            return {}
+        return shown if self.found and self._every_one(shown) else {}
+
+    def _every_one(self, shown: Mapping[str, list[int]]) -> bool:
+        return all(shown[s] or self._file.channels[i].axis is not None for s, i in self.found.items())
+
+    def possible_times(self, time_is_mapped: bool) -> dict[str, list[int]]:
+        """Return the numbers of the times by which each signal may go, none for its own axis; of time itself without signals."""
+        given = {
+            signal: number
+            for signal in self.found
+            if (own := self._columns[signal].time) is not None
+            and (number := self._find(f"{signal}, time", own)) is not None
+        }
+        declared = self._declared(possible_clocks(self._names, self.found, given, None), time_is_mapped)
+        if not self.found:
+            assert declared is not None
+            return {TIME: [declared]}
+        possible = possible_clocks(self._names, self.found, given, declared)
+        for signal, numbers in possible.items():
+            channel = self._file.channels[self.found[signal]]
+            foreign = numbers == [declared] and signal not in given
+            if channel.axis is not None and foreign and not _around(self._file.channels[numbers[0]], channel):
+                possible[signal] = []
+        return possible
+
+    def _declared(self, shown: Mapping[str, list[int]], time_is_mapped: bool) -> int | None:
+        """Return the number of the channel that is the time of all signals; None where each has its own."""
+        path, mapping, is_text = self._path, self._columns[TIME], self._file.lines is not None
+        every_one = bool(self.found) and self._every_one(shown)
+        matches = [] if isinstance(mapping.name, int) else self.named(mapping.name)
+        if every_one and len(matches) > 1 and all(shown.values()):
+            return None
+        if not matches and not time_is_mapped and every_one:
+            return None
+        if not matches and not time_is_mapped and not is_text:
+            axes = {signal: self._file.channels[number].axis for signal, number in self.found.items()}
+            lacking = [signal for signal, axis in axes.items() if not shown[signal] and axis is None]
+            if len(lacking) < len(self.found):
+                name = self._names[self.found[lacking[0]]]
+                raise InputError(
+                    f"{path.name}: channel '{name}' has no time axis, unlike others. Map time under columns, or "
+                    f'give it one: {{ name = "{name}", time = "..." }}.'
+                )
+            raise InputError(
+                f"{path.name} has no channel '{TIME}', and its channels have no time axis. Map time under columns "
+                f'({TIME} = "..."), or give the sample time in seconds with the record: dt = 0.001. '
+                f"Its channels: {self._listed()}."
+            )
+        return self._find(TIME, mapping.name)
+
+    def clock(self, signal: str, possible: Iterable[int], values: Mapping[str, Floats]) -> Clock:
+        """Return the clock of a signal: the first of the possible ones that increases, or its own axis."""
+        channel = self._file.channels[self.found[signal]] if signal in self.found else None
+        tried = [self._clock_of(number, values.get(signal)) for number in possible]
+        if not tried:
+            assert channel is not None
+            assert channel.axis is not None
+            if channel.axis not in self._axes:
+                stamps = _in_seconds(self._path, channel, channel.axis)
+                self._axes[channel.axis] = Clock(_OWN_AXIS, stamps, "s", channel.axis.origin)
+            return self._axes[channel.axis]
+        chosen = next((clock for clock in tried if increases(clock.stamps)), tried[-1])
+        if channel is not None and self._file.lines is None and chosen.stamps.size != channel.n_samples:
+            raise InputError(
+                f"{self._path.name}: '{channel.name}' has {channel.n_samples} samples, but the time '{chosen.label}' "
+                f"{chosen.stamps.size}. Give it the time that belongs to it: {signal} = "
                 f'{{ name = "{channel.name}", time = "..." }}.'
             )
-    return clocks
+        return chosen
 
-
-def _declared(
-    path: Path,
-    file: ChannelFile,
-    found: Mapping[str, Channel],
-    shown: Mapping[str, list[int]],
-    mapping: ColumnMapping,
-    time: str,
-    time_is_mapped: bool,
-) -> int | None:
-    """Return the number of the channel that is the time of all signals; None where each has its own."""
-    every_one = bool(found) and all(shown[s] or c.axis is not None for s, c in found.items())
-    matches = [] if isinstance(mapping.name, int) else _named(file.channels, mapping.name)
-    if every_one and len(matches) > 1 and all(shown.values()):
-        return None
-    if not matches and not time_is_mapped:
-        if every_one:
-            return None
-        lacking = [channel for signal, channel in found.items() if not shown[signal] and channel.axis is None]
-        if len(lacking) < len(found):
-            raise InputError(
-                f"{path.name}: channel '{lacking[0].name}' has no time axis, unlike others. Map time under columns, or "
-                f'give it one: {{ name = "{lacking[0].name}", time = "..." }}.'
-            )
-        raise InputError(
-            f"{path.name} has no channel '{time}', and its channels have no time axis. Map time under columns "
-            f'({time} = "..."), or give the sample time in seconds with the record: dt = 0.001. '
-            f"Its channels: {_listed(file)}."
-        )
-    channel = _find(path, file, time, mapping.name)
-    assert channel is not None
-    return list(file.channels).index(channel)
+    def _clock_of(self, number: int, samples: Floats | None) -> Clock:
+        """Return a time, of a text up to the last row in which it or its signal is given."""
+        channel = self._file.channels[number]
+        stamps = as_stamps(channel.load())
+        if self._file.lines is not None:
+            given = np.flatnonzero(~(np.isnan(stamps) & np.isnan(stamps if samples is None else samples)))
+            stamps = stamps[: int(given[-1]) + 1 if given.size else 0]
+        return Clock(channel.name, stamps, channel.unit, channel.origin)
 
 
 def _around(time: Channel, channel: Channel) -> bool:
@@ -269,30 +323,7 @@ def _around(time: Channel, channel: Channel) -> bool:
     return f"{channel.group}/".startswith(f"{time.group}/") or not time.group
 
 
-def _refuse_other_clocks(
-    path: Path,
-    file: ChannelFile,
-    found: Mapping[str, Channel],
-    columns: Mapping[str, ColumnMapping],
-    time: str,
-    dt: float,
-) -> None:
-    """Refuse one sample time for signals that the file shows to have clocks of their own that differ, or other lengths."""
-    lengths = {channel.n_samples for channel in found.values()}
-    clocks: dict[str, Clock] = {}
-    shown = possible_clocks(
-        [channel.name for channel in file.channels],
-        {signal: list(file.channels).index(channel) for signal, channel in found.items()},
-        {},
-        None,
-    )
-    if found and all(shown[signal] or channel.axis is not None for signal, channel in found.items()):
-        clocks = _clocks(path, file, found, columns, time, False)
-    if len(lengths) > 1 or (clocks and shared_clock(clocks.values()) is None):
-        refuse_one_dt(path.name, dt, "clocks of their own or other lengths")
-
-
-def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> NDArray[np.float64]:
+def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> Floats:
     try:
         scale = factor(axis.unit, "s")
     except UnknownUnitError as error:

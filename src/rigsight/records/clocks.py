@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.records.channel_names import NAMES_OF, closeness, plain_words
 from rigsight.records.column_mapping import Columns
-from rigsight.records.formats.time_stamps import seconds_since
+from rigsight.records.stamps import seconds_since
 
 TIME = "t"
 _NAMED = 2.0
@@ -90,10 +90,7 @@ def _in_front(names: Sequence[str], times: Sequence[int], number: int) -> int | 
 
 
 def possible_clocks(
-    names: Sequence[str],
-    signals: Mapping[str, int],
-    given: Mapping[str, int],
-    declared: int | None,
+    names: Sequence[str], signals: Mapping[str, int], given: Mapping[str, int], declared: int | None
 ) -> dict[str, list[int]]:
     """Return the numbers of the times by which each signal may go, the first that increases is its own."""
     own = own_clocks(names)
@@ -134,12 +131,12 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
     shared = shared_clock(chosen)
     known = {signal: clock.origin for signal, clock in clocks.items() if clock.origin is not None}
     if shared is not None:
-        labels = {**table.labels, time: shared.label}
+        labels = {time: shared.label, **table.labels}
         units = table.units if shared.unit is None else {**table.units, time: shared.unit}
         lines = table.lines if table.lines.size else np.arange(1, shared.stamps.size + 1, dtype=np.int64)
         return replace(
             table,
-            values={**table.values, time: shared.stamps},
+            values={time: shared.stamps, **table.values},
             labels=labels,
             units=units,
             lines=lines,
@@ -166,7 +163,7 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
     unit = next((clock.unit for clock in chosen if clock.unit is not None), None)
     return replace(
         table,
-        labels={**table.labels, time: chosen[0].label},
+        labels={time: chosen[0].label, **table.labels},
         units=table.units if unit is None else {**table.units, time: unit},
         axes=axes,
         clocks={signal: clock.label for signal, clock in clocks.items()},

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest, shown
 
+Floats = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class ColumnMapping:
@@ -73,7 +75,7 @@ class ColumnMapping:
         """True if scale or offset is given."""
         return self.scale is not None or self.offset is not None
 
-    def to_si(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_si(self, column: Floats) -> Floats:
         """Return a column in SI units, shape (n_samples,).
 
         Parameters
@@ -114,7 +116,7 @@ class Columns:
     """Numbers of a file before scale and offset."""
 
     # Signal name -> column, shape (n_samples,); all finite. Without time where `axes` has it.
-    values: Mapping[str, NDArray[np.float64]]
+    values: Mapping[str, Floats]
     labels: Mapping[str, str]  # signal name -> name of the column in the file
     lines: NDArray[np.int64]  # number of every row for messages, shape (n_samples,)
     notes: tuple[str, ...] = ()  # assumptions made while reading
@@ -122,7 +124,7 @@ class Columns:
     units: Mapping[str, str] = field(default_factory=dict)
     # Signal name -> time stamps, shape (n_samples,), where the signals do not share one axis; else empty. In
     # the unit of time.
-    axes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    axes: Mapping[str, Floats] = field(default_factory=dict)
     # Signal name -> how its time is called, where `axes` has it.
     clocks: Mapping[str, str] = field(default_factory=dict)
     row: str = "line"  # name of a row in messages: ``"line"`` of a text, ``"sample"`` otherwise

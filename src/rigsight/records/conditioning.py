@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.records.stamps import written_stamp
 
+Floats = NDArray[np.float64]
+
 FEWEST_SAMPLES = 50
 # Beyond, squares and quotients would overflow; data read with a wrong type looks like this.
 LARGEST_NUMBER = 1e100
@@ -46,7 +48,7 @@ class TimeBase:
     n_samples: int  # number of stamps
     # Measured stamps, shape (n_samples,), where the samples must be resampled; None where they lie on the
     # grid.
-    stamps: NDArray[np.float64] | None = None
+    stamps: Floats | None = None
     # Of these stamps, as a share of `dt`: how far they, or the steps between them, are from even at most.
     jitter: float = 0.0
     notes: tuple[str, ...] = ()  # what was assumed
@@ -56,7 +58,7 @@ class TimeBase:
         """The last stamp."""
         return self.t0 + self.dt * (self.n_samples - 1) if self.stamps is None else float(self.stamps[-1])
 
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """Return the stamps, shape (n_samples,)."""
         if self.stamps is not None:
             return self.stamps
@@ -76,9 +78,7 @@ def check_long_enough(file: str, n_samples: int) -> None:
         )
 
 
-def time_base(
-    stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str = "line"
-) -> TimeBase:
+def time_base(stamps: Floats, lines: NDArray[np.int64], file: str, row: str = "line") -> TimeBase:
     """Return the even grid of the time stamps."""
     check_long_enough(file, stamps.size)
     span = abs(stamps[-1] - stamps[0])
@@ -129,14 +129,14 @@ def time_base(
     return TimeBase(float(stamps[0]), _plain(dt, jitter * dt / stamps.size), stamps.size, stamps, jitter)
 
 
-def stamp_text(stamps: NDArray[np.float64], sample: int) -> str:
+def stamp_text(stamps: Floats, sample: int) -> str:
     """Return a stamp as text that tells it from its neighbors."""
     steps = np.abs(np.diff(stamps))
     finest = float(np.min(steps[steps > 0.0], initial=np.inf))
     return written_stamp(float(stamps[sample]), max(finest, 1e-3 * float(np.median(steps))), fewest=9)
 
 
-def pauses(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
+def pauses(stamps: Floats) -> NDArray[np.intp]:
     """Return the samples after which others are missing; none where steps vary (jitter).
 
     A step is a gap if it is longer than the others vary by at least half a sample, if it is longer by whole samples (or by more
@@ -163,7 +163,7 @@ def pauses(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
     return found
 
 
-def _is_missed(stamps: NDArray[np.float64], sample: int) -> bool:
+def _is_missed(stamps: Floats, sample: int) -> bool:
     """Return False if the stamps behind a long step are where they would be without it: one was only late."""
     step, near = float(np.median(np.diff(stamps))), 10
     before = stamps[max(0, sample - near) : sample + 1]
@@ -173,12 +173,12 @@ def _is_missed(stamps: NDArray[np.float64], sample: int) -> bool:
     return found - expected > 0.5 * step
 
 
-def missing_behind(stamps: NDArray[np.float64], sample: int) -> int:
+def missing_behind(stamps: Floats, sample: int) -> int:
     """Return how many samples are missing behind one."""
     return round(float(stamps[sample + 1] - stamps[sample]) / float(np.median(np.diff(stamps)))) - 1
 
 
-def resolution(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
+def resolution(stamps: Floats) -> Floats:
     """Return the spacing of the numbers that the file's digits can express at each stamp, shape (n_samples,).
 
     Files print either a fixed number of decimals or of significant digits; the coarser of both explains a stamp's rounding.
@@ -211,7 +211,7 @@ def _plain(dt: float, uncertainty: float) -> float:
     return dt
 
 
-def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str) -> None:
+def _check_order(stamps: Floats, lines: NDArray[np.int64], file: str, row: str) -> None:
     steps = np.diff(stamps)
     if np.all(steps > 0.0):
         return
@@ -229,7 +229,7 @@ def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: st
     )
 
 
-def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str) -> None:
+def _check_gaps(stamps: Floats, lines: NDArray[np.int64], file: str, row: str) -> None:
     """Refuse missing samples."""
     gaps = pauses(stamps)
     if gaps.size == 0:

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from rigsight.errors import InputError, readable
-from rigsight.records.channel_table import read_channels, unread_time
+from rigsight.records.channel_table import read_columns
 from rigsight.records.channel_units import si_mapping, units_of_columns
 from rigsight.records.clocks import TIME as TIME
-from rigsight.records.clocks import own_clocks, refuse_one_dt, side_by_side
+from rigsight.records.clocks import side_by_side
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
 from rigsight.records.conditioning import check_long_enough, time_base
-from rigsight.records.formats.channel_file import file_format
-from rigsight.records.formats.read_csv import read_csv
-from rigsight.records.readings import between_readings, refuse_codes, unwrapped
 from rigsight.records.record import Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, joined
+from rigsight.records.sensor_signs import between_readings, refuse_codes, unwrapped
 from rigsight.records.sound_signals import (
     NamedSignal,
     alike_notes,
@@ -218,24 +216,9 @@ def _table(
     time_is_mapped: bool,
 ) -> Columns:
     """Return the numbers of a file of any format, as they stand there."""
-    dt, dialect = options.dt, {key: getattr(options, key) for key in _DIALECT}
-    if file_format(path) is not None:
-        _refuse_dialect(path, dialect)
-        return read_channels(path, columns, TIME, time_is_mapped=time_is_mapped, optional=spare, dt=dt)
-    own = {signal: column for signal, column in columns.items() if dt is None or signal != TIME}
-    table = read_csv(path, own, optional=spare, **dialect)
-    if dt is None:
-        return table
-    clocks = own_clocks(table.names)
-    if len({clocks.get(table.names.index(label)) for label in table.labels.values()}) > 1:
-        refuse_one_dt(path.name, dt, "clocks of their own")
-    stamps = dt * np.arange(table.lines.size, dtype=np.float64)
-    notes = unread_time(path, dt, [TIME] if TIME in table.names else [])
-    return replace(
-        table,
-        values={TIME: stamps, **table.values},
-        labels={TIME: "dt", **table.labels},
-        notes=(*table.notes, *notes),
+    dialect = {key: getattr(options, key) for key in _DIALECT}
+    return read_columns(
+        path, columns, time_is_mapped=time_is_mapped, optional=spare, dt=options.dt, dialect=dialect
     )
 
 
@@ -248,12 +231,6 @@ def _refuse_time_as_signal(file: str, table: Columns) -> None:
             f"{file}: {same[0]} and {TIME} are both read from column '{table.labels[TIME]}'. Give each a column of its own under "
             "columns."
         )
-
-
-def _refuse_dialect(path: Path, dialect: Mapping[str, object]) -> None:
-    for key, value in dialect.items():
-        if value is not None:
-            raise InputError(f"{path.name} is not delimited text, so {key} does not apply; remove {key}.")
 
 
 def _on_one_axis(

@@ -14,6 +14,8 @@ from rigsight.records.formats.channel import MOST_SAMPLES
 from rigsight.records.record import Hold
 from rigsight.records.stamps import written_stamp
 
+Floats = NDArray[np.float64]
+
 # Of the sample time: closer than this, a stamp lies on the grid.
 _ON_GRID = 1e-6
 # What a step may be coarser than the samples without a filter: sample times are not known better.
@@ -34,7 +36,7 @@ class Resampled:
     # First stamp and sample time [s].
     t0: float
     dt: float
-    samples: Mapping[str, NDArray[np.float64]]  # signal name -> samples, shape (n_samples,) each
+    samples: Mapping[str, Floats]  # signal name -> samples, shape (n_samples,) each
     notes: tuple[str, ...] = ()  # what was interpolated, how, and at which cost
     is_filtered: bool = False  # whether an input was filtered, so that it is held no more between the samples
     # Time [s] by which signals may be late against each other, as far as the clocks can tell.
@@ -43,7 +45,7 @@ class Resampled:
 
 def joined(
     file: str,
-    samples: Mapping[str, NDArray[np.float64]],
+    samples: Mapping[str, Floats],
     bases: Mapping[str, TimeBase],
     clocks: Mapping[str, str],
     step: float | None,
@@ -61,7 +63,7 @@ def joined(
     grid = start + dt * np.arange(n_samples, dtype=np.float64)
     is_filtered = any(dt > _COARSER * base.dt for base in distinct)
     driven_finer = any(dt > _COARSER * base.dt for name, base in bases.items() if name in holds)
-    on_clock: dict[str, NDArray[np.float64]] = {}
+    on_clock: dict[str, Floats] = {}
     how, costs = [], []
     for signal, base in bases.items():
         position = (start - base.t0) / base.dt
@@ -120,12 +122,8 @@ def _common(
 
 
 def _interpolated(
-    samples: NDArray[np.float64],
-    base: TimeBase,
-    grid: NDArray[np.float64],
-    dt: float,
-    hold: Hold | None,
-) -> tuple[NDArray[np.float64], str, float]:
+    samples: Floats, base: TimeBase, grid: Floats, dt: float, hold: Hold | None
+) -> tuple[Floats, str, float]:
     """Return samples of shape (n_samples,) on the new clock, in which manner they were found, and the cost as a share of the RMS.
 
     Of a held input the cost is what differs from it between the samples; of others the error with which every second sample is
@@ -147,9 +145,7 @@ def _interpolated(
     return _spline(stamps, samples, grid, base.dt), "by cubic splines", by_spline
 
 
-def _means_of_held(
-    samples: NDArray[np.float64], stamps: NDArray[np.float64], grid: NDArray[np.float64], dt: float
-) -> tuple[NDArray[np.float64], float]:
+def _means_of_held(samples: Floats, stamps: Floats, grid: Floats, dt: float) -> tuple[Floats, float]:
     """Return a signal that is held over each sample of the grid, and the RMS of what it differs from the one held at the stamps.
 
     It is the mean over the sample, which alone would be late or early by the moment of what lies within; that moment is made up
@@ -168,7 +164,7 @@ def _means_of_held(
     at = np.clip(np.searchsorted(stamps, edges, "right") - 1, 0, None)
     within = edges - stamps[at]
 
-    def integral(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def integral(values: Floats) -> tuple[Floats, Floats]:
         once = np.concatenate([[0.0], np.cumsum(values * steps)])
         return once[at] + values[at] * within, once
 
@@ -186,9 +182,7 @@ def _means_of_held(
     return mean + (beside[:-2] - beside[2:]) / (2.0 * dt**2), spread
 
 
-def _spline(
-    stamps: NDArray[np.float64], samples: NDArray[np.float64], grid: NDArray[np.float64], step: float
-) -> NDArray[np.float64]:
+def _spline(stamps: Floats, samples: Floats, grid: Floats, step: float) -> Floats:
     """Return smooth samples on another clock, shape of `grid`; samples much closer than `step` are averaged first."""
     # Slow to load, and every process that reads a file apart would wait for it.
     from scipy.interpolate import CubicSpline
@@ -207,9 +201,7 @@ def _spline(
     return np.asarray(CubicSpline(place, values)(at), dtype=np.float64)
 
 
-def _decimated(
-    samples: NDArray[np.float64], base: TimeBase, grid: NDArray[np.float64], dt: float, hold: Hold | None
-) -> NDArray[np.float64]:
+def _decimated(samples: Floats, base: TimeBase, grid: Floats, dt: float, hold: Hold | None) -> Floats:
     """Return samples of shape (n_samples,) on a coarser clock, low-pass filtered forward and backward."""
     from scipy.signal import filtfilt, firwin
 

@@ -1,15 +1,24 @@
 """Does a channel show what moves, or signs of its own: codes for no reading, a full turn, a value that is held over several rows?
 
-The one place where these are found, for `inspect`, `init` and every command that reads a record.
+The one place where these are found, for `inspect`, `init` and every command that reads a record, and where a record is freed of
+them.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.records.channel_units import conversion, is_a
+from rigsight.records.column_mapping import ColumnMapping, Columns
+
+Floats = NDArray[np.float64]
 
 _CODE_SIZE = 1e30
 """From here on no reading in any unit: 9.9e37 and 9.91e37 (SCPI), 9.97e36 (NetCDF), 9.9e34 (DIAdem), 3.4e38 (end of a type)."""
@@ -38,6 +47,10 @@ FEWEST_FRESH = 20
 _REGULAR = 0.9
 """Share of the changes that must follow the earlier one after the usual number of rows, one more or one less: two clocks beat."""
 
+_ROWS_LISTED = 6
+"""Rows that a message lists."""
+_ANGLE = "rad"
+
 
 @dataclass(frozen=True)
 class Code:
@@ -47,7 +60,7 @@ class Code:
     samples: NDArray[np.intp]
 
 
-def codes(samples: NDArray[np.float64]) -> tuple[Code, ...]:
+def codes(samples: Floats) -> tuple[Code, ...]:
     """Return the codes for no reading in a signal of shape (n_samples,), all finite.
 
     A code is a usual number for it, rare, and further from all readings than any two of them that follow each other: a signal
@@ -75,7 +88,7 @@ def codes(samples: NDArray[np.float64]) -> tuple[Code, ...]:
     return tuple(found)
 
 
-def is_wrapped(samples: NDArray[np.float64], period: float) -> bool:
+def is_wrapped(samples: Floats, period: float) -> bool:
     """Return True if a signal of shape (n_samples,) begins again at the end of a period, as an angle does after a full turn.
 
     It stays within one period, and at each jump it moves on as it does elsewhere if a period is added or taken off.
@@ -96,7 +109,7 @@ def is_wrapped(samples: NDArray[np.float64], period: float) -> bool:
     )
 
 
-def wrapping_counter(samples: NDArray[np.float64]) -> float | None:
+def wrapping_counter(samples: Floats) -> float | None:
     """Return the range of a counter of whole numbers that begins again at its end, a power of two; None if it is none."""
     low, high = float(np.min(samples)), float(np.max(samples))
     for period in _COUNTERS:
@@ -116,7 +129,7 @@ class Held:
     fresh: NDArray[np.intp]  # rows with a reading of their own
 
 
-def held(samples: NDArray[np.float64]) -> Held | None:
+def held(samples: Floats) -> Held | None:
     """Return how a signal of shape (n_samples,) is held over several rows; None if it is not.
 
     It then changes after the same number of rows again and again, and never in two rows that follow each other. Rounding and rest
@@ -138,3 +151,115 @@ def held(samples: NDArray[np.float64]) -> Held | None:
     if common < 2:
         return Held(rows, changes)
     return Held(common, np.arange(changes[0] % common, samples.size, common))
+
+
+def refuse_codes(path: Path, table: Columns) -> None:
+    """Refuse a signal among whose readings are codes for no reading."""
+    for signal, samples in table.values.items():
+        found = codes(samples)
+        if not found:
+            continue
+        reported = []
+        for code in found:
+            rows = [str(table.lines[place]) for place in code.samples[:_ROWS_LISTED]]
+            more = f" and {code.samples.size - _ROWS_LISTED} more" if code.samples.size > _ROWS_LISTED else ""
+            reported.append(
+                f"{code.value:.6g} in {table.row}{'s' if code.samples.size > 1 else ''} {', '.join(rows)}{more}"
+            )
+        raise InputError(
+            f"{path.name}, column '{table.labels[signal]}': {'; '.join(reported)}: such a number stands for a missing or invalid "
+            "reading. Cut the record there, or fill the gap before reading if you know what was there."
+        )
+
+
+def unwrapped(
+    path: Path, table: Columns, columns: Mapping[str, ColumnMapping], units: Mapping[str, str]
+) -> tuple[Columns, tuple[str, ...]]:
+    """Return a table in which angles and counters go on at the end of their range, with a note for each."""
+    values, notes = dict(table.values), []
+    for signal, mapping in columns.items():
+        if signal not in values or mapping.unwrap is False:
+            continue
+        where = f"{path.name}, column '{table.labels[signal]}'"
+        period, unit = _period(where, signal, values[signal], mapping, units.get(signal, ""))
+        if period is None:
+            continue
+        before = values[signal]
+        values[signal] = np.unwrap(before, period=period)
+        count = int(np.count_nonzero(np.diff(np.round((values[signal] - before) / period))))
+        if count:
+            leave = f'{signal} = {{ name = "{table.labels[signal]}", unwrap = false }} leaves it as it is'
+            why = "as asked for" if mapping.unwrap is not None else leave
+            notes.append(
+                f"{where}: {signal} begins again at the end of {period:.6g}{unit}, {count} time{'s' if count > 1 else ''}; it "
+                f"was unwrapped ({why})."
+            )
+    return replace(table, values=values), tuple(notes)
+
+
+def _period(
+    where: str, signal: str, samples: Floats, mapping: ColumnMapping, si: str
+) -> tuple[float | None, str]:
+    """Return the period of a signal in the numbers of its column, None where nothing is unwrapped, and its unit in a note."""
+    scale = 1.0 if mapping.scale is None else abs(mapping.scale)
+    turn = 2.0 * math.pi / (conversion(_ANGLE, si)[0] * scale) if is_a(_ANGLE, si) else None
+    if mapping.unwrap is True:
+        if turn is None:
+            raise InputError(
+                f"{where}: unwrap = true needs an angle, but {signal} is in {si or 'no unit'}. Give the numbers after which the "
+                "column begins again: unwrap = 65536."
+            )
+        return turn, " (a full turn)"
+    if mapping.unwrap:
+        span = float(np.ptp(samples))
+        if span > 1.001 * mapping.unwrap:
+            raise InputError(
+                f"{where}: unwrap = {mapping.unwrap:g}, but its numbers span {span:.6g}. Give the period in its numbers."
+            )
+        return float(mapping.unwrap), ""
+    # Of a signal without a unit of its own, such as a reference, the numbers alone tell.
+    for period in (turn,) if turn is not None else FULL_TURNS if not si else ():
+        if is_wrapped(samples, period):
+            return period, " (a full turn)"
+    if turn is not None and not mapping.is_converted and is_wrapped(samples, FULL_TURNS[1]):
+        raise InputError(
+            f"{where}: {signal} is taken in {si}, but begins again after 360, as an angle in degrees does. Write "
+            f'{signal} = {{ name = "...", unit = "deg" }}.'
+        )
+    return wrapping_counter(samples), " (the range of a counter)"
+
+
+def between_readings(
+    path: Path, time: str, table: Columns, sensors: Collection[str]
+) -> tuple[Columns, tuple[str, ...]]:
+    """Return a table in which a reading that is held over several rows is interpolated between its own rows, with notes.
+
+    What the rig did meanwhile is smooth; what stands in the file is the last reading, too late by up to the
+    time between two of them. Rows before the first and behind the last reading are left out.
+    """
+    found = {s: slow for s in sensors if s in table.values and (slow := held(table.values[s])) is not None}
+    if not found:
+        return table, ()
+    # Slow to load, and every process that reads a file apart would wait for it.
+    from scipy.interpolate import CubicSpline
+
+    values = dict(table.values)
+    for signal, slow in found.items():
+        stamps = table.axes.get(signal, table.values.get(time))
+        if stamps is None or not np.all(np.diff(stamps) > 0.0):
+            stamps = np.arange(values[signal].size, dtype=np.float64)
+        inside = np.clip(stamps, stamps[slow.fresh[0]], stamps[slow.fresh[-1]])
+        values[signal] = CubicSpline(stamps[slow.fresh], values[signal][slow.fresh])(inside)
+    notes = tuple(
+        f"Warning: {path.name}, column '{table.labels[signal]}': {signal} changes every {slow.rows} rows only ({slow.fresh.size} "
+        f"readings in {table.values[signal].size} rows): its device is slower than the record. It was interpolated between the "
+        "rows at which it changes; motion and noise faster than its readings are not seen, a delay of the device remains."
+        for signal, slow in found.items()
+    )
+    mended = replace(table, values=values)
+    if table.axes:
+        return mended, notes
+    start = max(int(slow.fresh[0]) for slow in found.values())
+    stop = min(int(slow.fresh[-1]) for slow in found.values()) + 1
+    cut = {signal: samples[start:stop] for signal, samples in values.items()}
+    return replace(table, values=cut, lines=table.lines[start:stop]), notes

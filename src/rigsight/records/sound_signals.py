@@ -13,7 +13,9 @@ from rigsight.errors import InputError, nearest
 from rigsight.records.channel_names import closeness
 from rigsight.records.column_mapping import Columns
 from rigsight.records.conditioning import LARGEST_NUMBER
-from rigsight.records.plausibility import clipping, is_constant
+from rigsight.records.signals import clipping, is_constant
+
+Floats = NDArray[np.float64]
 
 _LISTED = 30
 """Columns that a message lists."""
@@ -63,7 +65,7 @@ def listed_columns(table: Columns) -> str:
     return ", ".join(f"'{name}'" for name in table.names[:_LISTED]) or "none"
 
 
-def refuse_implausible(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
+def refuse_implausible(path: Path, raw: Mapping[str, Floats], table: Columns) -> None:
     """Reject implausibly large numbers, from a wrong data type or a lost decimal point."""
     for signal, samples in raw.items():
         largest = float(np.max(np.abs(samples)))
@@ -76,11 +78,11 @@ def refuse_implausible(path: Path, raw: Mapping[str, NDArray[np.float64]], table
 
 def moving(
     path: Path,
-    raw: dict[str, NDArray[np.float64]],
+    raw: dict[str, Floats],
     table: Columns,
     needed: Collection[str],
     outputs: Sequence[NamedSignal],
-) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
+) -> tuple[dict[str, Floats], list[str]]:
     """Return the signals that can be used, with notes on those that cannot."""
     constant = {signal for signal, samples in raw.items() if is_constant(samples)}
     measured = [output.name for output in outputs if output.name in raw]
@@ -97,7 +99,7 @@ def moving(
 
 def rest_notes(
     path: Path,
-    raw: Mapping[str, NDArray[np.float64]],
+    raw: Mapping[str, Floats],
     table: Columns,
     recorded: Sequence[NamedSignal],
     must_move: Collection[str],
@@ -126,7 +128,7 @@ def rest_notes(
     ]
 
 
-def clipping_notes(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> list[str]:
+def clipping_notes(path: Path, raw: Mapping[str, Floats], table: Columns) -> list[str]:
     """Report clipped signals."""
     return [
         f"Warning: {path.name}, column '{table.labels[signal]}': {signal} looks clipped, {count} samples are exactly at its "

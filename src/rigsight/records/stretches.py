@@ -23,8 +23,10 @@ from rigsight.records.conditioning import (
     resolution,
     stamp_text,
 )
-from rigsight.records.plausibility import is_constant
+from rigsight.records.signals import is_constant
 from rigsight.records.stamps import written_span
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +103,7 @@ def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ())
     return Stretches(tuple(moving), (note,))
 
 
-def _gaps(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
+def _gaps(stamps: Floats) -> NDArray[np.intp]:
     """Return the samples after which others are missing, see `pauses`; none where a jump may be rounding."""
     none = np.zeros(0, dtype=np.intp)
     if stamps.size < FEWEST_SAMPLES:
@@ -110,7 +112,7 @@ def _gaps(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
     return none if found.size == 0 or _may_be_rounding(stamps) else found
 
 
-def _may_be_rounding(stamps: NDArray[np.float64]) -> bool:
+def _may_be_rounding(stamps: Floats) -> bool:
     """Return True if the jumps may come from rounding an even time axis to the printed digits."""
     digits = resolution(stamps)
     if np.max(digits) <= COARSEST_STAMPS * float(np.median(np.diff(stamps))):
@@ -130,7 +132,7 @@ def one_stretch(file: str, found: Stretches) -> Columns:
     )
 
 
-def _where(stamps: NDArray[np.float64], table: Columns, ends: NDArray[np.intp]) -> str:
+def _where(stamps: Floats, table: Columns, ends: NDArray[np.intp]) -> str:
     """Return the location of the first gap and the number of gaps."""
     first = int(ends[0])
     others = "" if ends.size == 1 else f", and at {ends.size - 1} more place{'s' if ends.size > 2 else ''}"
@@ -147,7 +149,7 @@ def _moves(part: Columns, outputs: Sequence[str]) -> bool:
 def _part(table: Columns, time: str, begin: float, stop: float) -> Columns | None:
     """Return the rows with stamps from `begin` to `stop`; None where a clock has none there."""
 
-    def rows(stamps: NDArray[np.float64]) -> slice:
+    def rows(stamps: Floats) -> slice:
         return slice(int(np.searchsorted(stamps, begin)), int(np.searchsorted(stamps, stop, "right")))
 
     if not table.axes:

@@ -33,7 +33,7 @@ from rigsight.report.wording import (
 )
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
-from rigsight.simulate.printing.mathml import mathml_equation
+from rigsight.simulate.printing.notation import mathml_equation
 from rigsight.simulate.printing.shown import shown_equations
 
 _TEMPLATES = files("rigsight.report") / "templates"

@@ -1,16 +1,16 @@
 """Robot models of other simulators: from MJCF and URDF to a checked rig file, and parameters and effects back to them."""
 
-from rigsight.robots.drafting.draft import RigDraft as RigDraft
-from rigsight.robots.drafting.draft import draft_rig as draft_rig
-from rigsight.robots.drafting.draft import rig_text as rig_text
+from rigsight.robots.draft import RigDraft as RigDraft
+from rigsight.robots.draft import RobotFile as RobotFile
+from rigsight.robots.draft import draft_rig as draft_rig
+from rigsight.robots.draft import read_robot as read_robot
+from rigsight.robots.draft import rig_text as rig_text
 from rigsight.robots.free_run import FreeRun as FreeRun
 from rigsight.robots.free_run import free_run as free_run
-from rigsight.robots.reading.tree import load_model as load_model
-from rigsight.robots.reading.tree import load_spec as load_spec
-from rigsight.robots.readings import sensor_readings as sensor_readings
-from rigsight.robots.robot_file import RobotFile as RobotFile
-from rigsight.robots.robot_file import read_robot as read_robot
-from rigsight.robots.writing.isaac import isaac_settings as isaac_settings
-from rigsight.robots.writing.writing_back import WrittenBack as WrittenBack
-from rigsight.robots.writing.writing_back import with_gears as with_gears
-from rigsight.robots.writing.writing_back import write_back as write_back
+from rigsight.robots.free_run import sensor_readings as sensor_readings
+from rigsight.robots.isaac import isaac_settings as isaac_settings
+from rigsight.robots.tree import load_model as load_model
+from rigsight.robots.tree import load_spec as load_spec
+from rigsight.robots.writing_back import WrittenBack as WrittenBack
+from rigsight.robots.writing_back import with_gears as with_gears
+from rigsight.robots.writing_back import write_back as write_back

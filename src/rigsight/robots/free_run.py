@@ -1,4 +1,4 @@
-"""Comparison of a rig with MuJoCo: both run freely from the same state, and their coordinates are compared."""
+"""Runs of a MuJoCo model: freely beside its rig from the same state, whose coordinates are compared, and under given controls."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import Rig, rig_of_tables
-from rigsight.robots.drafting.draft import RigDraft, with_known_constants
+from rigsight.robots.draft import RigDraft, with_known_constants
 from rigsight.simulate import compose, simulate
 
 if TYPE_CHECKING:
     import mujoco
+
+Floats = NDArray[np.float64]
+
 
 STEP, SAMPLES, STEPS_PER_SAMPLE = 1e-4, 500, 10
 """MuJoCo's step [s], samples that are compared, and steps from each to the next."""
@@ -26,6 +30,9 @@ _ACCURACY = 1e-8
 _WATCHED = "watched_"
 _WAY = {False: 0.4, True: 0.05}
 """How far from its reference a hinge [rad] or slide [m] starts."""
+
+_WHOLE = 1e-6
+"""How far a sample time may be from a whole number of steps, in steps."""
 
 
 @dataclass(frozen=True)
@@ -94,9 +101,7 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     return FreeRun(STEP * STEPS_PER_SAMPLE * (SAMPLES - 1), differences, friction)
 
 
-def _ours(
-    draft: RigDraft, start: dict[str, float], reported: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
+def _ours(draft: RigDraft, start: dict[str, float], reported: Floats) -> dict[str, Floats]:
     """Return the coordinates of the rig along the run, shape (SAMPLES,) each."""
     rig = watched(draft)
     structure = compose(rig, [])
@@ -121,3 +126,25 @@ def watched(draft: RigDraft) -> Rig:
     }
     tables = with_known_constants({**draft.tables, "sensors": sensors}, draft.tables.get("constants", {}))
     return rig_of_tables(tables, "the rig from the model")
+
+
+def sensor_readings(model: mujoco.MjModel, controls: Floats, dt: float) -> Floats:
+    """Run a model by its own integrator from where it is drawn, at rest."""
+    import mujoco
+
+    controls = np.asarray(controls, dtype=np.float64)
+    if controls.ndim != 2 or controls.shape[1] != model.nu:
+        raise InputError(f"Controls have shape (n_samples, {model.nu}) for this model, got {controls.shape}.")
+    steps = dt / float(model.opt.timestep)
+    if round(steps) < 1 or abs(steps - round(steps)) > _WHOLE:
+        raise InputError(
+            f"dt must be a multiple of the model's step of {model.opt.timestep:g} s, got {dt:g} s."
+        )
+    data = mujoco.MjData(model)
+    readings = np.empty((len(controls), model.nsensordata))
+    for reported, reading in zip(controls, readings, strict=True):
+        data.ctrl[:] = reported
+        mujoco.mj_forward(model, data)
+        reading[:] = data.sensordata
+        mujoco.mj_step(model, data, round(steps))
+    return readings

@@ -9,7 +9,8 @@ from rigsight.simulate.equations.structure import Structure as Structure
 from rigsight.simulate.equations.structure import carried_over as carried_over
 from rigsight.simulate.equations.structure import special_values as special_values
 from rigsight.simulate.equations.structure import unique_names as unique_names
-from rigsight.simulate.rest import rest_state as rest_state
+from rigsight.simulate.equilibrium import rest_state as rest_state
+from rigsight.simulate.side_by_side import Substeps as Substeps
 from rigsight.simulate.side_by_side import carries_tangents as carries_tangents
 from rigsight.simulate.side_by_side import choose_substeps as choose_substeps
 from rigsight.simulate.side_by_side import differs_at_events as differs_at_events
@@ -17,11 +18,10 @@ from rigsight.simulate.side_by_side import has_dry_friction as has_dry_friction
 from rigsight.simulate.side_by_side import normal_equations as normal_equations
 from rigsight.simulate.side_by_side import simulate_sets as simulate_sets
 from rigsight.simulate.side_by_side import simulate_tangents as simulate_tangents
+from rigsight.simulate.side_by_side import state_limits as state_limits
 from rigsight.simulate.side_by_side import tangent_equations as tangent_equations
 from rigsight.simulate.simulation import parameter_vector as parameter_vector
 from rigsight.simulate.simulation import record_input as record_input
 from rigsight.simulate.simulation import record_values as record_values
 from rigsight.simulate.simulation import simulate as simulate
 from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
-from rigsight.simulate.substeps import Substeps as Substeps
-from rigsight.simulate.substeps import state_limits as state_limits

@@ -1,7 +1,8 @@
-"""Equilibrium of any mechanism: balance of forces, including those held by friction and hysteresis."""
+"""At which state does a rig start and rest: declared values, else balance of forces with friction and memory; can it drift?"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,12 +11,29 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
+from scipy.linalg import null_space
 from scipy.optimize import least_squares
 
-from rigsight.effects.symbols import v
+from rigsight.effects import Place
+from rigsight.effects.symbols import derivative, v
+from rigsight.rigs import Rig
+from rigsight.simulate.compiled.kernel import kernel_of
+from rigsight.simulate.equations.composition import compose
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze, is_zero
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
-from rigsight.simulate.printing.c import limited
+from rigsight.simulate.input_hold import HeldInput, hold_input
+from rigsight.simulate.printing.language import limited
+
+RAMP_PERIODS = 20.0
+"""Length of the slow rise of the input in periods of the linear rig."""
+INTERVALS = 100
+"""Number of pieces of the rise, and of the first wait."""
+SETTLED = 1e-9
+"""Relative change of the states during one wait below which they are at rest."""
+WAITS = 7
+"""Each wait is twice as long as the one before."""
+TOLERANCE = 1e-9
+"""Error allowed per step, relative to the largest excursion of each state."""
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +45,110 @@ _HUGE = 1e100
 """Replaces infinity, because its square is still finite."""
 _PRECISE = 1e-15
 """Change of cost, point and slope at which the search ends, close to the precision of floating-point numbers."""
+
+_DRAWS = 3
+_SINGULAR = 1e-9
+"""Singular value of the scaled stiffness, relative to the largest, below which it counts as zero."""
+
+
+def rest_state(structure: Structure, p: Floats, held: HeldInput) -> Floats:
+    """Return the states at the start of a record, shape (n_states,): declared ones, and all others in equilibrium with them.
+
+    This is the equilibrium under the first sample of the inputs, reached from rest with empty memories: the inputs are raised
+    slowly from zero, so that hysteresis and friction hold the same forces as on a rig. A rig without a spring has no equilibrium
+    and starts at its rest position.
+    """
+    states = structure.states
+    given = {
+        states.index(symbol): _value(structure, p, value)
+        for symbol, value in structure.rig.mechanism.initial.items()
+        if symbol in states
+    }
+    moving = {states.index(rate) for rate in structure.tree.motion.velocities}
+    if has_raisable_damping(structure.rig) and not set(given) - moving:
+        state = _risen(structure, p, held)
+    else:
+        inputs = held.coefficients.reshape(held.n_pieces + 1, -1, 4)[0, : len(structure.rig.inputs), 0]
+        state = equilibrium(structure, p, inputs, given)
+    state[list(given)] = list(given.values())
+    return state
+
+
+def has_raisable_damping(rig: Rig) -> bool:
+    """Return True for a rig with one motion whose damping is a parameter of its own, so that a slow rise can be simulated."""
+    return rig.has_one_motion and (rig.motion.inertia is None or isinstance(rig.motion.damping, sp.Symbol))
+
+
+def _risen(structure: Structure, p: Floats, held: HeldInput) -> Floats:
+    """Return the state in which a rig with one motion rests after a slow rise of its input, simulated with high damping."""
+    state = np.zeros(max(1, len(structure.states)))
+    motion = structure.rig.motion
+    if motion.inertia is None:
+        return state
+    inertia = _value(structure, p, motion.inertia)
+    stiffness = _value(structure, p, motion.stiffness)
+    state[0] = _value(structure, p, motion.rest)
+    if stiffness <= 0.0:
+        return state
+    period = 2.0 * math.pi * math.sqrt(inertia / stiffness)
+    quiet = _quiet_parameters(structure, p, critical_damping=2.0 * math.sqrt(stiffness * inertia))
+    first = float(held.coefficients.reshape(held.n_pieces + 1, -1)[0, 0])
+    for start, stop in ((0.0, 0.0), (0.0, first)) if first != 0.0 else ((0.0, 0.0),):
+        reached = _settled(structure, quiet, state, (start, stop), RAMP_PERIODS * period)
+        if reached is None:
+            return state
+        state = reached
+    return state
+
+
+def _value(structure: Structure, p: Floats, expression: sp.Expr) -> float:
+    """Return the value of an expression in the rig's own symbols."""
+    return float(expression.subs({s: p[structure.names.index(s.name)] for s in expression.free_symbols}))
+
+
+def _quiet_parameters(structure: Structure, p: Floats, critical_damping: float) -> Floats:
+    """Return parameters with the same equilibria, but with critical damping and without delays and disturbances.
+
+    An overshoot of the equilibrium would leave a memory in hysteresis and friction that a rig at rest does not have.
+    """
+    quiet = p.copy()
+    damping = structure.names.index(structure.rig.motion.damping.name)
+    quiet[damping] = max(p[damping], critical_damping)
+    for effect in structure.effects:
+        if effect.delay is not None:
+            for own_name, null in effect.null_values().items():
+                name = structure.parameter_name(effect, own_name)
+                if name in structure.names:
+                    quiet[structure.names.index(name)] = null
+        if effect.place is Place.DISTURBANCE:
+            for parameter in effect.parameters:
+                name = structure.parameter_name(effect, parameter.name)
+                if name in structure.names:
+                    quiet[structure.names.index(name)] = 0.0
+    return quiet
+
+
+def _settled(
+    structure: Structure, p: Floats, state: Floats, ramp: tuple[float, float], duration: float
+) -> Floats | None:
+    """Return the state after a ramp of the input and waits until all states are at rest; None if the simulation fails."""
+    velocity = structure.velocity_index or 0
+    interval = duration / INTERVALS
+    samples = np.linspace(*ramp, INTERVALS + 1)
+    state = state.copy()
+    for wait in range(WAITS):
+        before = state.copy()
+        held = hold_input(samples, interval, "foh")
+        status, _, state = kernel_of(structure).simulate_one(held, p, state, TOLERANCE, samples.size)
+        if status != 0:
+            return None
+        moved = np.abs(state - before)
+        moved[velocity] = 0.0
+        if np.all(moved <= SETTLED * np.abs(state)):
+            break
+        samples = np.full(INTERVALS * 2**wait + 1, ramp[1])
+    state[velocity] = 0.0
+    return state
 
 
 def equilibrium(
@@ -122,41 +244,22 @@ def _reached(
 
 @lru_cache(maxsize=256)
 def _balance_of(structure: Structure) -> _Balance:
-    tree, states = structure.tree, structure.states
     frozen = freeze(structure)
     signs = frozen.friction_signs(structure)
-    rising = [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)[1:]]
-    at_rest: dict[sp.Expr, sp.Expr] = dict.fromkeys((*rising, TIME), sp.Integer(0))
-    still = {**at_rest, **dict.fromkeys(tree.motion.velocities, sp.Integer(0))}
-    before = [sp.Symbol(f"before {i}", real=True) for i in range(len(states))]
-    moved = {**at_rest, **_moved(structure, before)}
-    of_first_order = structure.equations[2 * len(tree.motion.coordinates) :]
-    rates, remembers = [], False
-    for missing in structure.out_of_balance:
-        rates.append(missing.xreplace(signs).xreplace(still))
-    for index, equation in enumerate(of_first_order, 2 * len(tree.motion.coordinates)):
-        rate = equation.rate.xreplace(still)
-        if not is_zero(rate):
-            rates.append(rate)
-            continue
-        remembers = True
-        reached = before[index] + equation.rate.xreplace(moved)
-        rates.append(
-            equation.symbol - (reached if equation.limit is None else limited(reached, equation.limit))
-        )
-    turned = [speed.xreplace(moved) for speed in frozen.speeds(structure)]
+    before = [sp.Symbol(f"before {i}", real=True) for i in range(len(structure.states))]
+    residuals, memories = residuals_at_rest(structure, before, limited, signs)
+    turned = [speed.xreplace(_moved(structure, before)) for speed in frozen.speeds(structure)]
     arguments = _arguments(structure, before, len(frozen.frictions))
     functions = [
         {"positive_part": lambda x: max(x, 0.0), "limited": lambda x, end: min(max(x, -end), end)},
         "numpy",
     ]
-    n = len(tree.motion.coordinates)
     return _Balance(
-        rates=sp.lambdify(arguments, rates, functions),
+        rates=sp.lambdify(arguments, list(residuals.values()), functions),
         turned=sp.lambdify(arguments, turned, functions),
-        unknown=(*range(n), *range(2 * n, len(states))),
+        unknown=tuple(residuals),
         n_frictions=len(frozen.frictions),
-        remembers=remembers,
+        remembers=bool(memories),
         one_sided=_one_sided(structure),
     )
 
@@ -178,16 +281,84 @@ def _one_sided(structure: Structure) -> dict[int, float]:
     return found
 
 
-def _moved(structure: Structure, before: Sequence[sp.Symbol]) -> dict[sp.Expr, sp.Expr]:
-    """Return the velocities over a step of unit time: differences of coordinates."""
+def residuals_at_rest(
+    structure: Structure,
+    before: Sequence[sp.Expr],
+    within: Callable[[sp.Expr, sp.Expr], sp.Expr],
+    signs: Mapping[sp.Expr, sp.Expr] | None = None,
+) -> tuple[dict[int, sp.Expr], set[int]]:
+    """Return what is zero at rest for each state but the velocities, by index, and the indices of memories.
+
+    It is what a coordinate lacks of balance, the rate of a state, or what a memory, which nothing moves at rest, has of the way
+    from the states before; `within` limits that to its range.
+    """
     motion = structure.tree.motion
-    return {
-        velocity: coordinate - before[i]
-        for i, (coordinate, velocity) in enumerate(zip(motion.coordinates, motion.velocities, strict=True))
-    }
+    n, still = len(motion.coordinates), {**_steady(structure), **dict.fromkeys(motion.velocities, sp.S.Zero)}
+    lacking = (missing.xreplace(signs or {}).xreplace(still) for missing in structure.out_of_balance)
+    found, memories = dict(enumerate(lacking)), set()
+    for index, equation in enumerate(structure.equations[2 * n :], 2 * n):
+        found[index] = equation.rate.xreplace(still)
+        if is_zero(found[index]):
+            memories.add(index)
+            reached = before[index] + equation.rate.xreplace(_moved(structure, before))
+            found[index] = equation.symbol - (
+                reached if equation.limit is None else within(reached, equation.limit)
+            )
+    return found, memories
+
+
+def _steady(structure: Structure) -> dict[sp.Expr, sp.Expr]:
+    """Return zeros for time and the rates of inputs."""
+    rising = [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)[1:]]
+    return dict.fromkeys((*rising, TIME), sp.S.Zero)
+
+
+def _moved(structure: Structure, before: Sequence[sp.Expr]) -> dict[sp.Expr, sp.Expr]:
+    """Return the velocities over a step of unit time under steady inputs: differences of coordinates."""
+    motion = structure.tree.motion
+    pairs = zip(motion.velocities, motion.coordinates, before, strict=False)
+    return {**_steady(structure), **{velocity: now - then for velocity, now, then in pairs}}
 
 
 def _arguments(structure: Structure, before: Sequence[sp.Symbol], n_frictions: int) -> list[list[sp.Symbol]]:
     inputs = [input_symbols(i)[0] for i in range(len(structure.rig.inputs))]
     signs = [FrozenStructure.friction_sign(i) for i in range(n_frictions)]
     return [list(structure.parameter_symbols), inputs, list(structure.states), list(before), signs]
+
+
+def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
+    """Return True if a rig can rest at different positions under the same force, and a sensor shows the difference."""
+    structure = compose(rig)
+    motion = structure.tree.motion
+    if not motion.coordinates:
+        return False
+    states = [equation.symbol for equation in structure.equations if equation.symbol not in motion.velocities]
+    rates = [*structure.out_of_balance, *(e.rate for e in structure.equations[2 * len(motion.coordinates) :])]
+    still = {*motion.velocities, TIME, *(s for i in range(len(rig.inputs)) for s in input_symbols(i)[1:])}
+    shown = list(structure.outputs)
+    if structure.elimination is not None:
+        # Without velocities and input rates the forces are short; otherwise their slopes would be too long.
+        zero = dict.fromkeys(still, sp.S.Zero)
+        rates, shown = ([e.xreplace(zero) for e in own] for own in (rates, shown))
+    slopes = sp.Matrix([[derivative(e, state) for state in states] for e in (*rates, *shown)])
+    symbols = sorted(slopes.free_symbols, key=str)
+    function = sp.lambdify(symbols, slopes, [{"positive_part": lambda x: np.maximum(x, 0.0)}, "numpy"])
+    rng = np.random.default_rng(0)
+    defaults = {p.name: p.default for p in (*rig.constants, *rig.parameters) if p.default is not None}
+    values = {f"parameter {name}": value for name, value in {**defaults, **known}.items()}
+    for _ in range(_DRAWS):
+        numbers = [
+            0.0 if symbol in still else values.get(str(symbol), float(rng.uniform(0.2, 0.8)))
+            for symbol in symbols
+        ]
+        with np.errstate(all="ignore"):
+            matrix = np.asarray(function(*numbers), dtype=np.float64)
+        if not np.all(np.isfinite(matrix)):
+            continue
+        balance, seen = matrix[: len(rates)], matrix[len(rates) :]
+        size = np.linalg.norm(balance, axis=0)
+        size[size == 0.0] = 1.0
+        free = null_space(balance / size, rcond=_SINGULAR)
+        if not np.any(np.abs((seen / size) @ free) > _SINGULAR * np.max(np.abs(seen), initial=1.0)):
+            return False
+    return True

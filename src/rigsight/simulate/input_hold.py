@@ -1,4 +1,4 @@
-"""Input between its samples, as a cubic polynomial per interval.
+"""Input between its samples, as a cubic polynomial per interval, and beyond its ends.
 
 The hold limits how well a model can fit: with linear interpolation, a sampled analog signal looks like one with a small delay and
 a gain error that grows with frequency.
@@ -13,9 +13,10 @@ from functools import cache, lru_cache
 from typing import Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from rigsight.simulate.linear_prediction import continued
+Floats = NDArray[np.float64]
 
 Hold = Literal["zoh", "foh", "band_limited"]
 
@@ -30,6 +31,11 @@ _HALF_LENGTH = 48
 _LONGEST_KEPT = 50_000
 """Samples up to which an input is cached for the next model; the cache stays below half a gigabyte."""
 
+_ORDER, _KNOWN = 24, 240
+"""Samples that a prediction weighs, enough for twelve tones, and samples at the end to which it is fitted."""
+_RANK = 1e-12
+"""Share of the largest power below which a direction is rounding error; samples of a few tones are linearly dependent."""
+
 
 @dataclass(frozen=True)
 class HeldInput:
@@ -38,7 +44,7 @@ class HeldInput:
     # Shape (n_intervals + 1, 4), for several inputs (n_intervals + 1, n_inputs, 4): ``c0 + c1 tau + c2 tau^2
     # + c3 tau^3`` with tau [s] from the start of each interval; row 0 is the input before the record, held at
     # its first value.
-    coefficients: NDArray[np.float64]
+    coefficients: Floats
     interval: float  # length of an interval [s]
     per_sample: int  # intervals per sample time
     continuous: bool  # false if the input jumps between intervals
@@ -90,7 +96,7 @@ class HeldInput:
         found[:, column] = shifted.coefficients
         return replace(self, coefficients=found.reshape(self.coefficients.shape))
 
-    def at_samples(self, n_samples: int) -> NDArray[np.float64]:
+    def at_samples(self, n_samples: int) -> Floats:
         """Return each input with its first and second time derivative at the samples, shape (3 n_inputs, n_samples).
 
         The values are those of the piece that begins there; at the last sample, those of the piece that ends there.
@@ -105,7 +111,7 @@ class HeldInput:
         return np.moveaxis(found, 0, 2).reshape(-1, found.shape[0])
 
 
-def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput:
+def hold_input(samples: Floats, dt: float, hold: Hold) -> HeldInput:
     """Return the input between its samples."""
     samples = np.ascontiguousarray(samples, dtype=np.float64)
     if samples.size > _LONGEST_KEPT:
@@ -119,32 +125,22 @@ def _kept(content: bytes, dt: float, hold: Hold) -> HeldInput:
     return _between(np.frombuffer(content, dtype=np.float64), dt, hold)
 
 
-def _between(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput:
+def _between(samples: Floats, dt: float, hold: Hold) -> HeldInput:
     if hold == "band_limited":
         nodes, slopes = _band_limited_nodes(samples, dt)
         per_sample = BAND_LIMITED_INTERVALS
         if _is_followed_by_one_piece(nodes, slopes, dt):
             nodes, slopes, per_sample = nodes[::per_sample], slopes[::per_sample], 1
-    else:
-        nodes, slopes = samples, np.zeros(0)
-        per_sample = 1
-    interval = dt / per_sample
-    coefficients = np.zeros((nodes.size, 4))
-    coefficients[0, 0] = nodes[0]
-    rows = coefficients[1:]
-    rows[:, 0] = nodes[:-1]
-    rise = np.diff(nodes)
+        return replace(hold_motion(nodes, slopes, dt / per_sample), per_sample=per_sample)
+    rows = np.zeros((samples.size, 4))
+    rows[0, 0] = samples[0]
+    rows[1:, 0] = samples[:-1]
     if hold == "foh":
-        rows[:, 1] = rise / interval
-    elif hold == "band_limited":
-        first, last = slopes[:-1] * interval, slopes[1:] * interval
-        rows[:, 1] = slopes[:-1]
-        rows[:, 2] = (3.0 * rise - 2.0 * first - last) / interval**2
-        rows[:, 3] = (first + last - 2.0 * rise) / interval**3
-    return HeldInput(coefficients, interval, per_sample, continuous=hold != "zoh")
+        rows[1:, 1] = np.diff(samples) / dt
+    return HeldInput(rows, dt, 1, continuous=hold != "zoh")
 
 
-def hold_motion(values: NDArray[np.float64], rates: NDArray[np.float64], dt: float) -> HeldInput:
+def hold_motion(values: Floats, rates: Floats, dt: float) -> HeldInput:
     """Return a prescribed motion between samples from displacement and velocity, both of shape (n_samples,)."""
     rows = np.zeros((values.size, 4))
     rows[0, 0] = values[0]
@@ -157,9 +153,7 @@ def hold_motion(values: NDArray[np.float64], rates: NDArray[np.float64], dt: flo
     return HeldInput(rows, dt, 1, continuous=True)
 
 
-def hold_accelerated_motion(
-    values: NDArray[np.float64], rates: NDArray[np.float64], accelerations: NDArray[np.float64], dt: float
-) -> HeldInput:
+def hold_accelerated_motion(values: Floats, rates: Floats, accelerations: Floats, dt: float) -> HeldInput:
     """Return a prescribed motion between samples from displacement, velocity and acceleration, each of shape (n_samples,).
 
     One cubic piece per sample, given by displacements and velocities, has an acceleration that is wrong by 1 % at 17 samples a
@@ -216,9 +210,7 @@ def _divided(held: HeldInput, parts: int) -> HeldInput:
     return HeldInput(rows, interval, held.per_sample * parts, held.continuous)
 
 
-def _band_limited_nodes(
-    samples: NDArray[np.float64], dt: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _band_limited_nodes(samples: Floats, dt: float) -> tuple[Floats, Floats]:
     """Return values and slopes at the interval boundaries, from a windowed-sinc interpolation."""
     from scipy.signal import upfirdn
 
@@ -233,7 +225,7 @@ def _band_limited_nodes(
     return at_nodes, rising * (BAND_LIMITED_INTERVALS / dt)
 
 
-def _is_followed_by_one_piece(nodes: NDArray[np.float64], slopes: NDArray[np.float64], dt: float) -> bool:
+def _is_followed_by_one_piece(nodes: Floats, slopes: Floats, dt: float) -> bool:
     """Return True if one cubic piece per sample, through values and slopes at the samples, follows the input between them.
 
     Twice as many pieces take a fit twice as many integration steps.
@@ -246,7 +238,7 @@ def _is_followed_by_one_piece(nodes: NDArray[np.float64], slopes: NDArray[np.flo
 
 
 @cache
-def _interpolation_taps() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _interpolation_taps() -> tuple[Floats, Floats]:
     """Return the filters that give values and slopes [per interval] at the interval boundaries.
 
     The slope is the fourth-order difference quotient of a finer interpolation, of which only the values at the boundaries are
@@ -259,3 +251,37 @@ def _interpolation_taps() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     around = np.pad(taps, 2)
     rise = 8.0 * (around[3:-1] - around[1:-3]) - (around[4:] - around[:-4])
     return taps[::_OVERSAMPLING], rise[::_OVERSAMPLING] / 12.0 * _OVERSAMPLING
+
+
+def continued(samples: Floats, count: int) -> Floats:
+    """Return a signal with additional samples before its beginning and after its end, by linear prediction.
+
+    A reflection about the last sample would reverse the curvature there: the slope at the end of an interpolation would be off by
+    as much as a tenth of its size.
+
+    References
+    ----------
+    S. M. Kay, *Modern Spectral Estimation* (Prentice Hall 1988), chapter 7, for the modified covariance method.
+    """
+    return np.concatenate([_following(samples[::-1], count)[::-1], samples, _following(samples, count)])
+
+
+def _following(samples: Floats, count: int) -> Floats:
+    order, known = min(_ORDER, samples.size // 3), samples[-_KNOWN:]
+    mean, low, high = float(np.mean(known)), float(np.min(known)), float(np.max(known))
+    if order == 0 or low == high:
+        return np.full(count, samples[-1])
+    # Scaled to unit size, because squares of a diverging motion may overflow although its prediction does not.
+    rows = sliding_window_view((known - mean) / max(high - mean, mean - low), order + 1)
+    regressors = np.vstack([rows[:, -2::-1], rows[:, 1:]])
+    # Normal equations: ten times as fast as a singular value decomposition, and this runs for every window of every record.
+    powers, directions = np.linalg.eigh(regressors.T @ regressors)
+    directions, powers = directions[:, powers > _RANK * powers[-1]], powers[powers > _RANK * powers[-1]]
+    reported = directions.T @ (regressors.T @ np.concatenate([rows[:, -1], rows[:, 0]]))
+    weights = directions @ (reported / powers)
+    # Limited, because noise may make the prediction unstable.
+    lowest, highest = 2.0 * low - high - mean, 2.0 * high - low - mean
+    latest = (known - mean)[: -order - 1 : -1].tolist()
+    for _ in range(count):
+        latest.insert(0, min(max(float(weights @ latest[:order]), lowest), highest))
+    return mean + np.array(latest[count - 1 :: -1])

@@ -304,7 +304,7 @@ def _opened(structure: Structure) -> tuple[Structure, tuple[sp.Expr, ...]]:
             delays.append(delay)
             d = replace(d, expression=signal + changes[d.symbol])
         definitions.append(d)
-    states = (*tree.states, *(FirstOrderState(c, (-c,), "1", None, None) for c in changes.values()))
+    states = (*tree.states, *(FirstOrderState(c, (-c,), "1") for c in changes.values()))
     changed = replace(tree, definitions=tuple(definitions), states=states, outputs=tuple(outputs))
     return replace(structure, tree=changed), tuple(delays)
 

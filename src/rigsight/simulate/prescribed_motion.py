@@ -13,11 +13,11 @@ from scipy.fft import dct, idct, idst
 from scipy.interpolate import make_interp_spline, make_smoothing_spline
 from scipy.optimize import minimize_scalar
 
-from rigsight.simulate.linear_prediction import continued
+from rigsight.simulate.input_hold import continued
 
-_cache: OrderedDict[bytes, tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]] = (
-    OrderedDict()
-)
+Floats = NDArray[np.float64]
+
+_cache: OrderedDict[bytes, tuple[Floats, Floats, Floats]] = OrderedDict()
 _cache_lock = Lock()
 _CACHED_SAMPLES = 2_000_000
 """Number of samples of all records in the cache, 48 MB: a campaign has few records, or hundreds of short windows of them."""
@@ -30,9 +30,7 @@ _END = 21
 """Samples from which the slope at an end is computed."""
 
 
-def smooth_motion(
-    displacement: NDArray[np.float64], dt: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def smooth_motion(displacement: Floats, dt: float) -> tuple[Floats, Floats]:
     """Return the smoothing spline through a measured displacement, and its velocity: that of a quintic spline through it.
 
     The amount of smoothing is chosen by generalized cross validation, so that noise and quantization of the sensor do not
@@ -47,17 +45,13 @@ def smooth_motion(
     return values, slopes / dt
 
 
-def accelerated_motion(
-    displacement: NDArray[np.float64], dt: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def accelerated_motion(displacement: Floats, dt: float) -> tuple[Floats, Floats, Floats]:
     """Return displacement and velocity of `smooth_motion`, and the acceleration."""
     values, slopes, bends = _kept(displacement)
     return values, slopes / dt, bends / dt**2
 
 
-def _kept(
-    displacement: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _kept(displacement: Floats) -> tuple[Floats, Floats, Floats]:
     samples = np.ascontiguousarray(displacement, dtype=np.float64)
     # Cached, because every candidate needs the same records.
     key = sha256(samples.tobytes()).digest()
@@ -73,9 +67,7 @@ def _kept(
     return found
 
 
-def smoothed_noise(
-    displacement: NDArray[np.float64], noise: NDArray[np.float64], dt: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def smoothed_noise(displacement: Floats, noise: Floats, dt: float) -> tuple[Floats, Floats]:
     """Return the change of the smoothing spline of a displacement due to additional noise, with unchanged smoothing.
 
     Each cosine of the noise is smoothed by itself: a hundred times as fast as another spline, with the same result except at the
@@ -95,9 +87,7 @@ def _penalty_kept(content: bytes) -> float:
     return _penalty(continued(samples / (float(np.std(samples)) or 1.0), _BEYOND))
 
 
-def _spline(
-    samples: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _spline(samples: Floats) -> tuple[Floats, Floats, Floats]:
     scale = float(np.std(samples)) or 1.0
     # A smoothing spline is straight at its ends, unlike a motion, so its ends are moved beyond those of the record.
     longer = continued(samples / scale, _BEYOND)
@@ -113,7 +103,7 @@ def _spline(
     return found
 
 
-def _penalty(samples: NDArray[np.float64]) -> float:
+def _penalty(samples: Floats) -> float:
     """Return the weight of the squared curvature that generalized cross validation chooses.
 
     For equally spaced samples a cosine transform makes the smoothing spline diagonal (except at its ends), so that each trial
@@ -132,13 +122,13 @@ def _penalty(samples: NDArray[np.float64]) -> float:
     return float(np.exp(minimize_scalar(score, bounds=around, method="bounded").x))
 
 
-def _stiffness(n: int) -> NDArray[np.float64]:
+def _stiffness(n: int) -> Floats:
     """Return the squared curvature of each cosine of a cubic spline with unit power, shape (n,)."""
     phase = np.pi * np.arange(n) / n
     return np.asarray((2.0 - 2.0 * np.cos(phase)) ** 2 * 3.0 / (2.0 + np.cos(phase)))
 
 
-def _end_slopes(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+def _end_slopes(samples: Floats) -> Floats:
     """Return the parabola with the samples' slopes at both ends; a cosine transform treats a nonzero slope there as a corner."""
     count = min(_END, samples.size)
     index = np.arange(count, dtype=np.float64)

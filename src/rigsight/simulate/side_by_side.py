@@ -1,4 +1,4 @@
-"""Simulation of many parameter sets of a structure for a fit: side by side, or one with its derivatives."""
+"""Simulation of many parameter sets of a structure for a fit: side by side, or one with its derivatives, in fixed steps."""
 
 from __future__ import annotations
 
@@ -8,19 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
-from rigsight.simulate.compiled.kernel import FittedRecord
-from rigsight.simulate.compiled.kernel_cache import kernel_of
+from rigsight.simulate.compiled.kernel import FittedRecord, kernel_of
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.sensor_delay import as_measured, read_ahead
+from rigsight.simulate.model import at_parameters
 from rigsight.simulate.simulation import (
     DEFAULT_ACCURACY,
     LOCAL_PER_GLOBAL,
+    as_measured,
+    read_ahead,
     simulate_outputs,
     state_vector,
 )
-from rigsight.simulate.substeps import Substeps, relative_needs
+
+Floats = NDArray[np.float64]
 
 _NUDGE = 1e-12
 """Perturbation of a state at rest: far below any accuracy, but unstable steps amplify it visibly."""
@@ -28,36 +30,22 @@ _CAUTION = 0.6
 """Share of the predicted number of substeps below which numbers are not tried."""
 _SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 
+_NEEDED_BY = 0.99
+"""Share of the pieces that need at most the full number of steps; the others need more only because events divide them."""
+
 
 def simulate_sets(
     structure: Structure,
     held: HeldInput,
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
+    p: Floats,
+    initial_states: Floats,
     n_samples: int,
     substeps: int | Substeps,
-) -> NDArray[np.float64]:
-    """Simulate many parameter sets side by side.
+) -> Floats:
+    """Return the outputs of parameter sets that are simulated side by side, shape (n_samples, n_outputs, n_sets).
 
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    held
-        Input between its samples.
-    p
-        Shape (n_parameters, n_sets).
-    initial_states
-        Shape (n_states, n_sets).
-    n_samples
-        Samples of the record.
-    substeps
-        Runge-Kutta steps per piece of the input, see `choose_substeps`. If there are delays within the rig, the sets are
-        simulated accurately, one after the other, and this is not used.
-
-    Returns
-    -------
-    Shape (n_samples, n_outputs, n_sets); NaN or infinity for a set that diverges.
+    Parameters have the shape (n_parameters, n_sets), initial states (n_states, n_sets). A set that diverges has NaN or infinity.
+    With delays within the rig, the sets are simulated accurately, one after the other, and the substeps are not used.
     """
     held, p = read_ahead(structure, held, p)
     if structure.histories:
@@ -70,12 +58,8 @@ def simulate_sets(
 
 
 def _one_by_one(
-    structure: Structure,
-    held: HeldInput,
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-    n_samples: int,
-) -> NDArray[np.float64]:
+    structure: Structure, held: HeldInput, p: Floats, initial_states: Floats, n_samples: int
+) -> Floats:
     """Return the outputs of sets that each need a history of their own, shape (n_samples, n_outputs, n_sets)."""
     sets = []
     for own, state in zip(p.T, initial_states.T, strict=True):
@@ -87,34 +71,13 @@ def _one_by_one(
 
 
 def normal_equations(
-    structure: Structure,
-    records: Sequence[FittedRecord],
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the products of weighted residuals and differences that a least-squares step needs for some records.
+    structure: Structure, records: Sequence[FittedRecord], p: Floats, initial_states: Floats
+) -> Floats:
+    """Return the products of weighted residuals and differences that least squares need, shape (n_records, n_sets, n_sets).
 
     Outputs are not stored: for many records and sets, moving them through memory would take longer than computing them.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects whose kernel has no tangents; no sensor may be delayed, because its reading is interpolated afterwards.
-    records
-        The fitted records.
-    p
-        Shape (n_parameters, n_sets).
-    initial_states
-        Shape (n_records, n_states, n_sets).
-
-    Returns
-    -------
-    Shape (n_records, n_sets, n_sets), see `Kernel.normal_equations`.
-
-    Raises
-    ------
-    ValueError
-        If a sensor is delayed, or there are delays within the rig.
+    Parameters have the shape (n_parameters, n_sets), initial states (n_records, n_states, n_sets). The kernel has no tangents,
+    and a ValueError is raised for a delayed sensor, because its reading is interpolated afterwards, or delays within the rig.
     """
     if structure.is_shifted or structure.histories:
         raise ValueError(
@@ -143,31 +106,16 @@ def has_dry_friction(structure: Structure) -> bool:
 def tangent_equations(
     structure: Structure,
     records: Sequence[FittedRecord],
-    p: NDArray[np.float64],
-    dp: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-    initial_slopes: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    p: Floats,
+    dp: Floats,
+    initial_states: Floats,
+    initial_slopes: Floats,
+) -> Floats:
     """Return the products of weighted residuals and their derivatives that a least-squares step needs for some records.
 
-    Parameters
-    ----------
-    structure
-        Rig and effects whose kernel has tangents.
-    records
-        The fitted records.
-    p
-        Shape (n_parameters,).
-    dp
-        Derivatives of the parameters along each direction, shape (n_parameters, n_directions).
-    initial_states
-        Shape (n_records, n_states).
-    initial_slopes
-        Their derivatives, shape (n_states, n_directions); the same for all records.
-
-    Returns
-    -------
-    Shape (n_records, 1 + n_directions, 1 + n_directions), see `Kernel.tangent_equations`.
+    Their shape is (n_records, 1 + n_directions, 1 + n_directions). Parameters have the shape (n_parameters,), their derivatives
+    along each direction (n_parameters, n_directions), initial states (n_records, n_states) and their derivatives, the same for
+    all records, (n_states, n_directions). The kernel must have tangents.
     """
     return kernel_of(structure).tangent_equations(records, p, dp, initial_states, initial_slopes)
 
@@ -175,41 +123,18 @@ def tangent_equations(
 def simulate_tangents(
     structure: Structure,
     held: HeldInput,
-    p: NDArray[np.float64],
-    dp: NDArray[np.float64],
-    initial_state: NDArray[np.float64],
-    initial_slope: NDArray[np.float64],
+    p: Floats,
+    dp: Floats,
+    initial_state: Floats,
+    initial_slope: Floats,
     n_samples: int,
     substeps: int | Substeps,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Simulate one parameter set with its derivatives along any directions of parameters and initial states.
 
     The derivatives of the equations are integrated with the motion, including the reversal of a velocity under dry friction and
-    the jump of a delayed held input. No difference step has to be chosen.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects whose kernel has tangents.
-    held
-        Input between its samples.
-    p
-        Shape (n_parameters,).
-    dp
-        Derivatives of the parameters along each direction, shape (n_parameters, n_directions).
-    initial_state
-        Shape (n_states,).
-    initial_slope
-        Its derivatives, shape (n_states, n_directions).
-    n_samples
-        Samples of the record.
-    substeps
-        Runge-Kutta steps per piece of the input, see `choose_substeps`.
-
-    Returns
-    -------
-    Shape (n_samples, n_outputs, 1 + n_directions): the outputs, followed by their derivatives; NaN or infinity if the simulation
-    diverges.
+    the jump of a delayed held input. No difference step has to be chosen. Shapes are those of `tangent_equations` for one record;
+    that of the result is (n_samples, n_outputs, 1 + n_directions): the outputs, then their derivatives.
     """
     steps = Substeps.per_piece(
         substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
@@ -220,8 +145,8 @@ def simulate_tangents(
 def choose_substeps(
     structure: Structure,
     held: HeldInput,
-    p: NDArray[np.float64],
-    initial_state: NDArray[np.float64],
+    p: Floats,
+    initial_state: Floats,
     n_samples: int,
     accuracy: float,
     most: int = _SUBSTEPS[-1],
@@ -264,3 +189,57 @@ def choose_substeps(
         f"{most} substeps per sample do not reach a relative accuracy of {accuracy:g}; "
         f"the model is too stiff for its sample time."
     )
+
+
+class Substeps(int):
+    """Largest number of Runge-Kutta steps in a piece of an input, and the number in each piece.
+
+    Attributes
+    ----------
+    needs
+        Steps that each piece needs as a share of the largest number, see `relative_needs`; None if all pieces take that number.
+    """
+
+    needs: Floats | None
+    _schedule: NDArray[np.intc] | None
+
+    def __new__(cls, most: int, needs: Floats | None = None) -> Substeps:
+        """Create the schedule from the largest number of steps and the `needs` of the pieces."""
+        made = super().__new__(cls, most)
+        made.needs = needs
+        made._schedule = None
+        return made
+
+    @property
+    def mean(self) -> float:
+        """Mean number of steps per piece, which determines the cost of a simulation."""
+        return float(self) if self.needs is None else float(np.mean(self.per_piece(self.needs.size)))
+
+    def with_most(self, most: int) -> Substeps:
+        """Return the same needs with another largest number of steps."""
+        return Substeps(most, self.needs)
+
+    def per_piece(self, n_pieces: int) -> NDArray[np.intc]:
+        """Return the steps of each piece, shape (n_pieces,); the largest number for all if the needs are of another input."""
+        if self.needs is None or self.needs.size != n_pieces:
+            return np.full(n_pieces, int(self), dtype=np.intc)
+        if self._schedule is None:
+            # A product such as 3 * (1 / 3) may be slightly above its exact integer value.
+            steps = np.ceil(self.needs * int(self) - 1e-9)
+            self._schedule = np.asarray(np.clip(steps, 1, int(self)), dtype=np.intc)
+        return self._schedule
+
+
+def relative_needs(taken: NDArray[np.intc]) -> Floats:
+    """Return the steps that pieces need, relative to a number that is sufficient for all but a few of them."""
+    place = int(_NEEDED_BY * (taken.size - 1))
+    return np.asarray(taken / max(float(np.partition(taken, place)[place]), 1.0))
+
+
+def state_limits(structure: Structure, p: Floats) -> Floats:
+    """Return the half-width of the range that each state cannot leave, infinite for a free one, shape (n_states, n_sets)."""
+    limits = np.full((len(structure.equations), p.shape[1]), np.inf)
+    for i, equation in enumerate(structure.equations):
+        if equation.limit is not None:
+            limits[i] = at_parameters(structure, equation.limit, p)
+    return limits

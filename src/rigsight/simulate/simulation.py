@@ -10,19 +10,13 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.records.record import Record
-from rigsight.simulate.compiled.kernel_cache import kernel_of
+from rigsight.simulate.compiled.kernel import kernel_of
 from rigsight.simulate.equations.composition import without_vanished_effects
-from rigsight.simulate.equations.structure import Structure, bandwidth_name
-from rigsight.simulate.input_hold import (
-    HeldInput,
-    hold_accelerated_motion,
-    hold_input,
-    hold_motion,
-    together,
-)
+from rigsight.simulate.equations.structure import Structure, ahead_name, bandwidth_name
+from rigsight.simulate.equilibrium import rest_state
+from rigsight.simulate.input_hold import HeldInput, hold_accelerated_motion, hold_input, hold_motion, together
+from rigsight.simulate.model import at_parameters
 from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
-from rigsight.simulate.rest import rest_state
-from rigsight.simulate.sensor_delay import as_measured, read_ahead
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""
@@ -38,6 +32,8 @@ _REASONS = {
     2: "the motion diverged; the model is unstable with these parameters",
     3: "not enough memory for the history of its delays",
 }
+
+Floats = NDArray[np.float64]
 
 
 def record_input(structure: Structure, record: Record) -> HeldInput:
@@ -75,9 +71,9 @@ def simulate(
     structure: Structure,
     values: Mapping[str, float],
     record: Record,
-    initial_state: NDArray[np.float64] | None = None,
+    initial_state: Floats | None = None,
     accuracy: float = DEFAULT_ACCURACY,
-    before: NDArray[np.float64] | Mapping[str, NDArray[np.float64]] | None = None,
+    before: Floats | Mapping[str, Floats] | None = None,
 ) -> Record:
     """Simulate a record's input and return the outputs as a record of the same form.
 
@@ -130,9 +126,7 @@ def simulate(
     return record.with_signals(**{name: outputs[:, i] for i, name in enumerate(names)})
 
 
-def _before(
-    structure: Structure, before: NDArray[np.float64] | Mapping[str, NDArray[np.float64]]
-) -> dict[str, NDArray[np.float64]]:
+def _before(structure: Structure, before: Floats | Mapping[str, Floats]) -> dict[str, Floats]:
     """Return the samples of each input before the record, by its name."""
     inputs = [signal.name for signal in structure.rig.inputs]
     if not inputs:
@@ -171,7 +165,7 @@ def record_values(structure: Structure, values: Mapping[str, float], record: Rec
     return {**values, **record.constants, **bandwidths}
 
 
-def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArray[np.float64]:
+def parameter_vector(structure: Structure, values: Mapping[str, float]) -> Floats:
     """Return the parameter values in the order of the structure, shape (n_parameters,).
 
     A missing value is the parameter's default; values of other names are ignored.
@@ -193,12 +187,12 @@ def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArr
 def simulate_outputs(
     structure: Structure,
     held: HeldInput,
-    p: NDArray[np.float64],
-    initial_state: NDArray[np.float64],
+    p: Floats,
+    initial_state: Floats,
     n_samples: int,
     accuracy: float = DEFAULT_ACCURACY,
     taken: NDArray[np.intc] | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return the outputs of one parameter set, shape (n_samples, n_outputs).
 
     If `taken` is given, shape (n_pieces,), the number of steps in each piece of the input is written to it.
@@ -218,6 +212,69 @@ def simulate_outputs(
     return as_measured(structure, p[:, None], out[:, :, None], held)[:, :, 0]
 
 
-def state_vector(structure: Structure, state: NDArray[np.float64]) -> NDArray[np.float64]:
+def state_vector(structure: Structure, state: Floats) -> Floats:
     """Return the initial states in the form that a kernel takes."""
     return np.asarray(state, dtype=np.float64)[: max(1, len(structure.states))]
+
+
+def as_measured(structure: Structure, p: Floats, out: Floats, held: HeldInput) -> Floats:
+    """Shift outputs by the delays of their sensors; beyond its ends the record is continued with its rates there."""
+    if not structure.is_shifted:
+        return out
+    n_samples = out.shape[0]
+    visible = out[:, : len(structure.outputs)].copy()
+    if n_samples < 2:
+        return visible
+    dt = held.interval * held.per_sample
+    late = [(i, delay) for i, delay in enumerate(structure.shown_late) if delay is not None]
+    for column, (output, delay) in enumerate(late, len(structure.outputs)):
+        values = at_parameters(structure, delay, p)
+        delays = np.broadcast_to(values, p.shape[1])
+        visible[:, output] = _shifted(out[:, output], out[:, column] * dt, delays / dt)
+    return visible
+
+
+def _shifted(value: Floats, rise: Floats, delays: Floats) -> Floats:
+    """Return values, shape (n_samples, n_sets), delayed by numbers of samples (n_sets,); `rise` is their slope per sample."""
+    shifted = np.empty_like(value)
+    for i, delay in enumerate(delays):
+        shifted[:, i] = _delayed(value[:, i].copy(), rise[:, i].copy(), float(delay))
+    return shifted
+
+
+def _delayed(value: Floats, rise: Floats, delay: float) -> Floats:
+    if not np.isfinite(delay):
+        return np.full_like(value, np.nan)
+    n_samples = value.size
+    whole = int(np.clip(np.ceil(delay), -n_samples, n_samples))
+    # A delay is the same fraction of every interval, so the Hermite polynomials are four numbers.
+    s = whole - delay
+    begin, end = max(whole, 0), min(n_samples, max(n_samples - 1 + whole, 0))
+    left, right = slice(begin - whole, end - whole), slice(begin - whole + 1, end - whole + 1)
+    delayed = np.empty_like(value)
+    # The values of a set that diverges may overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        delayed[begin:end] = (
+            (1.0 + 2.0 * s) * (1.0 - s) ** 2 * value[left]
+            + s**2 * (3.0 - 2.0 * s) * value[right]
+            + s * (1.0 - s) ** 2 * rise[left]
+            - s**2 * (1.0 - s) * rise[right]
+        )
+        delayed[:begin] = value[0] + rise[0] * (np.arange(begin) - delay)
+        delayed[end:] = value[-1] + rise[-1] * (np.arange(end, n_samples) - delay - (n_samples - 1))
+    return delayed
+
+
+def read_ahead(structure: Structure, held: HeldInput, p: Floats) -> tuple[HeldInput, Floats]:
+    """Return input and parameters, with the measured motion of delayed sensors advanced by the delays of the first set."""
+    delays = structure.observed_delays
+    if not delays:
+        return held, p
+    own = p.copy()
+    for sensor, delay in delays.items():
+        by = float(at_parameters(structure, delay, p if p.ndim == 1 else p[:, 0]))
+        if not np.isfinite(by):
+            continue
+        own[structure.names.index(ahead_name(sensor))] = by
+        held = held.read_ahead(len(structure.rig.inputs) + structure.observed.index(sensor), by)
+    return held, own

@@ -1,4 +1,4 @@
-"""Bodies that another program simulates: their names there, and the interface to the program.
+"""Bodies that another program simulates: their names there, the interface to the program, and its results in equations.
 
 ``M(q, p) q'' = f + h(q, q', f, p)``: the program gives the mass matrix M and the force h of gravity, gyroscopic and all other
 effects between and on the bodies; f are the forces of the rig's drives and joints. Numbers p are parameters of its own.
@@ -8,19 +8,22 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib import import_module
-from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
-from typing import Protocol
+from typing import Any
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.libraries import library_file
+from rigsight.libraries.templates import filled, template
 
 Floats = NDArray[np.float64]
 
@@ -29,21 +32,21 @@ STEP = 1e-6
 KINDS = ("mujoco", "fmu", "python")
 """Supported programs."""
 
+_MOST_REMEMBERED = 16
+"""A place and the moved ones around it, of two rigs with few coordinates."""
 
-class Program(Protocol):
-    """A program that is open."""
+_lock = threading.Lock()
 
-    @property
-    def reads_forces(self) -> bool:
-        """Whether h depends on f, as it does with contacts and other constraints."""
 
-    @property
-    def c_text(self) -> str:
-        """C functions ``bodies_mass`` and ``bodies_force`` of the arguments of a leaf, and ``connect``."""
+class Program:
+    """A program that is open: it gives C text, and is connected to libraries that contain it."""
 
-    @property
-    def include_folders(self) -> tuple[str, ...]:
-        """Folders of the headers that `c_text` includes."""
+    reads_forces = False
+    """Whether h depends on f, as it does with contacts and other constraints; without them f enters linearly."""
+    c_text = ""
+    """C functions ``bodies_mass`` and ``bodies_force`` of the arguments of a leaf, and ``connect``."""
+    include_folders: tuple[str, ...] = ()
+    """Folders of the headers that `c_text` includes."""
 
     def connect(self, library: ctypes.CDLL) -> None:
         """Connect a library that contains `c_text` with the program."""
@@ -98,18 +101,15 @@ class Bodies:
     @cached_property
     def c_text(self) -> str:
         """C functions ``simulated`` and ``simulated_slope``, which ask the program and remember its last answers."""
-        text = template("simulated.c.txt")
         fragments = {
-            "KEY": str(self.key),
-            "N": str(self.n),
-            "P": str(len(self.parameters)),
-            "GIVEN": str(self.n_given),
+            "KEY": self.key,
+            "N": self.n,
+            "P": len(self.parameters),
+            "GIVEN": self.n_given,
             "STEP": repr(STEP),
             "PROGRAM": self.program.c_text,
         }
-        for key, fragment in fragments.items():
-            text = text.replace(f"<<{key}>>", fragment)
-        return text
+        return filled(template("simulators", "simulated.c.txt"), fragments)
 
     @property
     def n_given(self) -> int:
@@ -123,13 +123,7 @@ class Bodies:
 
     @cached_property
     def program(self) -> Program:
-        """The program, opened once.
-
-        Raises
-        ------
-        InputError
-            If it is not installed, or its model cannot be read or lacks a name.
-        """
+        """The program, opened once."""
         if self.digest and model_digest(self.kind, Path(self.file)) != self.digest:
             included = ", what it includes or MuJoCo itself" if self.kind == "mujoco" else ""
             raise InputError(
@@ -140,18 +134,7 @@ class Bodies:
 
 
 class Responses:
-    """Evaluates bodies at many points, with a compiled library.
-
-    Parameters
-    ----------
-    bodies
-        What is simulated elsewhere.
-
-    Raises
-    ------
-    MachineError
-        If the library cannot be compiled or loaded.
-    """
+    """Evaluates bodies at many points, with a compiled library."""
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
@@ -181,6 +164,7 @@ _HEAD = """#include <math.h>
 #define EXPORT __attribute__((visibility("default")))
 #endif
 """
+
 _ANSWERS = """
 EXPORT void answer(int is_force, long count, const double *a, double *value) {
     double mass[BODIES_MASSES];
@@ -194,11 +178,6 @@ EXPORT void answer(int is_force, long count, const double *a, double *value) {
 
 _known: dict[int, Bodies] = {}
 """Bodies by their key, of which numbers alone stand in equations."""
-
-
-def template(name: str) -> str:
-    """Return the text of one of the fixed parts of C."""
-    return files("rigsight.simulators").joinpath("templates", name).read_text("utf-8")
 
 
 def bodies_of(key: int) -> Bodies:
@@ -222,3 +201,109 @@ def model_digest(kind: str, path: Path) -> str:
 def _module(kind: str) -> ModuleType:
     """Return the module of a program, which imports this one; its library is loaded only for rigs that use it."""
     return import_module(f"rigsight.simulators.{kind}_program")
+
+
+class simulated(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """``simulated(key, index, *arguments)``: see `mass_leaf` and `force_leaf`."""
+
+    is_real = True
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """Return the slope by one of the arguments."""
+        key, index, *arguments = self.args
+        if argindex < 3:
+            return sp.Integer(0)
+        return simulated_slope(key, index, sp.Integer(argindex - 3), *arguments)
+
+    @staticmethod
+    def _imp_(key: Any, index: Any, *arguments: Any) -> Any:
+        return _shaped(_values(int(key), _is_force(key, index), arguments)[_row(key, index)], arguments)
+
+
+class simulated_slope(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """``simulated_slope(key, index, argument, *arguments)``: its derivative by one argument; how that changes is left out."""
+
+    is_real = True
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:  # noqa: ARG002
+        """Return zero: only first derivatives are asked for."""
+        return sp.Integer(0)
+
+    @staticmethod
+    def _imp_(key: Any, index: Any, by: Any, *arguments: Any) -> Any:
+        by = int(by)
+        here = np.asarray(arguments[by], dtype=np.float64)
+        step = STEP * np.maximum(np.abs(here), 1.0)
+        moved = [*arguments[:by], here + step, *arguments[by + 1 :]]
+        before, behind = (
+            _values(int(key), _is_force(key, index), own)[_row(key, index)] for own in (arguments, moved)
+        )
+        return _shaped((behind - before) / step, arguments)
+
+
+def mass_leaf(bodies: Bodies, row: int, column: int, q: Sequence[sp.Expr], p: Sequence[sp.Expr]) -> sp.Expr:
+    """Return an entry of the mass matrix, of coordinates q and parameters p."""
+    i, j = max(row, column), min(row, column)
+    return simulated(sp.Integer(bodies.key), sp.Integer(i * (i + 1) // 2 + j), *q, *p)
+
+
+def force_leaf(
+    bodies: Bodies,
+    row: int,
+    q: Sequence[sp.Expr],
+    v: Sequence[sp.Expr],
+    f: Sequence[sp.Expr],
+    p: Sequence[sp.Expr],
+) -> sp.Expr:
+    """Return the force along a coordinate that the bodies' weight, gyration and constraints put on it.
+
+    It depends on coordinates q, rates v and parameters p, and on the forces f of drives and joints where bodies touch.
+    """
+    index = sp.Integer(bodies.n * (bodies.n + 1) // 2 + row)
+    return simulated(sp.Integer(bodies.key), index, *q, *v, *(f if bodies.program.reads_forces else ()), *p)
+
+
+def place_of(leaf: sp.Expr) -> tuple[int, ...]:
+    """Return row and column of a leaf that is an entry of the mass matrix, and the row of one that is a force."""
+    key, index = leaf.args[:2]
+    if _is_force(key, index):
+        return (_row(key, index),)
+    row = next(i for i in range(bodies_of(int(key)).n) if int(index) < (i + 1) * (i + 2) // 2)
+    return row, int(index) - row * (row + 1) // 2
+
+
+def _n_mass(key: Any) -> int:
+    n = bodies_of(int(key)).n
+    return n * (n + 1) // 2
+
+
+def _is_force(key: Any, index: Any) -> bool:
+    return int(index) >= _n_mass(key)
+
+
+def _row(key: Any, index: Any) -> int:
+    return int(index) - (_n_mass(key) if _is_force(key, index) else 0)
+
+
+def _shaped(values: Floats, arguments: Sequence[Any]) -> Any:
+    shape = np.broadcast_shapes(*(np.shape(argument) for argument in arguments))
+    return values.reshape(shape) if shape else float(values[0])
+
+
+def _values(key: int, is_force: bool, arguments: Sequence[Any]) -> Floats:
+    """Return the lower half of the mass matrix, or the forces, shape (n_values, n_points)."""
+    columns = np.atleast_2d(
+        np.stack(np.broadcast_arrays(*(np.asarray(a, dtype=np.float64).ravel() for a in arguments)))
+    )
+    return _answered(key, is_force, columns.shape, columns.tobytes())
+
+
+@lru_cache(maxsize=_MOST_REMEMBERED)
+def _answered(key: int, is_force: bool, shape: tuple[int, ...], content: bytes) -> Floats:
+    """Return the same of points whose numbers are given as bytes; each entry of a mass matrix asks for the same."""
+    with _lock:
+        return bodies_of(key).answers.at(np.frombuffer(content).reshape(shape), is_force=is_force)
+
+
+forget = _answered.cache_clear
+"""Drops what is remembered: a function of Python may be another one now."""

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError, nearest
-from rigsight.simulators.bodies import Bodies, template
+from rigsight.libraries.templates import filled, template
+from rigsight.simulators.bodies import Bodies, Program
 
 _FUNCTIONS = {
     "2": (
@@ -43,26 +44,8 @@ class _Told(ctypes.Structure):
     )  # fmt: skip
 
 
-class FmuProgram:
-    """An open FMU.
-
-    Parameters
-    ----------
-    bodies
-        Its file, and the names of states, of the inputs that take forces, and of parameters.
-
-    Attributes
-    ----------
-    reads_forces
-        False: forces enter accelerations linearly, as those of mechanics without contacts do.
-
-    Raises
-    ------
-    InputError
-        If FMPy is not installed, or the FMU is not for Model Exchange, not for this machine, or lacks a name.
-    """
-
-    reads_forces = False
+class FmuProgram(Program):
+    """An open FMU; forces enter accelerations linearly, as those of mechanics without contacts do."""
 
     def __init__(self, bodies: Bodies) -> None:
         self._file = bodies.file
@@ -112,7 +95,8 @@ class FmuProgram:
         self._strings = [
             text.encode() for text in (identifier, description.guid or description.instantiationToken, where)
         ]
-        self._n_states = len(states)
+        text = template("simulators", "fmu.c.txt") + template("simulators", "probed.c.txt")
+        self.c_text = filled(text, {"VERSION": self._version, "STATES": len(states)})
         self._kept: list[Any] = []
 
     def _state(self, name: str, states: list[str]) -> int:
@@ -135,17 +119,6 @@ class FmuProgram:
                 f"{self._file} {what}.{nearest(name, known)} It has: {', '.join(known) or 'none'}."
             )
         return int(self._variables[name].valueReference)
-
-    @property
-    def c_text(self) -> str:
-        """See `Program.c_text`."""
-        text = template("fmu.c.txt") + template("probed.c.txt")
-        return text.replace("<<VERSION>>", self._version).replace("<<STATES>>", str(self._n_states))
-
-    @property
-    def include_folders(self) -> tuple[str, ...]:
-        """No headers beside those of the compiler."""
-        return ()
 
     def connect(self, library: ctypes.CDLL) -> None:
         """See `Program.connect`."""

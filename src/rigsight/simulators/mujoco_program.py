@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
-from rigsight.simulators.bodies import Bodies, template
+from rigsight.libraries.templates import filled, template
+from rigsight.simulators.bodies import Bodies, Program
 
 if TYPE_CHECKING:
     import mujoco
@@ -28,23 +29,15 @@ _OBJECTS = ("body", "jnt", "dof", "geom", "tendon", "eq", "pair")
 """Beginnings of the fields of a model whose rows have names."""
 
 
-class MujocoProgram:
-    """An open MuJoCo model.
-
-    Parameters
-    ----------
-    bodies
-        Its file, and the names of joints and fields.
-
-    Raises
-    ------
-    InputError
-        If MuJoCo is not installed, cannot read the file, or has no such joint or field.
-    """
+class MujocoProgram(Program):
+    """An open MuJoCo model."""
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
         self._model = bodies_alone(opened(Path(bodies.file)), without_armature=bodies.without_armature)
+        # Not before: `opened` says what to do where it is missing.
+        import mujoco
+
         self._places = [self._coordinate(name) for name in bodies.coordinates]
         if len(self._places) != self._model.nv:
             others = [self._model.joint(i).name for i in range(self._model.njnt)]
@@ -54,10 +47,13 @@ class MujocoProgram:
             )
         self._fields = [self._field(name) for name in bodies.parameters]
         self.reads_forces = has_constraints(self._model)
-        """Whether there are contacts, joint or tendon limits, or equality constraints."""
         self._kept: list[Any] = []
         model = self._model
-        self._is_plain = not (self.reads_forces or model.ntendon or model.nflex or model.nplugin)
+        is_plain = not (self.reads_forces or model.ntendon or model.nflex or model.nplugin)
+        flags = {"CONSTRAINED": int(self.reads_forces), "PLAIN": int(is_plain)}
+        text = template("simulators", "mujoco.c.txt")
+        self.c_text = filled(text, {"VERSION": mujoco.__version__, **flags})
+        self.include_folders = ((Path(mujoco.__file__).parent / "include").as_posix(),)
 
     def _coordinate(self, name: str) -> tuple[int, int]:
         import mujoco
@@ -77,7 +73,7 @@ class MujocoProgram:
             )
         return int(self._model.jnt_qposadr[index]), int(self._model.jnt_dofadr[index])
 
-    def _field(self, name: str) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    def _field(self, name: str) -> tuple[Floats, tuple[int, ...]]:
         """Return the array of a field, and the place in it: of ``body_ipos hand 2`` the row of the body, and 2."""
         wanted = (
             f"{self._bodies.file}: '{name}' is not a number of the model. Write a field, the name of its element and, for a "
@@ -111,7 +107,7 @@ class MujocoProgram:
             )
         return field, place
 
-    def _is_kept(self, field: NDArray[np.float64], place: tuple[int, ...]) -> bool:
+    def _is_kept(self, field: Floats, place: tuple[int, ...]) -> bool:
         """Return True for a number that can be set and affects the bodies."""
         import mujoco
 
@@ -124,22 +120,6 @@ class MujocoProgram:
         field[place] = before
         mujoco.mj_setConst(self._model, mujoco.MjData(self._model))
         return kept
-
-    @property
-    def c_text(self) -> str:
-        """See `Program.c_text`."""
-        import mujoco
-
-        text = template("mujoco.c.txt")
-        text = text.replace("<<VERSION>>", mujoco.__version__)
-        for key, flag in {"<<CONSTRAINED>>": self.reads_forces, "<<PLAIN>>": self._is_plain}.items():
-            text = text.replace(key, str(int(flag)))
-        return text
-
-    @property
-    def include_folders(self) -> tuple[str, ...]:
-        """See `Program.include_folders`."""
-        return ((Path(_package_file()).parent / "include").as_posix(),)
 
     def connect(self, library: ctypes.CDLL) -> None:
         """See `Program.connect`."""
@@ -154,9 +134,6 @@ class MujocoProgram:
         library.connect(table, ctypes.c_void_p(self._model._address), places, moved)
         # The library keeps the addresses.
         self._kept.append((table, places, moved, mujoco_library))
-
-    def check(self) -> None:
-        """No errors are possible: MuJoCo only warns."""
 
 
 def opened(path: Path) -> mujoco.MjModel:
@@ -215,18 +192,14 @@ def has_constraints(model: mujoco.MjModel) -> bool:
     )
 
 
-def _address(field: NDArray[np.float64], place: tuple[int, ...]) -> int:
+def _address(field: Floats, place: tuple[int, ...]) -> int:
     return int(field.ctypes.data) + sum(int(s) * i for s, i in zip(field.strides, place, strict=True))
 
 
-def _package_file() -> str:
+def _library() -> str:
     import mujoco
 
-    return str(mujoco.__file__)
-
-
-def _library() -> str:
-    folder = Path(_package_file()).parent
+    folder = Path(mujoco.__file__).parent
     found = sorted(p for pattern in ("libmujoco*", "mujoco.dll") for p in folder.glob(pattern))
     if not found:
         raise InputError(f"The library of MuJoCo was not found in {folder}.")

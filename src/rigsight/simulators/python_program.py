@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from rigsight.errors import InputError
-from rigsight.simulators.bodies import Bodies, template
-from rigsight.simulators.leaf import forget
+from rigsight.libraries.templates import template
+from rigsight.simulators.bodies import Bodies, Program, forget
 
 Accelerations = Callable[..., Any]
 """``accelerations(q, v, forces, parameters)``: coordinates, rates and forces along coordinates, shape (n,) each, and parameters
@@ -38,26 +38,8 @@ def give_function(name: str, accelerations: Accelerations) -> None:
     forget()
 
 
-class PythonProgram:
-    """A function of Python.
-
-    Parameters
-    ----------
-    bodies
-        What it is called, and what parameters are called in it.
-
-    Attributes
-    ----------
-    reads_forces
-        False: forces enter accelerations linearly.
-
-    Raises
-    ------
-    InputError
-        If no such function was given.
-    """
-
-    reads_forces = False
+class PythonProgram(Program):
+    """A function of Python; forces enter linearly."""
 
     def __init__(self, bodies: Bodies) -> None:
         if bodies.file not in _given:
@@ -66,6 +48,7 @@ class PythonProgram:
                 f"line, --simulator FILE.py:FUNCTION, or in Python with rigsight.simulators.give_function."
             )
         self._bodies = bodies
+        self.c_text = template("simulators", "function.c.txt") + template("simulators", "probed.c.txt")
         self._error: BaseException | None = None
         self._call = _CALL(self._answer)
         self._failed = ctypes.c_int(0)
@@ -87,16 +70,6 @@ class PythonProgram:
             found = np.full(n, np.nan)
         for i, acceleration in enumerate(found.tolist()):
             a[i] = acceleration
-
-    @property
-    def c_text(self) -> str:
-        """See `Program.c_text`."""
-        return template("function.c.txt") + template("probed.c.txt")
-
-    @property
-    def include_folders(self) -> tuple[str, ...]:
-        """No headers beside those of the compiler."""
-        return ()
 
     def connect(self, library: ctypes.CDLL) -> None:
         """See `Program.connect`."""

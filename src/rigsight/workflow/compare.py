@@ -23,7 +23,7 @@ from rigsight.plot import svg_text
 from rigsight.report import comparison_figures, render_comparison
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
-from rigsight.simulate.drift import can_drift
+from rigsight.simulate.equilibrium import can_drift
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import read_campaign

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rigsight.errors import InputError, check_option, readable
 from rigsight.records import Role
-from rigsight.records.formats.csv_channels import open_measurement
+from rigsight.records.channel_summary import open_measurement
 from rigsight.records.formats.known import BY_SUFFIX
 from rigsight.rigs import RIGS, Rig
 from rigsight.robots import FreeRun, RigDraft, free_run, read_robot, rig_text, with_gears

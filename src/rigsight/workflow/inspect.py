@@ -10,9 +10,8 @@ from typing import Any
 from rigsight.errors import InputError
 from rigsight.json_data import json_data
 from rigsight.records.channel_names import closeness
-from rigsight.records.channel_summary import ChannelSummary, summarize, time_summary
+from rigsight.records.channel_summary import ChannelSummary, open_measurement, summarize, time_summary
 from rigsight.records.formats.channel import Channel, ChannelFile, Refused
-from rigsight.records.formats.csv_channels import open_measurement
 from rigsight.records.read_record import TIME
 from rigsight.rigs import RIGS, Rig
 from rigsight.workflow.campaign.record_proposal import propose

@@ -9,8 +9,8 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
 from rigsight.simulate import compose
-from rigsight.simulate.printing.latex import latex_name, latex_text
 from rigsight.simulate.printing.names import ShownName, declared_name, shown_names
+from rigsight.simulate.printing.notation import latex_name, latex_text
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import sympy as sp
 from rigsight.effects import CATALOGUE, Effect, effect_named, placed
 from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose
-from rigsight.simulate.compiled.kernel_cache import kernel_of
+from rigsight.simulate.compiled.kernel import kernel_of
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.equations.tree import late
 from rigsight.simulate.input_hold import HeldInput

@@ -10,7 +10,7 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.identify.closed_loop import closed_loop_notes
-from rigsight.records.reference import instrument_of
+from rigsight.records.signals import instrument_of
 from rigsight.rigs import rig_file_text
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model

@@ -14,9 +14,8 @@ from rigsight.diagnose.policy import NOTES
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response, responses_of_inputs
 from rigsight.identify.fit.windows import leading_output
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
-from rigsight.records.reference import instrument_of
+from rigsight.records.signals import instrument_of, is_constant
 from rigsight.rigs import Rig
 
 

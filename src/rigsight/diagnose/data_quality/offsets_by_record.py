@@ -19,7 +19,7 @@ from rigsight.effects import Effect, Place
 from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate.drift import can_drift
+from rigsight.simulate.equilibrium import can_drift
 
 _TOLERANCE = 1e-5
 _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in every command.'

@@ -7,8 +7,8 @@ from scipy.ndimage import uniform_filter1d
 
 from rigsight.diagnose.data_quality.finding import Finding
 from rigsight.diagnose.policy import NOTES
-from rigsight.records.plausibility import clipping
 from rigsight.records.record import Record
+from rigsight.records.signals import clipping
 from rigsight.records.stamps import written_span, written_stamp
 from rigsight.rigs import Rig
 from rigsight.simulate import compose

@@ -13,8 +13,8 @@ from rigsight.effects import Effect, Place, placed
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads, free_names
 from rigsight.identify.fit.windows import cut, strongest
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Floats, Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, joint_of
 from rigsight.simulate import Structure, compose, special_values
 

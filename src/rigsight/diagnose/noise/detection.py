@@ -21,8 +21,8 @@ from scipy.linalg import helmert
 from rigsight.diagnose.noise.block_means import blocks_of
 from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
 from rigsight.diagnose.policy import NOTES
-from rigsight.records.periods import differ_by_noise, repeated_period, roughness
 from rigsight.records.record import Record
+from rigsight.records.signals import differ_by_noise, repeated_period, roughness
 from rigsight.rigs import Rig
 
 _FREE_MODES = 6

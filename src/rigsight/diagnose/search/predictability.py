@@ -12,8 +12,8 @@ from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.windows import leading_output
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.simulate import parameter_vector, record_input, record_values, simulate_outputs
 
 _ACCURACY = 1e-5

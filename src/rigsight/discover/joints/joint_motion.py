@@ -23,7 +23,7 @@ from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionE
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Joint, Rig
 from rigsight.simulate import parameter_vector, record_input, rest_state
-from rigsight.simulate.equations.linear_forms import slope
+from rigsight.simulate.equations.derivatives import slope
 from rigsight.simulate.simulation import record_values
 
 _PASSES = 4

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from rigsight.identify.rig_equations import FUNCTIONS, rows_of
 from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, parameter_vector, record_input
-from rigsight.simulate.equations.derivatives import slopes_of
+from rigsight.simulate.equations.derivatives import slope, slopes_of
 from rigsight.simulate.equations.elimination import Elimination
-from rigsight.simulate.equations.linear_forms import slope
 from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.equations.structure import TIME, input_symbols
 from rigsight.simulate.input_hold import HeldInput

@@ -12,8 +12,8 @@ from scipy.optimize import least_squares
 from rigsight.effects import Place
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.typical_size import size_of_signal
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Floats, Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure
 from rigsight.units import parse_dimension

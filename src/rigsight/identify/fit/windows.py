@@ -18,8 +18,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Floats, Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.prescribed_motion import smooth_motion

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.identify.start.any_rig_start import any_rig_start
 from rigsight.identify.start.equation_error import solve_in_frequency, spectra_of
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Follower, Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 

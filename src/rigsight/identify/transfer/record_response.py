@@ -24,8 +24,8 @@ from rigsight.identify.transfer.relative_fit import fit_with_relative_error
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
-from rigsight.records.periods import mean_period
 from rigsight.records.record import Hold, Record
+from rigsight.records.signals import mean_period
 
 _Response = TypeVar("_Response", bound=FrequencyResponse)
 Method = Literal["local_rational", "local_polynomial", "h1", "thesis"]

@@ -24,8 +24,8 @@ from rigsight.identify.fit.covariance import colored_covariance, propagated_cova
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order, TransferForm
 from rigsight.identify.undetermined import POORLY_KNOWN
-from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Hold, Record
+from rigsight.records.signals import is_constant
 
 _PHASE_PER_BLOCK = 0.5
 """Phase of the fitted form's break frequency per block of averaged samples [rad]."""

@@ -1,11 +1,11 @@
-"""A channel of a measurement file before it is mapped to a signal."""
+"""A channel of a measurement file before it is mapped to a signal, and how its stored numbers become quantities."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.formats.stored_numbers import AS_STORED, Stored
+
+# CF conventions 1.11, chapter 8.1, and the NetCDF attribute conventions; NWB says conversion and offset for the same.
+_CONVENTIONS = (("scale_factor", "add_offset"), ("conversion", "offset"))
+_MISSING = ("_FillValue", "missing_value")
+_MAY_CONVERT = re.compile(
+    r"(?<![a-z])(scale|scaling|gain|factor|slope|sensitivity|calibration|offset|intercept|conversion|lsb)(?![a-z])",
+    re.IGNORECASE,
+)
+"""Words of attributes that look like a conversion; in no convention, so that nobody knows in which direction it goes."""
 
 MOST_SAMPLES = 50_000_000
 """Of one channel: 400 MB once read."""
@@ -28,8 +36,104 @@ MOST_COLUMNS = 64
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 _NO_UNIT = {"", "-", "--", "none", "null", "n/a", "unknown", "unit"}
 
+UNIT_NAMES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+
 Load = Callable[[], NDArray[Any]]
 """Reads stored numbers as they are, shape (n_samples,), while the file is open."""
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What a file says of the numbers of a channel: ``quantity = scale * stored + offset``."""
+
+    # From the stored number to the quantity, in the unit that the file states.
+    scale: float = 1.0
+    offset: float = 0.0
+    missing: tuple[float, ...] = ()  # stored numbers that stand for no reading
+    # Smallest and largest valid stored number.
+    least: float = -math.inf
+    most: float = math.inf
+    unsigned: bool = False  # true if the numbers are unsigned, although their type says otherwise
+    # Attributes that may be a conversion, as ``name = value``, but of no known convention.
+    unclear: tuple[str, ...] = ()
+
+    def quantity(self, stored: NDArray[Any]) -> NDArray[Any]:
+        """Return the quantity, shape (n_samples,), NaN where the file says that a reading is missing or invalid."""
+        if self == Stored(unclear=self.unclear):
+            return stored
+        if self.unsigned and stored.dtype.kind == "i":
+            stored = stored.view(f"u{stored.dtype.itemsize}")
+        # In single precision -9999.9 is the number next to it.
+        alike = stored.dtype if stored.dtype.kind == "f" else np.dtype(np.float64)
+        invalid = (
+            np.isin(stored.astype(alike), np.array(self.missing).astype(alike))
+            | (stored < self.least)
+            | (stored > self.most)
+        )
+        return np.where(invalid, np.nan, self.scale * stored.astype(np.float64) + self.offset)
+
+    @property
+    def note(self) -> str:
+        """What was done to the numbers, empty where nothing was."""
+        converted = (self.scale, self.offset) != (1.0, 0.0)
+        return (
+            f"{self.scale:.9g} * stored number + {self.offset:.9g}, as the file states" if converted else ""
+        )
+
+
+AS_STORED = Stored()
+"""Numbers that are the quantity."""
+
+
+def stored_by(attributes: Mapping[str, Any]) -> Stored:
+    """Return what the attributes of a dataset, a channel or a column say of its numbers."""
+    numbers = {name: own for name, value in attributes.items() if (own := _numbers(value))}
+    scale, offset = 1.0, 0.0
+    known: set[str] = set()
+    for scaled, added in _CONVENTIONS:
+        # An offset of no convention may be added before or after scaling.
+        if scaled in numbers or (added in numbers and added == "add_offset"):
+            scale, offset = numbers.get(scaled, (1.0,))[0], numbers.get(added, (0.0,))[0]
+            known = {scaled, added}
+            break
+    valid = numbers.get("valid_range", ())
+    least, most = valid if len(valid) == 2 else (-math.inf, math.inf)
+    unclear = [
+        f"{name} = {own[0]:g}"
+        for name, own in numbers.items()
+        if name not in known
+        and len(own) == 1
+        and _MAY_CONVERT.search(name.replace("_", " "))
+        and own[0] not in (0.0, 1.0)
+    ]
+    return Stored(
+        scale,
+        offset,
+        tuple(value for name in _MISSING for value in numbers.get(name, ()) if not math.isnan(value)),
+        numbers.get("valid_min", (least,))[0],
+        numbers.get("valid_max", (most,))[0],
+        str(_text(attributes.get("_Unsigned", ""))).lower() == "true",
+        tuple(unclear),
+    )
+
+
+def _text(value: Any) -> Any:
+    return value.decode("utf-8", errors="replace") if isinstance(value, bytes) else value
+
+
+def _numbers(value: Any) -> tuple[float, ...]:
+    """Return the few numbers of an attribute, also where they are written as text; none of anything else."""
+    value = _text(value)
+    if isinstance(value, str):
+        try:
+            return (float(value),)
+        except ValueError:
+            return ()
+    array = np.asarray(value)
+    # An attribute of type empty has no shape.
+    if array.dtype.kind not in "iuf" or not 0 < array.size <= 16:
+        return ()
+    return tuple(float(number) for number in array.reshape(-1))
 
 
 class ReadingError(Exception):
@@ -67,6 +171,10 @@ class Channel:
     axis: TimeAxis | None = None  # its own time; None where time is a channel like any other
     stored: Stored = AS_STORED  # how stored numbers become quantities
     origin: np.datetime64 | None = None  # of a channel of dates, the moment from which its seconds count
+    label: str = ""  # what the file calls it; that is its name where it is not given
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "label", self.label or self.name)
 
     @property
     def short_name(self) -> str:
@@ -91,6 +199,10 @@ class Refused:
         object.__setattr__(self, "reason", printable(self.reason))
 
 
+def _each_by_itself(needed: Mapping[str, int], blank: bool) -> None:
+    """Read nothing ahead."""
+
+
 @dataclass(frozen=True, eq=False)
 class ChannelFile:
     """What a file holds, found out without reading any samples."""
@@ -99,6 +211,22 @@ class ChannelFile:
     channels: tuple[Channel, ...]
     refused: tuple[Refused, ...] = ()  # what else is in it
     format: str = ""  # plain name, ``"MATLAB"``; `open_channels` fills it in
+    # Of a delimited text the line of each row, shape (n_rows,); what was assumed of its layout; whether it has a header; and how
+    # some columns, by signal, are read at once, with blank cells or without.
+    lines: NDArray[np.int64] | None = None
+    notes: tuple[str, ...] = ()
+    has_names: bool = True
+    ahead: Callable[[Mapping[str, int], bool], None] = _each_by_itself
+
+    @property
+    def word(self) -> str:
+        """What a channel is called in messages."""
+        return "channel" if self.lines is None else "column"
+
+    @property
+    def row(self) -> str:
+        """What a row is called in messages."""
+        return "sample" if self.lines is None else "line"
 
 
 def check_size(file: str, name: str, n_samples: int) -> None:
@@ -149,26 +277,19 @@ def printable(text: str) -> str:
 
 
 def columns_of(
-    name: str,
-    shape: tuple[int, ...],
-    read: Load,
-    unit: str | None = None,
-    stored: Stored = AS_STORED,
-) -> list[Channel] | Refused:
-    """Return the channels of a stored array: one of a vector, one per column of a table."""
-    long = [length for length in shape if length != 1]
-    if not long or 0 in long:
-        return Refused(name, "holds a single number" if not long else "is empty")
+    name: str, shape: tuple[int, ...], read: Load, unit: str | None = None, stored: Stored = AS_STORED
+) -> list[Channel | Refused]:
+    """Return the channels of a stored array, one of a vector, one per column of a table, or why it has none."""
+    long, size = [length for length in shape if length != 1], math.prod(shape)
+    if reason := too_short(size):
+        return [Refused(name, reason)]
     if len(long) == 1:
-        return [Channel(name, long[0], lambda: read().reshape(-1), unit, stored=stored)]
+        return [Channel(name, size, lambda: read().reshape(-1), unit, stored=stored)]
     if len(long) > 2 or min(long) > MOST_COLUMNS:
-        return Refused(name, f"is an array of shape {shape}, neither a vector nor a table of columns")
-
-    if math.prod(long) > MOST_IN_TABLE:
-        return Refused(
-            name,
-            f"is a table of {math.prod(long)} numbers, more than the {MOST_IN_TABLE} that are read of one",
-        )
+        return [Refused(name, f"is an array of shape {shape}, neither a vector nor a table of columns")]
+    if size > MOST_IN_TABLE:
+        why = f"is a table of {size} numbers, more than the {MOST_IN_TABLE} that are read of one"
+        return [Refused(name, why)]
 
     def column(index: int) -> Load:
         return lambda: _upright(read())[:, index]
@@ -176,6 +297,24 @@ def columns_of(
     return [
         Channel(f"{name}(:,{i + 1})", max(long), column(i), unit, stored=stored) for i in range(min(long))
     ]
+
+
+def too_short(n_samples: int) -> str | None:
+    """Return why so few samples are no channel, None where they are enough."""
+    return None if n_samples > 1 else "holds a single number" if n_samples else "is empty"
+
+
+def listed(file: str, parts: Iterable[Channel | Refused]) -> ChannelFile:
+    """Return what a file holds, of parts that are found one after the other."""
+    channels: list[Channel] = []
+    refused: list[Refused] = []
+    for part in parts:
+        if isinstance(part, Refused):
+            refused.append(part)
+        else:
+            channels.append(part)
+        check_count(file, len(channels) + len(refused))
+    return ChannelFile(tuple(channels), tuple(refused))
 
 
 def kept_last(kept: dict[str, NDArray[Any]], name: str, read: Load) -> Load:
@@ -207,11 +346,18 @@ def stated_unit(text: object) -> str | None:
     return None if text.lower() in _NO_UNIT else text
 
 
+def unit_of(attributes: Mapping[str, Any], names: Sequence[str] = UNIT_NAMES) -> str | None:
+    """Return the unit that a file states in one of some attributes."""
+    return next((unit for name in names if (unit := stated_unit(attributes.get(name))) is not None), None)
+
+
 def with_distinct_names(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     """Return the channels with printable names, with a number behind each that is not the first of its name."""
     channels = tuple(channels)
     names = distinct_names([printable(channel.name) for channel in channels])
-    return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
+    return tuple(
+        replace(channel, name=name, label=name) for channel, name in zip(channels, names, strict=True)
+    )
 
 
 def distinct_names(names: Sequence[str]) -> list[str]:

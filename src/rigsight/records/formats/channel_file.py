@@ -15,21 +15,29 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.records.formats.channel import (
+    AS_STORED,
     Channel,
     ChannelFile,
     Load,
     ReadingError,
+    Stored,
     check_count,
     check_size,
     check_total,
     with_distinct_names,
 )
 from rigsight.records.formats.isolated_reader import open_isolated
-from rigsight.records.formats.known import BY_SUFFIX, HEAD, PACKAGES, Format, reader_of, recognized
-from rigsight.records.formats.ordinary_file import file_size
-from rigsight.records.formats.stored_numbers import AS_STORED, Stored
+from rigsight.records.formats.known import (
+    BY_SUFFIX,
+    HEAD,
+    PACKAGES,
+    Format,
+    check_largest,
+    file_size,
+    reader_of,
+    recognized,
+)
 
-LARGEST_FILE = 2_000_000_000
 MEND = "Export it again, or as CSV."
 
 
@@ -58,12 +66,7 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
     if known is None:
         raise InputError(f"{path.name} is not a measurement file of a known format.")
     name = known.name
-    size = file_size(path)
-    if size > LARGEST_FILE:
-        raise InputError(
-            f"{path.name} has {size / 1e9:.1f} GB, more than the {LARGEST_FILE / 1e9:g} GB that are read; "
-            "split it into several records or reduce the sample rate."
-        )
+    check_largest(path, known.largest)
     with contextlib.ExitStack() as stack:
         stack.enter_context(_silence())
         with _reported(path, name):

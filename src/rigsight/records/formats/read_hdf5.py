@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,10 @@ from rigsight.records.formats.channel import (
     check_count,
     columns_of,
     kept_last,
-    stated_unit,
+    listed,
+    stored_by,
+    unit_of,
 )
-from rigsight.records.formats.stored_numbers import stored_by
-
-UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 
 
 def open_hdf5(path: Path) -> Iterator[ChannelFile]:
@@ -32,29 +31,27 @@ def open_hdf5(path: Path) -> Iterator[ChannelFile]:
     import h5py
 
     with h5py.File(path, "r") as file:
-        channels: list[Channel] = []
-        refused: list[Refused] = []
-        kept: dict[str, NDArray[Any]] = {}
+        found: list[tuple[str | bytes, Any]] = []
 
-        def visit(stored: str | bytes, item: Any) -> None:
-            # A name that is no UTF-8 comes as bytes.
-            name = stored.decode("utf-8", errors="replace") if isinstance(stored, bytes) else stored
-            check_count(path.name, len(channels) + len(refused))
-            if not isinstance(item, h5py.Dataset):
-                return
-            read = kept_last(kept, name, lambda: item[()])
-            attributes = _attributes(item)
-            found = columns_of(name, item.shape or (), read, _unit(attributes), stored_by(attributes))
-            reason = _refusal(item)
-            if reason is not None:
-                refused.append(Refused(name, reason))
-            elif isinstance(found, Refused):
-                refused.append(found)
-            else:
-                channels.extend(found)
+        def visit(name: str | bytes, item: Any) -> None:
+            check_count(path.name, len(found))
+            if isinstance(item, h5py.Dataset):
+                found.append((name, item))
 
         file.visititems(visit)
-        yield ChannelFile(tuple(channels), tuple(refused))
+        kept: dict[str, NDArray[Any]] = {}
+        yield listed(path.name, (part for name, item in found for part in _parts(name, item, kept)))
+
+
+def _parts(stored: str | bytes, dataset: Any, kept: dict[str, NDArray[Any]]) -> list[Channel | Refused]:
+    # A name that is no UTF-8 comes as bytes.
+    name = stored.decode("utf-8", errors="replace") if isinstance(stored, bytes) else stored
+    reason = _refusal(dataset)
+    if reason is not None:
+        return [Refused(name, reason)]
+    attributes = _attributes(dataset)
+    read = kept_last(kept, name, lambda: dataset[()])
+    return columns_of(name, dataset.shape, read, unit_of(attributes), stored_by(attributes))
 
 
 def _refusal(dataset: Any) -> str | None:
@@ -77,10 +74,3 @@ def _attributes(dataset: Any) -> dict[str, Any]:
         with contextlib.suppress(OSError, TypeError, ValueError):
             found[str(name)] = dataset.attrs[name]
     return found
-
-
-def _unit(attributes: Mapping[str, Any]) -> str | None:
-    for name in UNIT_ATTRIBUTES:
-        if name in attributes:
-            return stated_unit(attributes[name])
-    return None

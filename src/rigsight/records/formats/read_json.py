@@ -9,11 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rigsight.errors import InputError
-from rigsight.records.formats.channel import MOST_COLUMNS, Channel, ChannelFile, Refused, check_count
-
-LARGEST_FILE = 300_000_000
-"""In bytes: every number becomes an object, ten times the file."""
+from rigsight.records.formats.channel import MOST_COLUMNS, Channel, ChannelFile, Refused, listed
 
 
 def open_json(path: Path) -> Iterator[ChannelFile]:
@@ -21,25 +17,12 @@ def open_json(path: Path) -> Iterator[ChannelFile]:
 
     JSON states no units.
     """
-    if (size := path.stat().st_size) > LARGEST_FILE:
-        raise InputError(
-            f"{path.name} has {size / 1e6:.0f} MB, more than the {LARGEST_FILE / 1e6:g} MB that are read of a JSON file. "
-            "Export the record as CSV, Parquet or HDF5."
-        )
     text = path.read_text(encoding="utf-8-sig")
     try:
         data = json.loads(text)
     except json.JSONDecodeError:
         data = [json.loads(line) for line in text.splitlines() if line.strip()]
-    channels: list[Channel] = []
-    refused: list[Refused] = []
-    for one in _parts("", data):
-        check_count(path.name, len(channels) + len(refused))
-        if isinstance(one, Refused):
-            refused.append(one)
-        else:
-            channels.append(one)
-    yield ChannelFile(tuple(channels), tuple(refused))
+    yield listed(path.name, _parts("", data))
 
 
 def _parts(name: str, value: Any) -> Iterator[Channel | Refused]:
@@ -48,14 +31,10 @@ def _parts(name: str, value: Any) -> Iterator[Channel | Refused]:
             yield from _parts(f"{name}/{key}" if name else str(key), inner)
         return
     if not isinstance(value, list) or len(value) < 2:
-        what = (
-            "is empty"
-            if value in ([], None)
-            else "is text"
-            if isinstance(value, str)
-            else "holds a single number"
+        is_text = isinstance(value, str)
+        yield Refused(
+            name, "is empty" if value in ([], None) else "is text" if is_text else "holds a single number"
         )
-        yield Refused(name, what)
         return
     kinds = {type(row) for row in value if row is not None}
     if kinds == {dict}:

@@ -17,8 +17,9 @@ from rigsight.records.formats.channel import (
     Load,
     Refused,
     TimeAxis,
-    check_count,
+    listed,
     stated_unit,
+    too_short,
 )
 
 # Types of asammdf.blocks.v4_constants: numbers, and conversions that are formulas with numbers, not text.
@@ -41,27 +42,25 @@ def open_mdf(path: Path) -> Iterator[ChannelFile]:
             )
         stream.seek(0)
         with MDF(stream) as file:
-            channels: list[Channel] = []
-            refused: list[Refused] = []
-            groups: list[Any] = list(file.groups)
-            for number, group in enumerate(groups):
-                master = file.masters_db.get(number)
-                n_samples = int(group.channel_group.cycles_nr)
-                axis = _axis(file, group, number, master, n_samples)
-                label = group.channel_group.acq_name or f"group {number + 1}"
-                prefix = f"{label}/" if len(groups) > 1 else ""
-                for index, channel in enumerate(group.channels):
-                    check_count(path.name, len(channels) + len(refused))
-                    if index == master:
-                        continue
-                    name = prefix + channel.name
-                    reason = _refusal(channel, n_samples, axis)
-                    if reason is not None:
-                        refused.append(Refused(name, reason))
-                        continue
-                    unit = stated_unit(channel.unit) or stated_unit(getattr(channel.conversion, "unit", None))
-                    channels.append(Channel(name, n_samples, _load(file, number, index), unit, axis))
-            yield ChannelFile(tuple(channels), tuple(refused))
+            yield listed(path.name, _parts(file))
+
+
+def _parts(file: Any) -> Iterator[Channel | Refused]:
+    for number, group in enumerate(file.groups):
+        master = file.masters_db.get(number)
+        n_samples = int(group.channel_group.cycles_nr)
+        axis = _axis(file, group, number, master, n_samples)
+        label = group.channel_group.acq_name or f"group {number + 1}"
+        prefix = f"{label}/" if len(file.groups) > 1 else ""
+        for index, channel in enumerate(group.channels):
+            if index == master:
+                continue
+            name, reason = prefix + channel.name, _refusal(channel, n_samples, axis)
+            unit = stated_unit(channel.unit) or stated_unit(getattr(channel.conversion, "unit", None))
+            if reason is not None:
+                yield Refused(name, reason)
+            else:
+                yield Channel(name, n_samples, _load(file, number, index), unit, axis)
 
 
 def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int) -> TimeAxis | None:
@@ -91,9 +90,7 @@ def _refusal(channel: Any, n_samples: int, axis: TimeAxis | None) -> str | None:
         return _FORMULA
     if channel.data_type not in _NUMBERS or (conversion not in _NO_CONVERSION and conversion > _LAST_NUMERIC):
         return "contains text, a list or other bytes, not numbers"
-    if n_samples < 2:
-        return "holds a single number" if n_samples else "is empty"
-    return None if axis is not None else "has no time"
+    return too_short(n_samples) or (None if axis is not None else "has no time")
 
 
 def _conversion(channel: Any) -> int | None:

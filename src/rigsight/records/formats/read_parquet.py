@@ -15,12 +15,12 @@ from rigsight.records.formats.channel import (
     Load,
     Refused,
     check_count,
-    stated_unit,
+    listed,
+    stored_by,
+    too_short,
+    unit_of,
 )
-from rigsight.records.formats.stored_numbers import stored_by
-from rigsight.records.formats.time_stamps import earliest, seconds_since
-
-UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
+from rigsight.records.stamps import earliest, seconds_since
 
 
 def open_parquet(path: Path) -> Iterator[ChannelFile]:
@@ -31,27 +31,32 @@ def open_parquet(path: Path) -> Iterator[ChannelFile]:
     from pyarrow.parquet import ParquetFile
 
     with ParquetFile(path) as file:
-        schema = file.schema_arrow
-        check_count(path.name, len(schema))
-        n_rows = file.metadata.num_rows
-        dated = [column.name for column in schema if _is_date(column.type)]
-        origin = _origin(file, dated) if n_rows and len(set(schema.names)) == len(schema.names) else None
-        channels: list[Channel] = []
-        refused: list[Refused] = []
-        for column in schema:
-            if schema.names.count(column.name) > 1:
-                refused.append(Refused(column.name, "occurs twice in the file"))
-            elif not _is_numeric(column.type):
-                refused.append(Refused(column.name, f"is of type {column.type}, not numbers"))
-            elif n_rows < 2:
-                refused.append(Refused(column.name, "holds a single number" if n_rows else "is empty"))
-            else:
-                unit = "s" if _is_time(column.type) else _unit(column.metadata)
-                own = origin if _is_date(column.type) else None
-                stored = stored_by(_texts(column.metadata))
-                load = _load(file, column.name, own)
-                channels.append(Channel(column.name, n_rows, load, unit, stored=stored, origin=own))
-        yield ChannelFile(tuple(channels), tuple(refused))
+        check_count(path.name, len(file.schema_arrow))
+        yield listed(path.name, _parts(file))
+
+
+def _parts(file: Any) -> Iterator[Channel | Refused]:
+    from pyarrow import types
+
+    schema, n_rows = file.schema_arrow, file.metadata.num_rows
+    dated = [column.name for column in schema if types.is_timestamp(column.type)]
+    origin = _origin(file, dated) if n_rows and len(set(schema.names)) == len(schema.names) else None
+    for column in schema:
+        name, kind = column.name, column.type
+        is_time = types.is_timestamp(kind) or types.is_duration(kind)
+        if schema.names.count(name) > 1:
+            yield Refused(name, "occurs twice in the file")
+        elif not (types.is_integer(kind) or types.is_floating(kind) or is_time):
+            yield Refused(name, f"is of type {kind}, not numbers")
+        elif reason := too_short(n_rows):
+            yield Refused(name, reason)
+        else:
+            said = {
+                key.decode("utf-8", errors="replace"): value for key, value in (column.metadata or {}).items()
+            }
+            own = origin if types.is_timestamp(kind) else None
+            unit, load = "s" if is_time else unit_of(said), _load(file, name, own, is_time=is_time)
+            yield Channel(name, n_rows, load, unit, stored=stored_by(said), origin=own)
 
 
 def _origin(file: Any, dated: list[str]) -> np.datetime64 | None:
@@ -62,41 +67,10 @@ def _origin(file: Any, dated: list[str]) -> np.datetime64 | None:
     return earliest(np.datetime64(first.column(name).to_numpy(zero_copy_only=False)[0]) for name in dated)
 
 
-def _load(file: Any, name: str, origin: np.datetime64 | None) -> Load:
+def _load(file: Any, name: str, origin: np.datetime64 | None, *, is_time: bool) -> Load:
     def samples() -> NDArray[Any]:
-        column = file.read(columns=[name]).column(name)
-        if _is_time(column.type):
-            return seconds_since(column.to_numpy(), origin)
         # Missing cells of whole numbers become NaN, and are told as such.
-        return np.asarray(column.to_numpy())
+        column = file.read(columns=[name]).column(name).to_numpy()
+        return seconds_since(column, origin) if is_time else np.asarray(column)
 
     return samples
-
-
-def _is_numeric(kind: Any) -> bool:
-    from pyarrow import types
-
-    return bool(types.is_integer(kind) or types.is_floating(kind)) or _is_time(kind)
-
-
-def _is_date(kind: Any) -> bool:
-    from pyarrow import types
-
-    return bool(types.is_timestamp(kind))
-
-
-def _is_time(kind: Any) -> bool:
-    from pyarrow import types
-
-    return bool(types.is_timestamp(kind) or types.is_duration(kind))
-
-
-def _texts(metadata: Any) -> dict[str, Any]:
-    return {name.decode("utf-8", errors="replace"): value for name, value in (metadata or {}).items()}
-
-
-def _unit(metadata: Any) -> str | None:
-    for key in UNIT_KEYS:
-        if metadata and (unit := stated_unit(metadata.get(key))) is not None:
-            return unit
-    return None

@@ -16,23 +16,17 @@ from rigsight.records.formats.channel import (
     Load,
     Refused,
     TimeAxis,
+    listed,
     stated_unit,
+    stored_by,
+    too_short,
+    unit_of,
 )
-from rigsight.records.formats.stored_numbers import stored_by
-from rigsight.records.formats.time_stamps import earliest, seconds_since
+from rigsight.records.stamps import earliest, seconds_since
 
 SCALES = (
-    "Polynomial",
-    "Linear",
-    "RTD",
-    "Strain",
-    "Table",
-    "Thermistor",
-    "Thermocouple",
-    "Add",
-    "Subtract",
-    "AdvancedAPI",
-)
+    "Polynomial", "Linear", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add", "Subtract", "AdvancedAPI",
+)  # fmt: skip
 """Types of scales that nptdms 1.10 applies; it passes over others with a line in its log."""
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription", "unit", "Unit")
@@ -49,34 +43,29 @@ def open_tdms(path: Path) -> Iterator[ChannelFile]:
     with TdmsFile.open(path) as file:
         if file.file_status.incomplete_final_segment:
             raise ValueError("the last segment is incomplete")
-        channels: list[Channel] = []
-        refused: list[Refused] = []
-        every = [channel for group in file.groups() for channel in group.channels()]
-        origin = earliest(moment for channel in every if (moment := _start(channel)) is not None)
-        for group in file.groups():
-            for channel in group.channels():
-                name = f"{group.name}/{channel.name}"
-                kind = np.dtype(channel.dtype).kind
-                if kind not in "iufM":
-                    refused.append(
-                        Refused(name, "holds text or complex numbers" if len(channel) else "is empty")
-                    )
-                elif len(channel) < 2:
-                    refused.append(Refused(name, "holds a single number" if len(channel) else "is empty"))
-                elif unknown := _unknown_scales(channel.properties, group.properties, file.properties):
-                    refused.append(
-                        Refused(
-                            name,
-                            f"has a scale of type {', '.join(unknown)}, which is not read; export scaled values",
-                        )
-                    )
-                else:
-                    dated = origin if kind == "M" else None
-                    unit = "s" if kind == "M" else _unit(channel.properties)
-                    stored = stored_by(_of_users(channel.properties))
-                    axis, load = _axis(channel, origin), _load(channel, dated)
-                    channels.append(Channel(name, len(channel), load, unit, axis, stored, dated))
-        yield ChannelFile(tuple(channels), tuple(refused))
+        yield listed(path.name, _parts(file))
+
+
+def _parts(file: Any) -> Iterator[Channel | Refused]:
+    every = [(group, channel) for group in file.groups() for channel in group.channels()]
+    origin = earliest(moment for _, channel in every if (moment := _start(channel)) is not None)
+    for group, channel in every:
+        name, properties = f"{group.name}/{channel.name}", channel.properties
+        kind = np.dtype(channel.dtype).kind
+        if kind not in "iufM":
+            yield Refused(name, "holds text or complex numbers" if len(channel) else "is empty")
+        elif reason := too_short(len(channel)):
+            yield Refused(name, reason)
+        elif unknown := _unknown_scales(properties, group.properties, file.properties):
+            what = f"has a scale of type {', '.join(unknown)}, which is not read; export scaled values"
+            yield Refused(name, what)
+        else:
+            dated = origin if kind == "M" else None
+            unit = "s" if kind == "M" else unit_of(properties, UNIT_PROPERTIES)
+            # Properties of waveforms and of scales are known; the others a person wrote.
+            said = {key: value for key, value in properties.items() if not key.startswith(("NI_", "wf_"))}
+            axis, load = _axis(channel, origin), _load(channel, dated)
+            yield Channel(name, len(channel), load, unit, axis, stored_by(said), dated)
 
 
 def _unknown_scales(*owners: Mapping[str, Any]) -> list[str]:
@@ -90,11 +79,6 @@ def _unknown_scales(*owners: Mapping[str, Any]) -> list[str]:
         types = {str(value) for name, value in properties.items() if _SCALE_TYPE.fullmatch(name)}
         return sorted(types.difference(SCALES))
     return []
-
-
-def _of_users(properties: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the properties that a person wrote; those of waveforms and of scales are known."""
-    return {name: value for name, value in properties.items() if not name.startswith(("NI_", "wf_"))}
 
 
 def _load(channel: Any, origin: np.datetime64 | None) -> Load:
@@ -126,10 +110,3 @@ def _axis(channel: Any, origin: np.datetime64 | None) -> TimeAxis | None:
     if is_dated:
         first += float(seconds_since(np.array([start]), origin)[0])
     return TimeAxis(len(channel), float(increment), first, unit=unit, origin=origin if is_dated else None)
-
-
-def _unit(properties: Any) -> str | None:
-    for name in UNIT_PROPERTIES:
-        if (unit := stated_unit(properties.get(name))) is not None:
-            return unit
-    return None

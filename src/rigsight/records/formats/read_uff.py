@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.errors import InputError
 from rigsight.records.formats.channel import (
     Channel,
     ChannelFile,
@@ -18,11 +17,10 @@ from rigsight.records.formats.channel import (
     TimeAxis,
     check_count,
     check_size,
+    listed,
     stated_unit,
 )
 
-LARGEST_FILE = 300_000_000
-"""In bytes: pyuff holds every number of a text dataset as an object, thirty times the file."""
 FUNCTION, TIME_RESPONSE, TIME_AXIS = 58, 1, 17
 _FUNCTIONS = {
     2: "an auto spectrum",
@@ -47,42 +45,32 @@ def open_uff(path: Path) -> Iterator[ChannelFile]:
     """
     import pyuff
 
-    size = path.stat().st_size
-    if size > LARGEST_FILE:
-        raise InputError(
-            f"{path.name} has {size / 1e6:.0f} MB, more than the {LARGEST_FILE / 1e6:g} MB that are read of a universal file. "
-            "Export the record as MATLAB 7.3, TDMS or MDF4."
-        )
     with path.open("rb") as stream:
-        stream.seek(-min(size, 200), 2)
+        stream.seek(-min(path.stat().st_size, 200), 2)
         if not stream.read().rstrip().endswith(b"-1"):
             raise ValueError("the last dataset has no end")
     file = pyuff.UFF(str(path))
     types = [int(kind) for kind in file.get_set_types()]
-    check_count(path.name, len(types))
-    channels: list[Channel] = []
-    refused: list[Refused] = []
-    for i, kind in enumerate(types):
-        if kind != FUNCTION:
-            continue
-        header = file.read_sets(i, header_only=True)
-        name = _name(header, i)
-        function = int(header["func_type"])
-        if int(header["abscissa_spec_data_type"]) not in (0, TIME_AXIS) or function not in (0, TIME_RESPONSE):
-            what = _FUNCTIONS.get(function, f"a function of type {function}, not over time")
-            refused.append(Refused(name, f"is {what}; a record needs the time data it was made from"))
-        elif int(header["ord_data_type"]) not in _REAL:
-            refused.append(Refused(name, "holds complex numbers"))
-        else:
-            channels.append(_channel(path, file, i, name, header))
     if not types:
         raise ValueError("no dataset is complete")
-    yield ChannelFile(tuple(channels), tuple(refused))
+    check_count(path.name, len(types))
+    yield listed(path.name, (_part(path.name, file, i) for i, kind in enumerate(types) if kind == FUNCTION))
 
 
-def _channel(path: Path, file: Any, number: int, name: str, header: dict[str, Any]) -> Channel:
+def _part(of: str, file: Any, number: int) -> Channel | Refused:
+    header = file.read_sets(number, header_only=True)
+    name, function = _name(header, number), int(header["func_type"])
+    if int(header["abscissa_spec_data_type"]) not in (0, TIME_AXIS) or function not in (0, TIME_RESPONSE):
+        what = _FUNCTIONS.get(function, f"a function of type {function}, not over time")
+        return Refused(name, f"is {what}; a record needs the time data it was made from")
+    if int(header["ord_data_type"]) not in _REAL:
+        return Refused(name, "holds complex numbers")
+    return _channel(of, file, number, name, header)
+
+
+def _channel(of: str, file: Any, number: int, name: str, header: dict[str, Any]) -> Channel:
     n_samples = int(header["num_pts"])
-    check_size(path.name, name, n_samples)
+    check_size(of, name, n_samples)
     read: list[dict[str, Any]] = []
 
     def part(key: str) -> Load:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
-from rigsight.records.formats.ordinary_file import file_size
+from rigsight.records.formats.known import file_size
 from rigsight.rigs.parts import READING
 from rigsight.rigs.reading.declaration import Declaration
 from rigsight.rigs.reading.declared_names import check_all_used, check_declared_names, check_names_read

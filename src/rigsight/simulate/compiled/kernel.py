@@ -1,8 +1,10 @@
-"""Compiled kernels as functions of arrays. While one runs, other Python threads can run."""
+"""Compiled kernels as functions of arrays, kept by structure. While one runs, other Python threads can run."""
 
 from __future__ import annotations
 
 import ctypes
+import hashlib
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,38 +13,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import MachineError
-from rigsight.simulate.compiled.simulated_bodies import connect
+from rigsight.libraries import is_kept, library_file
+from rigsight.simulate.compiled.kernel_source import connect, include_folders, kernel_source
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
 
 Floats = NDArray[np.float64]
 
-_DOUBLES, _INTS = ctypes.c_void_p, ctypes.c_void_p
-_LONG, _DOUBLE, _INT = ctypes.c_long, ctypes.c_double, ctypes.c_int
+_TYPES: dict[str, Any] = {"a": ctypes.c_void_p, "l": ctypes.c_long, "d": ctypes.c_double, "i": ctypes.c_int}
+"""Types of arguments: address of an array, long, double, int."""
+
+_kernels: dict[str, Kernel] = {}
+_keys: dict[Structure, str] = {}
+_texts: dict[Structure, str] = {}
+"""C texts of structures whose kernel is not loaded yet; printing a text takes some 20 ms."""
+_lock = threading.Lock()
+_made: dict[str, threading.Lock] = {}
+"""A lock for each kernel, so that it is compiled only once while others may be compiled at the same time."""
 
 
 class _FittedRecord(ctypes.Structure):
     """The C structure ``fitted_record`` of the kernel."""
 
-    _fields_ = (
-        ("c", _DOUBLES), ("n_pieces", _LONG), ("length", _DOUBLE), ("per_sample", _LONG), ("substeps", _INTS),
-        ("start_time", _DOUBLE), ("measured", _DOUBLES), ("weights", _DOUBLES),
-    )  # fmt: skip
+    _fields_ = [
+        (field[2:], _TYPES[field[0]])
+        for field in (
+            "a c", "l n_pieces", "d length", "l per_sample", "a substeps", "d start_time", "a measured", "a weights",
+        )
+    ]  # fmt: skip
 
 
 class FittedRecord:
-    """A record to which parameter sets are fitted.
+    """A record to which parameter sets are fitted: with steps of shape (n_pieces,) and outputs (n_samples, n_outputs).
 
-    Parameters
-    ----------
-    held
-        Input between its samples.
-    substeps
-        Runge-Kutta steps in each piece of the input, shape (n_pieces,).
-    measured
-        Outputs, shape (n_samples, n_outputs).
-    weights
-        Factors of the residuals, shape (n_outputs,); 0 for an output that was not measured.
+    Weights are factors of the residuals, shape (n_outputs,); 0 for an output that was not measured.
     """
 
     def __init__(
@@ -58,20 +62,7 @@ class FittedRecord:
 
 
 class Kernel:
-    """The integrators of a structure.
-
-    Parameters
-    ----------
-    path
-        Shared library.
-    structure
-        The structure that was compiled.
-
-    Raises
-    ------
-    MachineError
-        If the library cannot be loaded.
-    """
+    """The integrators of a structure that was compiled to a shared library."""
 
     def __init__(self, path: Path, structure: Structure) -> None:
         self.path = path
@@ -86,30 +77,16 @@ class Kernel:
             ) from error
         connect(structure, loaded)
         self._bodies = structure.rig.mechanism.bodies
-        self._one = loaded.simulate_one
-        self._one.restype = _INT
-        self._one.argtypes = [
-            _DOUBLES, _LONG, _DOUBLE, _LONG, _INT, _DOUBLE, _DOUBLES, _DOUBLES, _DOUBLE, _DOUBLES, _LONG, _INTS,
-        ]  # fmt: skip
+        self._one = _function(loaded, "simulate_one", "a l d l i d a a d a l a")
         self.carries_tangents = hasattr(loaded, "tangent_equations")
         """True if `tangent_equations` and `simulate_tangents` are available, False if `normal_equations` is."""
         if structure.histories:
             return
-        self._lanes = loaded.simulate_lanes
-        self._lanes.restype = None
-        self._lanes.argtypes = [
-            _DOUBLES, _LONG, _DOUBLE, _LONG, _INTS, _DOUBLE, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES,
-        ]  # fmt: skip
+        self._lanes = _function(loaded, "simulate_lanes", "a l d l a d a l l a a", None)
         if self.carries_tangents:
-            self._tangents = loaded.tangent_equations
-            self._tangents.restype = _INT
-            self._tangents.argtypes = [
-                _DOUBLES, _LONG, _DOUBLES, _DOUBLES, _LONG, _DOUBLES, _DOUBLES, _LONG, _DOUBLES, _DOUBLES,
-            ]  # fmt: skip
+            self._tangents = _function(loaded, "tangent_equations", "a l a a l a a l a a")
         else:
-            self._normal = loaded.normal_equations
-            self._normal.restype = _INT
-            self._normal.argtypes = [_DOUBLES, _LONG, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES]
+            self._normal = _function(loaded, "normal_equations", "a l a l l a a")
 
     def simulate_one(
         self,
@@ -210,5 +187,58 @@ class Kernel:
             raise MachineError(f"Not enough memory to simulate {n_directions} derivatives side by side.")
 
 
+def _function(library: ctypes.CDLL, name: str, arguments: str, result: Any = ctypes.c_int) -> Any:
+    """Return a function of a library that takes arguments of `_TYPES`."""
+    function = getattr(library, name)
+    function.restype, function.argtypes = result, [_TYPES[own] for own in arguments.split()]
+    return function
+
+
 def _doubles(values: Any) -> Floats:
     return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def kernel_of(structure: Structure) -> Kernel:
+    """Return the compiled kernels of a structure, compiling them if this machine has not yet done so."""
+    known = _loaded(structure)
+    if known is not None:
+        return known
+    with _lock:
+        known = _loaded(structure)
+        if known is not None:
+            return known
+        # Threads write texts one after the other, which is no slower in pure Python. The compilers run in parallel.
+        text = _text(structure)
+        key = hashlib.sha256(text.encode()).hexdigest()
+        own = _made.setdefault(key, threading.Lock())
+    with own:
+        if key not in _kernels:
+            _kernels[key] = Kernel(library_file(text, include_folders(structure)), structure)
+        _keys[structure] = key
+        _texts.pop(structure, None)
+        return _kernels[key]
+
+
+def _loaded(structure: Structure) -> Kernel | None:
+    key = _keys.get(structure)
+    return None if key is None else _kernels.get(key)
+
+
+def compiled(structure: Structure) -> bool:
+    """Return True if the machine code of a structure's kernels is loaded or in the cache."""
+    if _loaded(structure) is not None:
+        return True
+    text = _text(structure)
+    return is_kept(text)
+
+
+def _text(structure: Structure) -> str:
+    text = _texts.get(structure)
+    if text is None:
+        text = _texts[structure] = kernel_source(structure)
+    return text
+
+
+def compile_kernels(structure: Structure) -> None:
+    """Compile the kernels of a structure and keep them on disk."""
+    kernel_of(structure)

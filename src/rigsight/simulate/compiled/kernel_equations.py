@@ -8,11 +8,11 @@ from functools import cached_property
 import sympy as sp
 
 from rigsight.effects.symbols import derivative
-from rigsight.simulate.compiled.c_functions import FUNCTIONS, elements, filled, function_body, real, template
-from rigsight.simulate.equations.expressions import gathered, hoist_constants
+from rigsight.libraries.templates import filled, template
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
+from rigsight.simulate.equations.straight_line import gathered, hoist_constants
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
-from rigsight.simulate.printing.c import limited
+from rigsight.simulate.printing.language import FUNCTIONS, elements, function_body, limited, real
 
 
 class KernelEquations:
@@ -58,10 +58,9 @@ class KernelEquations:
         """Return the part of a C file that contains the equations."""
         structure, frictions = self.structure, self.frozen.frictions
         single, dependent = self.frozen.single_friction, self.frozen.dependent_modes
-        n_states, n_modes, n_late = len(structure.states), len(self.frozen.modes), len(structure.histories)
+        n_states, n_modes = len(structure.states), len(self.frozen.modes)
         names = self._names
         prepare = dict(zip(structure.parameter_symbols, parameter_names, strict=True))
-        switches = [*elements("g", n_modes), *elements("d", n_modes)]
         fragments = {
             "N_STATES": n_states,
             "SIZE_STATES": max(1, n_states),
@@ -86,10 +85,8 @@ class KernelEquations:
             "READS_LATE_RATE": int(
                 any(slope.free_symbols & set(self._late_rates) for slope in self._groups["switch_slopes"])
             ),
-            "SIGNALS": function_body(
-                ("now", "x", "q", "w"), elements("w", n_late), self._groups["signals"], names
-            ),
-            "DELAYS": function_body(("q", "by"), elements("by", n_late), self._groups["delays"], names),
+            "SIGNALS": self._body("now x q w", "w", self._groups["signals"]),
+            "DELAYS": self._body("q by", "by", self._groups["delays"]),
             "HAS_LIMITS": int(bool(self.limits) and n_modes > 0),
             "N_DEPENDENT": len(dependent),
             "DEPENDENT_MODES": ", ".join(map(str, dependent)) or "0",
@@ -100,34 +97,22 @@ class KernelEquations:
             "DELAY": function_body(
                 ("q",), ["const double delay"], self._groups["delay"], names, "return delay;"
             ),
-            "RATES": function_body(
-                ("now", "x", "s", "q", "r"),
-                elements("r", n_states),
-                self._groups["rates"],
-                names,
-                steps=self._steps,
-            ),
+            "RATES": self._body("now x s q r", "r", self._groups["rates"]),
             "SWITCHES": function_body(
-                ("now", "x", "k", "s", "q", "g", "d"),
-                switches,
+                ["now", "x", "k", "s", "q", "g", "d"],
+                [*elements("g", n_modes), *elements("d", n_modes)],
                 [*self._groups["switches"], *self._groups["switch_slopes"]],
                 names,
             ),
             "PUT_BACK": function_body(("x", "q"), *self._put_back("x", self.limits), names)
             if self.limits and n_modes > 0
             else "",
-            "OUTPUTS": function_body(
-                ("now", "x", "s", "q", "y"),
-                elements("y", len(structure.computed_outputs)),
-                self._groups["outputs"],
-                names,
-                steps=self._steps,
-            ),
+            "OUTPUTS": self._body("now x s q y", "y", self._groups["outputs"]),
         }
         texts = {key: str(value) for key, value in fragments.items()}
         bodies = "\n".join(texts.values())
         called = [text for name, text in FUNCTIONS.items() if f"{name}(" in bodies]
-        return filled(template("equations.c.txt"), {"FUNCTIONS": "\n".join(called), **texts})
+        return filled(template("simulate", "equations.c.txt"), {"FUNCTIONS": "\n".join(called), **texts})
 
     def lane_fragments(self) -> dict[str, str]:
         """Return the equations for parameter sets side by side, by their key in the template."""
@@ -140,7 +125,7 @@ class KernelEquations:
         kept = [limited(gained[i], limit) for i, limit in followers.items()]
         others = {i: limit for i, limit in self.limits.items() if i not in followers}
         frictions, several = self.frozen.frictions, self.has_several_frictions
-        speeds, slopes = self._groups["speeds"], self._groups["speed_slopes"]
+        slopes = self._groups["speed_slopes"]
         curvatures = {input_symbols(i)[2] for i in range(structure.n_inputs)}
         read = set().union(
             *(e.free_symbols for e in (*rates, *self.outputs, *slopes, *self.lane_steps.values()))
@@ -150,35 +135,25 @@ class KernelEquations:
             "SINGLE_FRICTION": str(0 if frictions and not several else -1),
             "SEVERAL_FRICTIONS": str(len(frictions) if several else 0),
             "HAS_CURVATURE": str(int(bool(curvatures & read))),
-            "LANE_SPEEDS": function_body(
-                ("now", "x", "q"), elements("g", len(speeds)), speeds, names, lanes=True
-            ),
-            "LANE_SPEED_SLOPES": function_body(
-                ("now", "x", "k", "q"), elements("d", len(slopes)), slopes, names, lanes=True
-            ),
+            "LANE_SPEEDS": self._body("now x q", "g", self._groups["speeds"], lanes=True),
+            "LANE_SPEED_SLOPES": self._body("now x k q", "d", slopes, lanes=True),
             "N_INTEGRATED": str(len(integrated)),
             "INTEGRATED": ", ".join(map(str, integrated)) or "0",
-            "LANE_RATES": function_body(
-                ("now", "x", "q", "r"),
-                elements("r", len(rates)),
-                rates,
-                names,
-                lanes=True,
-                steps=self.lane_steps,
-            ),
-            "LANE_OUTPUTS": function_body(
-                ("now", "x", "q", "y"),
-                elements("y", len(structure.computed_outputs)),
-                self.outputs,
-                names,
-                lanes=True,
-                steps=self.lane_steps,
-            ),
+            "LANE_RATES": self._body("now x q r", "r", rates, lanes=True),
+            "LANE_OUTPUTS": self._body("now x q y", "y", self.outputs, lanes=True),
             "LANE_FOLLOWERS": function_body(
                 (), [f"y[{i}]" for i in followers], kept, self._plus_own(names, kept), lanes=True
             ),
             "LANE_PUT_BACK": function_body((), *self._put_back("x", others), names, lanes=True),
         }
+
+    def _body(
+        self, arguments: str, array: str, expressions: Sequence[sp.Expr], *, lanes: bool = False
+    ) -> str:
+        """Return the body of a function that writes expressions to an array, after the steps that they need."""
+        names, steps = (self.lane_names, self.lane_steps) if lanes else (self._names, self._steps)
+        targets = elements(array, len(expressions))
+        return function_body(arguments.split(), targets, expressions, names, lanes=lanes, steps=steps)
 
     @cached_property
     def lane_names(self) -> dict[sp.Symbol, str]:
@@ -267,10 +242,7 @@ class KernelEquations:
 
     def _slope(self, expression: sp.Expr) -> sp.Expr:
         """Return the total derivative of an expression with respect to time, between events."""
-        along = {
-            **dict(zip(self.structure.states, self._rate_symbols, strict=True)),
-            TIME: sp.Integer(1),
-        }
+        along = {**dict(zip(self.structure.states, self._rate_symbols, strict=True)), TIME: sp.Integer(1)}
         for i in range(self.structure.n_inputs):
             value, rate, curvature = input_symbols(i)
             along |= {value: rate, rate: curvature}

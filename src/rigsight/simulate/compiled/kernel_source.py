@@ -18,9 +18,10 @@ and constants are numbered.
 
 from __future__ import annotations
 
-from rigsight.simulate.compiled.c_functions import filled, template
+import ctypes
+
+from rigsight.libraries.templates import filled, template
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
-from rigsight.simulate.compiled.simulated_bodies import bodies_text, lane_bodies_text
 from rigsight.simulate.compiled.tangent_equations import carries_tangents, tangent_fragments
 from rigsight.simulate.equations.structure import Structure
 
@@ -63,7 +64,9 @@ def accurate_integrator(equations: KernelEquations) -> str:
     left_out = [] if equations.structure.histories else ["history.c.txt"]
     left_out += [] if equations.frozen.frictions else ["friction.c.txt"]
     parts = [part for part in ACCURATE if part not in left_out]
-    return "\n".join(filled(template(part), {"READS_LATE": equations.reads_late}) for part in parts)
+    return "\n".join(
+        filled(template("simulate", part), {"READS_LATE": equations.reads_late}) for part in parts
+    )
 
 
 def kernel_source(structure: Structure) -> str:
@@ -77,7 +80,7 @@ def kernel_source(structure: Structure) -> str:
         accurate_integrator(equations),
     ]
     if structure.histories:
-        return "\n".join([*head, template("one_late.c.txt")])
+        return "\n".join([*head, template("simulate", "one_late.c.txt")])
     tangents = carries_tangents(equations)
     lanes = {
         "LANES": str(LANES),
@@ -89,8 +92,34 @@ def kernel_source(structure: Structure) -> str:
     return "\n".join(
         [
             *head,
-            template("one.c.txt"),
-            *(filled(template(part), lanes) for part in parts),
-            filled(template("tangents.c.txt"), tangent_fragments(equations)) if tangents else "",
+            template("simulate", "one.c.txt"),
+            *(filled(template("simulate", part), lanes) for part in parts),
+            filled(template("simulate", "tangents.c.txt"), tangent_fragments(equations)) if tangents else "",
         ]
     )
+
+
+def bodies_text(structure: Structure) -> str:
+    """Return the C text of a structure's simulated bodies; empty if there are none."""
+    bodies = structure.rig.mechanism.bodies
+    return "" if bodies is None else bodies.c_text
+
+
+def lane_bodies_text(structure: Structure) -> str:
+    """Return the same for parameter sets side by side."""
+    if structure.rig.mechanism.bodies is None:
+        return ""
+    return template("simulators", "lane_simulated.c.txt")
+
+
+def include_folders(structure: Structure) -> tuple[str, ...]:
+    """Return the folders of the headers that `bodies_text` includes."""
+    bodies = structure.rig.mechanism.bodies
+    return () if bodies is None else bodies.program.include_folders
+
+
+def connect(structure: Structure, library: ctypes.CDLL) -> None:
+    """Give a loaded kernel the functions by which it calls another simulator."""
+    bodies = structure.rig.mechanism.bodies
+    if bodies is not None:
+        bodies.program.connect(library)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
-from rigsight.simulate.compiled.c_functions import elements, function_body, lane_body, real, symbols
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
-from rigsight.simulate.equations.derivatives import slopes_of
+from rigsight.simulate.equations.derivatives import LinearForms, linear_forms, slope, slopes_of
 from rigsight.simulate.equations.elimination import Elimination
 from rigsight.simulate.equations.kinks import absolute
-from rigsight.simulate.equations.linear_forms import LinearForms, linear_forms, slope
 from rigsight.simulate.equations.straight_line import needed_steps, of_parts, straight_line
 from rigsight.simulate.equations.structure import INPUT, INPUT_RATE
-from rigsight.simulate.printing.c import C, limited
+from rigsight.simulate.printing.language import C, elements, function_body, lane_body, limited, real, symbols
 
 _EARLIER = sp.Symbol("earlier input", real=True)
 
@@ -72,7 +69,7 @@ def tangent_fragments(equations: KernelEquations) -> dict[str, str]:
         factors = tuple(factor.xreplace(now) for factor in forms.factors.values())
         places = elements("d", len(factors))
         fragments[f"N_{key}_FACTORS"] = str(max(1, len(factors)))
-        if isinstance(forms, EliminatedForms):
+        if forms.parts:
             parts = {symbol: part.xreplace(now) for symbol, part in forms.parts.items()}
             fragments[f"{key}_FACTORS"] = lane_body(places, of_parts(parts, factors), names)
             fragments[f"{key}_CHANGES"] = lane_body(targets, of_parts(forms.steps, forms.sums), names)
@@ -87,7 +84,7 @@ def _forms(
     expressions: Sequence[sp.Expr],
     changes: Mapping[sp.Symbol, sp.Symbol],
     steps: Mapping[sp.Symbol, sp.Expr],
-) -> LinearForms | EliminatedForms:
+) -> LinearForms:
     elimination, constants = equations.structure.elimination, set(equations.constants)
     if elimination is None or not needed_steps(expressions, steps):
         return linear_forms(expressions, changes, constants)
@@ -124,26 +121,13 @@ def _is_costly(part: sp.Expr) -> bool:
     return not isinstance(part, (sp.Abs, sp.sign, positive_part, limited, absolute))
 
 
-@dataclass(frozen=True)
-class EliminatedForms:
-    """Changes of expressions that contain accelerations."""
-
-    # Symbol -> the derivative or part of the elimination that it denotes; they are the same for all changes.
-    factors: Mapping[sp.Symbol, sp.Expr]
-    parts: Mapping[sp.Symbol, sp.Expr]  # symbols in the factors -> their expressions, in any order
-    # Symbols in the sums -> their expressions in factors, constants and changes: the changes of the
-    # accelerations.
-    steps: Mapping[sp.Symbol, sp.Expr]
-    sums: tuple[sp.Expr, ...]  # change of each expression, in terms of factors, constants, changes and steps
-
-
 def eliminated_forms(
     expressions: Sequence[sp.Expr],
     changes: Mapping[sp.Symbol, sp.Expr],
     constants: set[sp.Symbol],
     elimination: Elimination,
     steps: Mapping[sp.Symbol, sp.Expr],
-) -> EliminatedForms:
+) -> LinearForms:
     """Return the changes of expressions with accelerations due to changes of symbols, with all signs held constant."""
     n, begun = elimination.size, elimination.begun(steps)
     by = [*changes, *elimination.accelerations]
@@ -167,9 +151,9 @@ def eliminated_forms(
     sums = tuple(total(row, [*own, *elimination.solution("change")]) for row in rows[n:])
     known = {s for step in solved.values() for s in step.free_symbols if s in elimination.steps}
     kept = {s: factor(s) for s in sorted(known, key=str)}
-    return EliminatedForms(
+    return LinearForms(
         {symbol: value for value, symbol in factors.items()},
+        sums,
         {**whole.parts, **line.parts, **elimination.steps},
         {symbol: step.xreplace(kept) for symbol, step in solved.items()},
-        sums,
     )

@@ -1,4 +1,4 @@
-"""Meaning of the names in the declarations of a rig and its effects in the equations of one structure."""
+"""What names in the declarations of a rig and its effects mean in the equations of one structure, and its named values."""
 
 from __future__ import annotations
 
@@ -6,25 +6,23 @@ from collections.abc import Mapping
 
 import sympy as sp
 
-from rigsight.effects import Effect
+from rigsight.effects import Effect, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Rig, acceleration
 from rigsight.simulate.equations.structure import TIME, input_symbols
+from rigsight.simulate.equations.tree import (
+    Definition,
+    EquationsOfMotion,
+    EquationTree,
+    FirstOrderState,
+    Kind,
+)
 
 
 class Binder:
     """Replaces the symbols of rig and effect declarations by those of one structure.
 
-    Parameters
-    ----------
-    rig
-        The rig.
-    symbols
-        Symbol of each parameter of the structure, by its name in the structure.
-    unique
-        Name of each effect's parameter in the structure, by (effect, own name).
-    fixed
-        Values of parameters that appear in the equations as numbers.
+    `unique` has the name of each effect's parameter in the structure, by (effect, own name); those in `fixed` become numbers.
     """
 
     def __init__(
@@ -70,3 +68,59 @@ class Binder:
 def state_symbol(effect: Effect, symbol: sp.Symbol) -> sp.Symbol:
     """Return the symbol of an effect's state within a structure; two effects may use the same own name, such as z."""
     return sp.Symbol(f"{effect.name}.{symbol.name}", real=True)
+
+
+class DefinedSignals:
+    """Definitions in the order in which they were made."""
+
+    def __init__(self, binder: Binder, rig: Rig) -> None:
+        self.binder = binder
+        self.definitions: list[Definition] = []
+        self._signals = rig.mechanism.signals
+        self._values: dict[sp.Symbol, sp.Expr] = {}
+        """Expressions of signals, drives and sensors, by the symbols that denote them in the rig."""
+
+    def stands_for(self, symbol: sp.Symbol, expression: sp.Expr) -> None:
+        """From here on an expression stands for a drive or a sensor."""
+        self._values[symbol] = expression
+
+    def bound(self, expression: sp.Expr) -> sp.Expr:
+        """Bind an expression of the rig, with drives and sensors after their effects."""
+        for symbol, signal in self._signals.items():
+            if symbol in expression.free_symbols and symbol not in self._values:
+                self._values[symbol] = self.name(Kind.SIGNAL, symbol.name, self.bound(signal))
+        return self.binder.rig(expression).xreplace(self._values)
+
+    def flattened(self, expression: sp.Expr) -> sp.Expr:
+        """Return an expression without symbols of definitions."""
+        return EquationTree((), tuple(self.definitions), EquationsOfMotion(), (), ()).flattened(expression)
+
+    def name(self, kind: Kind, name: str, expression: sp.Expr) -> sp.Expr:
+        """Return a symbol for a named expression of the rig; an expression that is a symbol already keeps it."""
+        if expression.is_Symbol:
+            return expression
+        symbol = sp.Symbol(f"{name}:{kind.value}", real=True)
+        self.definitions.append(Definition(symbol, expression, kind, None, name=name))
+        return symbol
+
+    def define(
+        self, kind: Kind, effect: Effect, expression: sp.Expr, rate_of: sp.Symbol | None = None
+    ) -> sp.Symbol:
+        """Return a symbol for an expression that an effect changes."""
+        # Names of effects and parameters contain no colon, so there is no conflict.
+        symbol = sp.Symbol(f"{effect.name}:{kind.value}", real=True)
+        self.definitions.append(Definition(symbol, expression, kind, effect.name, rate_of))
+        return symbol
+
+    def states(self, effect: Effect, signals: Mapping[str, sp.Expr]) -> list[FirstOrderState]:
+        """Return the states of an effect; `signals` are the expressions of canonical symbols, by name."""
+        return [
+            FirstOrderState(
+                symbol=state_symbol(effect, s.symbol),
+                terms=(self.binder.effect(effect, s.rate, signals),),
+                dimension=placed_dimension(effect, s.dimension),
+                limit=None if s.limit is None else self.binder.effect(effect, s.limit, signals),
+                owner=effect.name,
+            )
+            for s in effect.states
+        ]

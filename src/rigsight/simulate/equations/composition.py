@@ -66,14 +66,9 @@ def _in_order(rig: Rig, sensors: Iterable[str]) -> tuple[str, ...]:
 
 
 def structure_of_fit(structure: Structure, records: Iterable[Record]) -> Structure:
-    """Return the structure that is simulated in a fit to records; the same one if no record has free offsets or an observer.
+    """Return the structure that is simulated in a fit to records, with their free offsets and observers, see `compose`.
 
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    records
-        Their free offsets and observers are added, see `compose`; those of sensors that the rig does not have are ignored.
+    It is the same one if no record has any; those of sensors that the rig does not have are ignored.
     """
     offsets, observed = set[str](), set[str]()
     for record in records:
@@ -154,13 +149,7 @@ def _ahead(sensor: str) -> Parameter:
 def structure_named(
     rig_name: str, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None
 ) -> Structure:
-    """Compose a rig given by its name.
-
-    Raises
-    ------
-    InputError
-        If there is no such rig, or as `compose`.
-    """
+    """Compose a rig given by its name."""
     return compose(RIGS[check_option("Rig", rig_name, RIGS)], effects, fixed)
 
 

@@ -1,4 +1,4 @@
-"""Equations of motion from drives, joints, energies and simulated bodies.
+"""Equations of motion from drives, joints, energies and simulated bodies, and how an observer corrects them.
 
 Lagrange's equations with the forces of drives and joints by virtual work.
 """
@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 import sympy as sp
 
 from rigsight.effects.symbols import derivative
-from rigsight.rigs import Rig, applied_symbol
+from rigsight.rigs import Coordinate, Rig, applied_symbol
 from rigsight.simulate.equations.tree import EquationsOfMotion
 from rigsight.units import size_of
 
@@ -54,3 +54,26 @@ def equations_of_motion(
         dimensions=("x",) if one else tuple(size_of(c.name) for c in free),
         rate_dimensions=("x time^-1",) if one else tuple(size_of(c.rate.name) for c in free),
     )
+
+
+def measured_before(shown: Sequence[sp.Expr], delay: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """Return value and rate of a measured motion before a delay, by a Taylor series that is valid for small delays."""
+    value, rate, curvature = shown
+    return value + delay * rate + delay**2 / 2 * curvature, rate + delay * curvature
+
+
+def observer_acceleration(
+    free: Sequence[Coordinate],
+    reads: sp.Expr,
+    shown: tuple[sp.Expr, sp.Expr],
+    measured: tuple[sp.Expr, sp.Expr],
+    bandwidth: sp.Expr,
+) -> sp.Matrix:
+    """Return the accelerations of the free coordinates with which the error of one sensor decays, shape (n_degrees, 1)."""
+    slopes = sp.Matrix([derivative(reads, c.rate) for c in free])
+    if any(slope != 0 for slope in slopes):
+        wanted = bandwidth * (measured[0] - shown[0])
+    else:
+        slopes = sp.Matrix([derivative(reads, c.symbol) for c in free])
+        wanted = bandwidth**2 * (measured[0] - shown[0]) + sp.sqrt(2) * bandwidth * (measured[1] - shown[1])
+    return slopes * (wanted / slopes.dot(slopes))

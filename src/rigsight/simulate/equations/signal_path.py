@@ -14,10 +14,8 @@ from rigsight.effects import Effect, Energy, Place
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
-from rigsight.simulate.equations.binder import Binder
-from rigsight.simulate.equations.defined_signals import DefinedSignals
-from rigsight.simulate.equations.lagrange import equations_of_motion
-from rigsight.simulate.equations.observer_acceleration import measured_before, observer_acceleration
+from rigsight.simulate.equations.binder import Binder, DefinedSignals
+from rigsight.simulate.equations.lagrange import equations_of_motion, measured_before, observer_acceleration
 from rigsight.simulate.equations.structure import ahead_name, bandwidth_name, input_symbols
 from rigsight.simulate.equations.tree import (
     EquationsOfMotion,
@@ -112,7 +110,7 @@ class _Path:
 
     def _shifts(self) -> list[FirstOrderState]:
         return [
-            FirstOrderState(symbol, (sp.Integer(0),), at_place("x", name), None, None)
+            FirstOrderState(symbol, (sp.Integer(0),), at_place("x", name))
             for name, symbol in self._offsets.items()
         ]
 
@@ -304,7 +302,7 @@ class _Path:
                 for effect in self._effects
                 if effect.lateral is not None
             ]
-            found.append(FirstOrderState(state.symbol, (linear, *changes), "length", None, None))
+            found.append(FirstOrderState(state.symbol, (linear, *changes), "length"))
         return found
 
     def _sensor(

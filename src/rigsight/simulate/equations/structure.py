@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import sympy as sp
@@ -13,7 +13,7 @@ from rigsight.effects.symbols import derivative
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig, joint_of
 from rigsight.simulate.equations.elimination import Elimination, steps_to_accelerations
-from rigsight.simulate.equations.tree import EquationTree, late, rate_within
+from rigsight.simulate.equations.tree import EquationTree, FirstOrderState, late
 
 INPUT = sp.Symbol("input value", real=True)
 INPUT_RATE = sp.Symbol("input rate", real=True)
@@ -30,21 +30,6 @@ def input_symbols(index: int) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
         sp.Symbol(f"{s.name} {index}", real=True) for s in (INPUT, INPUT_RATE, INPUT_CURVATURE)
     )
     return value, rate, curvature
-
-
-@dataclass(frozen=True)
-class StateEquation:
-    """One state of a structure: its rate, its dimension and the half-width of the range that it cannot leave, if any."""
-
-    symbol: sp.Symbol
-    rate: sp.Expr
-    dimension: str
-    limit: sp.Expr | None = None
-
-    @property
-    def limited_rate(self) -> sp.Expr:
-        """The rate; zero while the state is at an end of its range and the rate points outward."""
-        return rate_within(self.symbol, self.rate, self.limit)
 
 
 @dataclass(frozen=True)
@@ -94,7 +79,7 @@ class Structure:
         return len(self.rig.inputs) + len(self.observed)
 
     @cached_property
-    def equations(self) -> tuple[StateEquation, ...]:
+    def equations(self) -> tuple[FirstOrderState, ...]:
         """The states with their rates, dimensions and limits: coordinates, velocities, then the others.
 
         They contain no delays.
@@ -102,21 +87,18 @@ class Structure:
         return self._equations(self.tree.flattened)
 
     @cached_property
-    def remembering_equations(self) -> tuple[StateEquation, ...]:
+    def remembering_equations(self) -> tuple[FirstOrderState, ...]:
         """The same with the symbols of `histories`, as used in the simulation."""
         return self._equations(self.tree.remembering) if self.histories else self.equations
 
-    def _equations(self, flattened: Callable[[sp.Expr], sp.Expr]) -> tuple[StateEquation, ...]:
+    def _equations(self, flattened: Callable[[sp.Expr], sp.Expr]) -> tuple[FirstOrderState, ...]:
         tree, motion = self.tree, self.tree.motion
         coordinates = zip(motion.coordinates, motion.velocities, motion.dimensions, strict=True)
         velocities = zip(motion.velocities, motion.accelerations, motion.rate_dimensions, strict=True)
         return (
-            *(StateEquation(*coordinate) for coordinate in coordinates),
-            *(StateEquation(symbol, flattened(rate), size) for symbol, rate, size in velocities),
-            *(
-                StateEquation(state.symbol, flattened(state.rate), state.dimension, state.limit)
-                for state in tree.states
-            ),
+            *(FirstOrderState(symbol, (rate,), size) for symbol, rate, size in coordinates),
+            *(FirstOrderState(symbol, (flattened(rate),), size) for symbol, rate, size in velocities),
+            *(replace(state, terms=(flattened(state.rate),)) for state in tree.states),
         )
 
     @property

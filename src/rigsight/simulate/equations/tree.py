@@ -92,13 +92,13 @@ class EquationsOfMotion:
 
 @dataclass(frozen=True)
 class FirstOrderState:
-    """A state other than the motion: a memory, a lag, the lateral displacement."""
+    """A state and its rate: in a tree one other than the motion, a memory, a lag, the lateral displacement."""
 
     symbol: sp.Symbol
     terms: tuple[sp.Expr, ...]  # the parts of its rate, in display order
     dimension: str  # dimension text
-    limit: sp.Expr | None  # half-width of the range that it cannot leave, if any
-    owner: str | None  # name of the effect to which it belongs; None for the rig
+    limit: sp.Expr | None = None  # half-width of the range that it cannot leave, if any
+    owner: str | None = None  # name of the effect to which it belongs; None for the rig
 
     @property
     def rate(self) -> sp.Expr:
@@ -108,7 +108,9 @@ class FirstOrderState:
     @property
     def limited_rate(self) -> sp.Expr:
         """The rate; zero while the state is at an end of its range and the rate points outward."""
-        return rate_within(self.symbol, self.rate, self.limit)
+        if self.limit is None:
+            return self.rate
+        return self.rate * (1 - sp.sign(self.symbol * sp.sign(self.rate) - self.limit)) / 2
 
 
 @dataclass(frozen=True)
@@ -243,10 +245,3 @@ class EquationTree:
             now = expression.args[0] if isinstance(expression, late) else expression
             values[symbol] = now.xreplace(values)
         return values
-
-
-def rate_within(state: sp.Symbol, rate: sp.Expr, limit: sp.Expr | None) -> sp.Expr:
-    """Return the rate of a state, zero while it is at an end of its range and the rate points outward."""
-    if limit is None:
-        return rate
-    return rate * (1 - sp.sign(state * sp.sign(rate) - limit)) / 2

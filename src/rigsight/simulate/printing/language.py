@@ -1,4 +1,4 @@
-"""Statements of a programming language, independent of the language."""
+"""Printing of expressions and statements in programming languages, and of the bodies of C functions."""
 
 from __future__ import annotations
 
@@ -15,6 +15,19 @@ from sympy.printing.pycode import PythonCodePrinter
 from rigsight.simulate.equations.straight_line import StraightLine, needed_steps, straight_line
 
 _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
+
+_LONGEST_CHAIN = 3
+"""Number of terms up to which a sum is added one after the other."""
+
+# Only functions that are called are written: some compilers warn of unused ones.
+FUNCTIONS = {
+    "sign_of": "static inline double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }",
+    "positive": "static inline double positive(double value) { return value > 0.0 ? value : 0.0; }",
+    "within": (
+        "static inline double within(double value, double limit) "
+        "{ return value > limit ? limit : (value < -limit ? -limit : value); }"
+    ),
+}
 
 
 class PowersAsProducts:
@@ -161,3 +174,170 @@ class PythonPrinter(PowersAsProducts, PythonCodePrinter):  # type: ignore[misc]
 
 
 PYTHON = Language(PythonPrinter(), "{} = {}", "{} = {}")
+
+
+class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """First argument, limited to plus and minus the second: two instructions, where `clamp` would need six."""
+
+    is_real = True
+
+
+class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
+    """C99 with products for small powers; ``sign_of``, ``positive`` and ``within`` are functions in the generated file."""
+
+    def _print_Rational(self, expr: sp.Rational) -> str:  # noqa: N802
+        return repr(float(expr))
+
+    def _print_Integer(self, expr: sp.Integer) -> str:  # noqa: N802
+        # Integers beyond the range of C would overflow; a double can represent them.
+        return f"{int(expr)}.0" if abs(int(expr)) < 10**15 else repr(float(expr))
+
+    def _print_NumberSymbol(self, expr: sp.Expr) -> str:  # noqa: N802
+        return repr(float(expr))
+
+    _print_Pi = _print_Exp1 = _print_NumberSymbol  # noqa: N815
+
+    def _print_Add(self, expr: sp.Add, order: str | None = None) -> str:  # noqa: N802
+        # A compiler may not reorder a sum, so each term of a long one would wait for all earlier ones.
+        terms = self._as_ordered_terms(expr, order)
+        if len(terms) <= _LONGEST_CHAIN:
+            return str(super()._print_Add(expr, order))
+        half = len(terms) // 2
+        parts = [sp.Add(*part, evaluate=False) for part in (terms[:half], terms[half:])]
+        return " + ".join(f"({self._print_Add(part, order)})" for part in parts)
+
+    def _print_sign(self, expr: sp.sign) -> str:
+        return f"sign_of({self._print(expr.args[0])})"
+
+    def _print_absolute(self, expr: sp.Function) -> str:
+        return f"fabs({self._print(expr.args[0])})"
+
+    def _print_positive_part(self, expr: sp.Function) -> str:
+        return f"positive({self._print(expr.args[0])})"
+
+    def _print_limited(self, expr: sp.Function) -> str:
+        return f"within({', '.join(map(self._print, expr.args))})"
+
+    def _print_simulated(self, expr: sp.Function) -> str:
+        _, index, *arguments = expr.args
+        return f"simulated(0, {int(index)}, (const double[]){{{', '.join(map(self._print, arguments))}}})"
+
+    def _print_simulated_slope(self, expr: sp.Function) -> str:
+        _, index, by, *arguments = expr.args
+        listed = ", ".join(map(self._print, arguments))
+        return f"simulated_slope(0, {int(index)}, {int(by)}, (const double[]){{{listed}}})"
+
+
+class LanePrinter(CPrinter):
+    """The same for vectors: every function has a prefix ``v_`` and takes only vectors."""
+
+    def doprint(self, expr: sp.Expr, assign_to: str | None = None) -> str:
+        """Return an expression as a vector."""
+        text = str(super().doprint(expr, assign_to))
+        return f"v_all({text})" if expr.is_number else text
+
+    def _vector(self, expr: sp.Expr) -> str:
+        text = str(self._print(expr))
+        return f"v_all({text})" if expr.is_number else text
+
+    def _call(self, name: str, *arguments: sp.Expr) -> str:
+        return f"v_{name}({', '.join(map(self._vector, arguments))})"
+
+    def _print_Function(self, expr: sp.Function) -> str:  # noqa: N802
+        return self._call(type(expr).__name__, *expr.args)
+
+    def _print_Add(self, expr: sp.Add, order: str | None = None) -> str:  # noqa: N802
+        # The vectors of many sets hide this latency.
+        return str(C99CodePrinter._print_Add(self, expr, order))
+
+    # sympy's C printer has methods for these, which would print the scalar function.
+    _print_sin = _print_cos = _print_tan = _print_asin = _print_acos = _print_atan = _print_atan2 = (
+        _print_Function
+    )
+    _print_sinh = _print_cosh = _print_tanh = _print_asinh = _print_exp = _print_log = _print_Function
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: N802
+        if expr.exp == -1:
+            return f"1.0/{self.parenthesize(expr.base, 1000)}"
+        if expr.exp == sp.Rational(1, 2):
+            return self._call("sqrt", expr.base)
+        if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
+            return super()._print_Pow(expr, rational)
+        return self._call("pow", expr.base, expr.exp)
+
+    def _print_Abs(self, expr: sp.Abs) -> str:  # noqa: N802
+        return self._call("abs", *expr.args)
+
+    def _print_absolute(self, expr: sp.Function) -> str:
+        return self._call("abs", *expr.args)
+
+    def _print_sign(self, expr: sp.sign) -> str:
+        return self._call("sign_of", *expr.args)
+
+    def _print_positive_part(self, expr: sp.Function) -> str:
+        return self._call("positive", *expr.args)
+
+    def _print_limited(self, expr: sp.Function) -> str:
+        return self._call("within", *expr.args)
+
+    def _print_simulated(self, expr: sp.Function) -> str:
+        _, index, *arguments = expr.args
+        listed = ", ".join(map(self._vector, arguments))
+        return f"v_simulated({int(index)}, {len(arguments)}, (const lanes[]){{{listed}}})"
+
+    def _print_simulated_slope(self, expr: sp.Function) -> str:
+        _, index, by, *arguments = expr.args
+        listed = ", ".join(map(self._vector, arguments))
+        return f"v_simulated_slope({int(index)}, {int(by)}, {len(arguments)}, (const lanes[]){{{listed}}})"
+
+
+C = Language(CPrinter(), "const double {} = {};", "{} = {};")
+
+C_LANES = Language(LanePrinter(), "const lanes {} = {};", "{} = {};")
+
+
+def real(name: str) -> sp.Symbol:
+    """Return a symbol whose name is C code already."""
+    return sp.Symbol(name, real=True)
+
+
+def symbols(array: str, count: int) -> list[sp.Symbol]:
+    """Return the elements of a C array as symbols."""
+    return [real(element) for element in elements(array, count)]
+
+
+def elements(array: str, count: int) -> list[str]:
+    """Return the elements of a C array as text."""
+    return [f"{array}[{i}]" for i in range(count)]
+
+
+def function_body(
+    arguments: Sequence[str],
+    targets: Sequence[str],
+    expressions: Sequence[sp.Expr],
+    names: Mapping[sp.Symbol, str],
+    *further: str,
+    lanes: bool = False,
+    steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
+) -> str:
+    """Return the body of a function; arguments that its equations do not use are marked as unused for the compiler."""
+    needed = needed_steps(expressions, steps)
+    read = set().union(*(e.free_symbols for e in (*expressions, *needed.values())))
+    for symbol in sorted(read - set(needed) - set(names), key=str):
+        raise KeyError(
+            f"The symbol {symbol} has no number: names of rigs and effects must not appear in C code."
+        )
+    lines = (C_LANES if lanes else C).statements(targets, expressions, names, needed) if targets else []
+    return _marked(arguments, lines, further)
+
+
+def lane_body(targets: Sequence[str], line: StraightLine, names: Mapping[sp.Symbol, str]) -> str:
+    """Return the body of a function of vector lanes that computes expressions in parts."""
+    return _marked((), C_LANES.written(targets, line, names), ())
+
+
+def _marked(arguments: Sequence[str], lines: Sequence[str], further: Sequence[str]) -> str:
+    text = "\n".join([*lines, *further])
+    unread = [a for a in arguments if f"{a}[" not in text and f"{a}->" not in text]
+    marks = [" ".join(f"(void){argument};" for argument in unread)] if unread else []
+    return "\n".join(f"    {line}" for line in [*marks, *lines, *further])

@@ -177,11 +177,7 @@ def _motion_in_parts(structure: Structure) -> list[ShownEquation]:
         equations.append(ShownEquation(None, left, (load,), inertia=inertia))
     masses = [ShownEquation(None, mass, (motion.mass[at],)) for at, mass in elimination.mass.items()]
     loads = zip(elimination.loads, motion.terms, strict=True)
-    return [
-        *equations,
-        *masses,
-        *(ShownEquation(None, load, terms or (sp.S.Zero,)) for load, terms in loads),
-    ]
+    return [*equations, *masses, *(ShownEquation(None, load, terms or (sp.S.Zero,)) for load, terms in loads)]
 
 
 def _states(structure: Structure) -> list[ShownEquation]:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold, Kind, Role
-from rigsight.records.formats.ordinary_file import file_size
+from rigsight.records.formats.known import file_size
 from rigsight.rigs.reading.toml_places import Place, toml_tables, value_places
 
 MOST_RECORDS = 1000

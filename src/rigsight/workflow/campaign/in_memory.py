@@ -10,7 +10,7 @@ from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import ParameterSet
 from rigsight.records import Hold, Record
-from rigsight.records.plausibility import is_constant
+from rigsight.records.signals import is_constant
 from rigsight.rigs import RIGS, Rig, rig_of_tables
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model

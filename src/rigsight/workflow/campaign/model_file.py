@@ -13,7 +13,7 @@ from rigsight.discover.terms.monomials import known_terms
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold
-from rigsight.records.formats.ordinary_file import file_size
+from rigsight.records.formats.known import file_size
 from rigsight.rigs import Rig, declared_rig
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named

@@ -11,7 +11,7 @@ from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, nearest, readable, shown
 from rigsight.records import ColumnMapping, ReadingOptions, Record
 from rigsight.records.read_record import TIME, read_stretches
-from rigsight.records.reference import signals_beside
+from rigsight.records.signals import signals_beside
 from rigsight.rigs import Rig, read_rig_file, rotational
 from rigsight.units import INPUT_UNIT
 from rigsight.workflow.campaign.campaign_file import (

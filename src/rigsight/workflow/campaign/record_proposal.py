@@ -17,8 +17,8 @@ from rigsight.records.channel_summary import step_and_gaps
 from rigsight.records.channel_units import has_si, in_drive_unit, is_a
 from rigsight.records.clocks import increases, is_time
 from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
-from rigsight.records.periods import repeated_period
 from rigsight.records.read_record import TIME
+from rigsight.records.signals import repeated_period
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, distinguishing, guess_file
 

@@ -10,7 +10,7 @@ from rigsight.records.channel_units import DRIVES, has_si, is_a
 from rigsight.records.clocks import own_clocks
 from rigsight.records.formats.channel import Channel
 from rigsight.records.read_record import TIME
-from rigsight.records.reference import REFERENCE
+from rigsight.records.signals import REFERENCE
 from rigsight.rigs import Rig, rotational
 
 _FITTING_UNIT = 0.5

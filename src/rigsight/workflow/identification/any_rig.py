@@ -42,7 +42,7 @@ from rigsight.identify.record_identification import EstimationOptions
 from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
-from rigsight.records.plausibility import is_constant
+from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, evaluated, has_built_in_parameters, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization

@@ -21,7 +21,7 @@ from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.metrics import nrmse
 from rigsight.records import Record
-from rigsight.records.periods import roughness
+from rigsight.records.signals import roughness
 from rigsight.report.quantities import gap_percent
 from rigsight.report.wording import sentence_case
 from rigsight.simulate import Structure, compose

@@ -16,7 +16,7 @@ from rigsight.discover.terms.monomials import known_terms
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.effect import PARTS
 from rigsight.errors import InputError
-from rigsight.simulate.printing.text import text
+from rigsight.simulate.printing.notation import text
 from rigsight.workflow.own.effect_checks import failed_checks
 from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.python_file import run_python_file

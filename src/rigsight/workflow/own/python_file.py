@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 from rigsight.errors import InputError, RigsightError
-from rigsight.records.formats.ordinary_file import file_size
+from rigsight.records.formats.known import file_size
 
 _LARGEST_FILE = 1_000_000
 

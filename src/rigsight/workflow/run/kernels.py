@@ -12,7 +12,7 @@ from rigsight.effects import Effect
 from rigsight.errors import check_in_range
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
-from rigsight.simulate.compiled.precompile import compile_kernels, compiled
+from rigsight.simulate.compiled.kernel import compile_kernels, compiled
 from rigsight.workflow.run.progress import Listener, Stage, silent
 
 COMPILING = "Compiling kernels (first time only)"

@@ -1,0 +1,296 @@
+"""A MuJoCo model -> the tables of a rig file, with the origin of each part, so that parameters can be written back."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from rigsight.errors import InputError
+from rigsight.rigs import Rig, rig_of_tables
+from rigsight.robots.declared_numbers import DeclaredNumbers, Field, Names
+from rigsight.robots.energies import Energies, energies_of
+from rigsight.robots.parts import TreeSensor, actuators_of, left_out_of, sensors_of
+from rigsight.robots.tables import (
+    armature,
+    drive_of,
+    gear_table,
+    joint_table,
+    plain_drive,
+    split_joints,
+    way_unit,
+)
+from rigsight.robots.tree import TreeJoint, bodies_of, gravity_of, load_spec
+from rigsight.simulators import has_constraints
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+@dataclass(frozen=True)
+class Gear:
+    """The gear between the rotor of a joint and the moved body."""
+
+    joint: int  # number of the joint in the model
+    coordinate: str  # deflection of the gear
+
+
+@dataclass(frozen=True)
+class RigDraft:
+    """A rig file equivalent to a MuJoCo model.
+
+    Attributes
+    ----------
+    tables
+        The rig file.
+    joints, drives, sensors
+        Place of the rig -> number of the joint, actuator or sensor in the model; -1 for what was added.
+    gears
+        Place between a rotor and what it moves -> its joint.
+    controls
+        Input of a drive -> index of the control in the model; -1 for what was added.
+    fields
+        Parameter or constant of the rig -> the fields of the model that it represents.
+    values
+        Parameters as the model has them.
+    left_out
+        Descriptions of the parts of the model that are not in the rig file.
+    notes
+        Descriptions of what was added.
+    """
+
+    tables: Mapping[str, Any]
+    joints: Mapping[str, int]
+    gears: Mapping[str, Gear]
+    drives: Mapping[str, int]
+    controls: Mapping[str, int]
+    sensors: Mapping[str, int]
+    fields: Mapping[str, tuple[Field, ...]]
+    values: Mapping[str, float]
+    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def index_with_gears(self, joint: int) -> int:
+        """Return the number of a joint once each with a gear has its second joint behind it."""
+        return joint + sum(gear.joint < joint for gear in self.gears.values())
+
+    @property
+    def is_as_it_is(self) -> bool:
+        """True if bodies are left to MuJoCo."""
+        return "simulator" in self.tables
+
+    @property
+    def rig(self) -> Rig:
+        """The rig."""
+        return rig_of_tables(self.tables, "the rig of the model")
+
+
+def draft_rig(
+    model: mujoco.MjModel,
+    name: str,
+    *,
+    with_drives: bool = False,
+    gears: Mapping[str, float] | None = None,
+    as_it_is: str | None = None,
+) -> RigDraft:
+    """Return the rig file of a MuJoCo model.
+
+    Damping, dry friction, stiffness and armature of joints are parameters, masses, lengths and gains constants. Bodies that are
+    simulated in MuJoCo have no masses and lengths in the rig file, and all their constraints are kept.
+    """
+    names, notes = Names(), []
+    numbers = DeclaredNumbers(names)
+    rig_name = names.free(name, "rig")
+    gears = gears or {}
+    if gears and as_it_is is not None:
+        raise InputError(
+            "a gear splits a joint in two, which is impossible if the model is simulated as it is; omit one of the two options"
+        )
+    bodies, plays = split_joints(model, bodies_of(model), gears)
+    actuators, drives_left_out = actuators_of(model)
+    sensors, sensors_left_out = sensors_of(model, actuators)
+    joints = sorted((joint for body in bodies for joint in body.joints), key=lambda joint: joint.index)
+    coordinates = [names.free(joint.name or f"joint_{joint.index + 1}", "joint") for joint in joints]
+    drives = [drive_of(one, joints[one.joint], coordinates[one.joint], names, numbers) for one in actuators]
+    if not drives and with_drives:
+        notes.append("The model has no actuators: a force or torque drives every joint.")
+        drives = [
+            plain_drive(joint, q, names)
+            for joint, q in zip(joints, coordinates, strict=True)
+            if joint.index < model.njnt
+        ]
+    if not sensors:
+        notes.append("The model has no joint sensor: the rig reads the position of every joint.")
+        sensors = [
+            TreeSensor(-1, joint.index, "", 1.0, False) for joint in joints if joint.index < model.njnt
+        ]
+    own = [(joint, q) for joint, q in zip(joints, coordinates, strict=True) if joint.index < model.njnt]
+    joint_tables = {q: joint_table(model, joint, q, numbers) for joint, q in own}
+    for joint, q in own:
+        if joint.index in plays:
+            play = coordinates[plays[joint.index].index]
+            joint_tables[f"{q}_gear"] = gear_table(model, joint, q, play, gears[joint.name], numbers)
+    rotors = [armature(model, joint, q, numbers) for joint, q in own]
+    if as_it_is is not None and has_constraints(model):
+        # What binds bodies goes with all that they move, rotors too, so they stay in MuJoCo.
+        rotors = []
+    if as_it_is is None:
+        called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
+        symbols = [sp.Symbol(q, real=True) for q in coordinates]
+        energies = energies_of(bodies, called, symbols, gravity_of(model), numbers)
+    else:
+        energies = Energies()
+    shown = _sensor_tables(sensors, joints, coordinates, names, numbers)
+    tables: dict[str, Any] = {
+        "name": rig_name,
+        "summary": "From a MuJoCo model.",
+        "inputs": {drive.reported: drive.control for drive in drives},
+        "constants": {},
+        "parameters": numbers.parameters,
+        "coordinates": {q: {"unit": way_unit(joint)} for joint, q in zip(joints, coordinates, strict=True)},
+        "energy": {"kinetic": _sum(*energies.kinetic, *rotors), "potential": _sum(*energies.potential)},
+        "simulator": {} if as_it_is is None else simulator_table(model, as_it_is, own, numbers.fields),
+        "signals": {signal: _sum(value) for signal, value in energies.signals.items()},
+        "states": {name: state for drive in drives for name, state in drive.states.items()},
+        "joints": joint_tables,
+        "drives": {drive.name: drive.table for drive in drives},
+        "sensors": {name: table for name, _, table in shown},
+    }
+    return RigDraft(
+        with_known_constants(tables, numbers.constants),
+        {q: joint.index for joint, q in own},
+        {
+            f"{q}_gear": Gear(joint.index, coordinates[plays[joint.index].index])
+            for joint, q in own
+            if joint.index in plays
+        },
+        {drive.name: drive.index for drive in drives},
+        {drive.reported: drive.control_index for drive in drives},
+        {name: sensor.index for name, sensor, _ in shown},
+        numbers.fields,
+        numbers.values,
+        (*left_out_of(model, as_it_is=as_it_is is not None), *drives_left_out, *sensors_left_out),
+        tuple(notes),
+    )
+
+
+def with_known_constants(tables: Mapping[str, Any], constants: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of a rig with those constants that they read, and without tables that are empty."""
+    read = set(_words(value for key, value in tables.items() if key != "constants"))
+    known = {name: table for name, table in constants.items() if name in read}
+    return {key: value for key, value in {**tables, "constants": known}.items() if value != {}}
+
+
+def _words(values: Iterable[Any]) -> Iterable[str]:
+    for value in values:
+        if isinstance(value, Mapping):
+            yield from _words(value.values())
+        elif isinstance(value, str):
+            yield from re.findall(r"\w+", value)
+
+
+def _sensor_tables(
+    sensors: Sequence[TreeSensor],
+    joints: Sequence[TreeJoint],
+    coordinates: Sequence[str],
+    names: Names,
+    numbers: DeclaredNumbers,
+) -> list[tuple[str, TreeSensor, dict[str, Any]]]:
+    found = []
+    for sensor in sensors:
+        q, unit = coordinates[sensor.joint], way_unit(joints[sensor.joint])
+        what = ("position", "velocity") if joints[sensor.joint].slides else ("angle", "speed")
+        name = names.free(sensor.name or f"{q}_{what[sensor.is_rate]}", "sensor")
+        factor = numbers.factor(f"{name}_factor", sensor.factor, f"reading of {name} per motion of the joint")
+        reads, own = (f"d({q})", f"{unit}/s") if sensor.is_rate else (q, unit)
+        found.append((name, sensor, {"reads": f"{factor}{reads}", "unit": own}))
+    return found
+
+
+def _sum(*terms: sp.Expr) -> str:
+    """Return a sum as an expression of a rig file."""
+    return str(sp.Add(*terms)).replace("**", "^")
+
+
+def rig_text(draft: RigDraft, source: str, folder: Path) -> str:
+    """Return the text of a rig file."""
+    try:
+        import tomli_w
+    except ImportError:
+        raise InputError(
+            "Writing a rig file needs tomli-w, which is not installed: pip install 'rigsight[mujoco]'."
+        ) from None
+    lines = [f"Written by rigsight init from {source}.", *draft.notes]
+    if draft.left_out:
+        lines += ["Not taken over:", *(f"- {what}" for what in draft.left_out)]
+    head = "\n".join(f"# {line}" for line in "\n".join(lines).split("\n"))
+    tables = dict(draft.tables)
+    if draft.is_as_it_is:
+        beside = Path(os.path.relpath(tables["simulator"]["file"], folder.resolve())).as_posix()
+        tables["simulator"] = {**tables["simulator"], "file": beside}
+    return f"{_printable(head)}\n\n{tomli_w.dumps(tables)}"
+
+
+def _printable(text: str) -> str:
+    """Return text without the signs that TOML forbids in comments."""
+    return "".join(sign if sign in "\n\t" or sign.isprintable() else " " for sign in text)
+
+
+def simulator_table(
+    model: mujoco.MjModel,
+    file: str,
+    joints: Sequence[tuple[TreeJoint, str]],
+    fields: Mapping[str, tuple[Field, ...]],
+) -> dict[str, Any]:
+    """Return the table."""
+    for joint, _ in joints:
+        if not joint.name:
+            raise InputError(
+                f"joint number {joint.index} has no name, which is needed to access it in MuJoCo; give it one"
+            )
+    names = {joint.index: joint.name for joint, _ in joints}
+    parameters = {
+        name: f"dof_armature {names[own[0].index]}"
+        for name, own in fields.items()
+        if own[0].attribute == "armature" and has_constraints(model)
+    }
+    rotors = any(own[0].attribute == "armature" for own in fields.values())
+    coordinates = {q: joint.name for joint, q in joints if joint.name != q}
+    return {
+        "kind": "mujoco",
+        "file": file,
+        **({"without_armature": True} if rotors and not parameters else {}),
+        **({"coordinates": coordinates} if coordinates else {}),
+        **({"parameters": parameters} if parameters else {}),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class RobotFile:
+    """A robot's model with its rig."""
+
+    spec: mujoco.MjSpec  # what the file says; may be changed
+    model: mujoco.MjModel  # compiled
+    draft: RigDraft  # its rig file
+
+
+def read_robot(path: Path, gears: Mapping[str, float] | None = None, *, as_it_is: bool = False) -> RobotFile:
+    """Read an MJCF or URDF file; a URDF, which has no actuators, gets a force or torque at every joint."""
+    spec = load_spec(path)
+    model = spec.compile()
+    try:
+        draft = draft_rig(
+            model,
+            path.stem,
+            with_drives=path.suffix.lower() == ".urdf",
+            gears=gears,
+            as_it_is=path.resolve().as_posix() if as_it_is else None,
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return RobotFile(spec, model, draft)

@@ -1,1 +1,0 @@
-"""Content of a compiled MuJoCo model, and the parts that a rig file cannot represent."""

@@ -1,1 +1,0 @@
-"""Fields of MuJoCo and Isaac Lab for the parameters and effects of a model."""

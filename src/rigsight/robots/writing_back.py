@@ -1,0 +1,321 @@
+"""Parameters and effects of a model -> the original MuJoCo model, as far as MuJoCo has fields for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigsight.effects import Effect, kind_of
+from rigsight.errors import InputError
+from rigsight.robots.declared_numbers import Field
+from rigsight.robots.draft import Gear, RigDraft, RobotFile, read_robot
+from rigsight.simulate.model import Model
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+_IMPEDANCE = 0.01
+"""Of the limit of a joint: with MuJoCo's own, 0.9 to 0.95, what moves would seem ten to twenty times as heavy at the limit."""
+
+
+_SLACK = 2
+"""Samples of a control's history beyond its delay: one for the step in hand, one for rounding."""
+
+Write = Callable[[Any, Mapping[str, float], Any], str | None]
+"""Writes an effect's own values into an element, given the model's options, and says why not where it cannot."""
+_LINEAR = 1
+"""How a history is read between two steps: a delay need be no whole number of them."""
+
+
+@dataclass(frozen=True)
+class EffectField:
+    """Where an effect is written."""
+
+    element: str  # ``"joint"``, ``"actuator"`` or ``"sensor"``
+    attribute: str  # for people
+    write: Write  # does it
+
+
+def _added(attribute: str, own: str, entry: int | None = None) -> Write:
+    def write(element: Any, values: Mapping[str, float], _: Any) -> None:
+        if entry is None:
+            setattr(element, attribute, float(getattr(element, attribute)) + values[own])
+        else:
+            getattr(element, attribute)[entry] += values[own]
+
+    return write
+
+
+def _late(own: str) -> Write:
+    def write(element: Any, values: Mapping[str, float], options: Any) -> str | None:
+        import mujoco
+
+        late = values[own]
+        if (
+            own == "T_d"
+            and options.integrator == int(mujoco.mjtIntegrator.mjINT_RK4)
+            and element.delay <= 0.0
+        ):
+            # The Runge-Kutta method reads on within a step, where a controller holds its command: half a step early on average.
+            late += 0.5 * options.timestep
+        element.delay = max(float(element.delay), 0.0) + late
+        element.nsample = max(element.nsample, int(element.delay / options.timestep) + _SLACK)
+        element.interp = _LINEAR
+        return None
+
+    return write
+
+
+def _limited(element: Any, values: Mapping[str, float], _: Any) -> str | None:
+    size = values["u_max"]
+    low, high = (-size, size)
+    if element.ctrlrange[0] < element.ctrlrange[1]:
+        low, high = max(low, float(element.ctrlrange[0])), min(high, float(element.ctrlrange[1]))
+    element.ctrlrange[:] = (low, high)
+    element.ctrllimited = True
+    return None
+
+
+def _filtered(element: Any, values: Mapping[str, float], _: Any) -> str | None:
+    import mujoco
+
+    if element.dyntype != mujoco.mjtDyn.mjDYN_NONE:
+        return "the actuator has a filter already"
+    element.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
+    element.dynprm[0] = values["T_a"]
+    return None
+
+
+EFFECT_FIELDS: Mapping[str, EffectField] = {
+    "coulomb_friction": EffectField("joint", "frictionloss", _added("frictionloss", "T_c")),
+    "quadratic_damping": EffectField("joint", "damping, second number", _added("damping", "c_2", 1)),
+    "asymmetric_stiffness": EffectField("joint", "stiffness, second number", _added("stiffness", "k_2", 1)),
+    "cubic_stiffness": EffectField("joint", "stiffness, third number", _added("stiffness", "k_3", 2)),
+    "input_delay": EffectField("actuator", "delay", _late("T_d")),
+    "input_saturation": EffectField("actuator", "ctrlrange", _limited),
+    "actuator_lag": EffectField("actuator", "dyntype filterexact", _filtered),
+    "sensor_delay": EffectField("sensor", "delay", _late("T_s")),
+}
+"""By the name of the effect, as of MuJoCo 4.0."""
+
+
+_SAME = 1e-12
+"""Relative difference below which a number is the one that the file has."""
+
+
+@dataclass(frozen=True)
+class WrittenBack:
+    """A MuJoCo model with the parameter values and effects of another model."""
+
+    text: str  # MJCF
+    written: tuple[str, ...]  # descriptions of the changed fields
+    without_field: tuple[str, ...]  # descriptions of what MuJoCo has no field for
+
+
+def write_back(model: Model, source: Path) -> WrittenBack:
+    """Return the MuJoCo model of a file with the numbers and effects of a rig that was made from it."""
+    robot = read_for(model, source)
+    structure = model.structure
+    own = frozenset(structure.parameter_name(e, p.name) for e in structure.effects for p in e.parameters)
+    writer = _Writer(robot, own)
+    for place, gear in robot.draft.gears.items():
+        writer.write_gear(place, gear, model)
+    for name, value in model.values.items():
+        writer.write_number(name, value)
+    for effect in model.effects:
+        writer.write_effect(effect, model)
+    return writer.finished(source)
+
+
+def read_for(model: Model, source: Path) -> RobotFile:
+    """Return the robot of a file with the gears that a rig which was made from it has."""
+    robot = read_robot(source)
+    places = {joint.name for joint in model.structure.rig.mechanism.joints}
+    gears = {
+        robot.model.joint(index).name: model.values[f"{place}_gear_stiffness"]
+        for place, index in robot.draft.joints.items()
+        if f"{place}_gear" in places and f"{place}_gear_stiffness" in model.values
+    }
+    if gears:
+        robot = read_robot(source, gears)
+    _check_is_of(model, robot.draft, source)
+    return robot
+
+
+def _check_is_of(model: Model, draft: RigDraft, source: Path) -> None:
+    mechanism = model.structure.rig.mechanism
+    for what, parts, known in (
+        ("joint", mechanism.joints, {**draft.joints, **draft.gears}),
+        ("drive", mechanism.drives, draft.drives),
+        ("sensor", mechanism.sensors, draft.sensors),
+    ):
+        missing = [part.name for part in parts if part.name not in known]
+        if missing:
+            raise InputError(
+                f"The model's rig has a {what} '{missing[0]}', but {source} has none of that name "
+                f"({', '.join(known) or 'none at all'}). Give the file from which rigsight init --mjcf made the rig."
+            )
+
+
+class _Writer:
+    def __init__(self, robot: RobotFile, of_effects: frozenset[str]) -> None:
+        spec, self._compiled, self._draft = robot.spec, robot.model, robot.draft
+        self._spec = spec
+        self._elements: Mapping[str, Mapping[int, Any]] = {
+            "joint": {joint.id: joint for joint in spec.joints},
+            "actuator": {actuator.id: actuator for actuator in spec.actuators},
+            "sensor": {sensor.id: sensor for sensor in spec.sensors},
+            "body": {body.id: body for body in spec.bodies},
+        }
+        tables = {**robot.draft.tables.get("constants", {}), **robot.draft.tables["parameters"]}
+        self._defaults = {name: float(table["default"]) for name, table in tables.items()}
+        self._of_effects = of_effects
+        self._written: list[str] = []
+        self._without_field: list[str] = []
+
+    def write_number(self, name: str, value: float) -> None:
+        """Write a parameter or constant that differs from the file's, or say that it has no field: a length, an inertia."""
+        fields, before = self._draft.fields.get(name, ()), self._defaults.get(name)
+        if name in self._of_effects or (fields and fields[0].element == "gear"):
+            return
+        if before is not None and math.isclose(before, value, rel_tol=_SAME, abs_tol=0.0):
+            return
+        if not fields:
+            was = "" if before is None else f", {before:g} in the file"
+            self._without_field.append(f"{name} = {value:g}{was}")
+            return
+        for field in fields:
+            self._set(field, value)
+        first = fields[0]
+        self._written.append(
+            f"{self._called(first.element, first.index)} {first.attribute}: {before:g} -> {value:g}"
+        )
+
+    def _set(self, field: Field, value: float) -> None:
+        element = self._elements[field.element][field.index]
+        number = field.sign * value
+        if field.element == "body":
+            self._set_mass(element, field.index, number)
+        elif field.attribute == "springref" and self._in_degrees(field.index):
+            element.springref = math.degrees(number)
+        elif isinstance(getattr(element, field.attribute), float):
+            setattr(element, field.attribute, number)
+        else:
+            getattr(element, field.attribute)[field.entry] = number
+
+    def _in_degrees(self, joint: int) -> bool:
+        import mujoco
+
+        hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
+        return bool(self._spec.compiler.degree) and int(self._compiled.jnt_type[joint]) == hinge
+
+    def _set_mass(self, body: Any, index: int, mass: float) -> None:
+        """Give a body a mass, with center and inertia as they were: its shapes no longer say them."""
+        body.explicitinertial = True
+        body.mass = mass
+        body.ipos[:], body.iquat[:] = self._compiled.body_ipos[index], self._compiled.body_iquat[index]
+        body.inertia[:] = self._compiled.body_inertia[index]
+        body.fullinertia[:] = [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+    def write_gear(self, place: str, gear: Gear, model: Model) -> None:
+        first = self._elements["joint"][gear.joint]
+        stiffness, damping = (model.values[f"{place}_{what}"] for what in ("stiffness", "damping"))
+        structure = model.structure
+        loose = [
+            effect
+            for effect in model.effects
+            if kind_of(effect.name) == "free_play" and structure.rig.acts_at(effect) == place
+        ]
+        play = structure.values_of(loose[0], model.values)["g"] if loose else 0.0
+        name = add_second_joint(self._spec, first, stiffness, damping, play)
+        reported = f", range +-{play:.4g} (free_play at {place})" if play > 0.0 else ""
+        self._written.append(
+            f"joint '{name}' behind '{first.name}': stiffness {stiffness:.4g}, damping {damping:.4g}{reported}"
+        )
+
+    def write_effect(self, effect: Effect, model: Model) -> None:
+        structure = model.structure
+        if kind_of(effect.name) == "free_play" and structure.rig.acts_at(effect) in self._draft.gears:
+            return
+        place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
+        values = structure.values_of(effect, model.values)
+        numbers = ", ".join(f"{own} = {value:.4g}" for own, value in values.items())
+        reported = f"{kind} at {place} ({numbers})"
+        field = EFFECT_FIELDS.get(kind)
+        places = {"joint": self._draft.joints, "actuator": self._draft.drives, "sensor": self._draft.sensors}
+        index = -1 if field is None else places[field.element].get(place, -1)
+        if field is None or index < 0:
+            self._without_field.append(reported)
+            return
+        refused = field.write(self._elements[field.element][index], values, self._compiled.opt)
+        if refused is None:
+            self._written.append(f"{self._called(field.element, index)} {field.attribute}: {reported}")
+        else:
+            self._without_field.append(f"{reported}: {refused}")
+
+    def _called(self, element: str, index: int) -> str:
+        return f"{element} '{self._elements[element][index].name or index}'"
+
+    def finished(self, source: Path) -> WrittenBack:
+        try:
+            self._spec.compile()
+            text = self._spec.to_xml()
+        except ValueError as error:
+            raise InputError(f"{source}: MuJoCo rejects it with the new values: {error}") from None
+        lines = [f"Written by rigsight export from {source.name}."]
+        lines += [f"{line}" for line in self._written]
+        lines += [f"MuJoCo has no field for {line}" for line in self._without_field]
+        # An XML comment must not contain two hyphens in a row.
+        comment = "\n".join(lines).replace("--", "- -")
+        return WrittenBack(f"<!-- {comment} -->\n{text}", tuple(self._written), tuple(self._without_field))
+
+
+def with_gears(spec: mujoco.MjSpec, draft: RigDraft) -> mujoco.MjModel:
+    """Return the compiled model with the second joint of each gear, as a spring."""
+    joints = {joint.id: joint for joint in spec.joints}
+    for place, gear in draft.gears.items():
+        add_second_joint(
+            spec,
+            joints[gear.joint],
+            draft.values[f"{place}_stiffness"],
+            draft.values[f"{place}_damping"],
+            0.0,
+        )
+    return spec.compile()
+
+
+def add_second_joint(spec: mujoco.MjSpec, first: Any, stiffness: float, damping: float, play: float) -> str:
+    """Add what lies between a rotor and its body to a MuJoCo model, and return the name of the joint.
+
+    Without play it is a spring. With play the spring acts beyond a range, as the limit of the joint, whose stiffness MuJoCo
+    counts by the inertia that it moves.
+    """
+    import mujoco
+
+    name = f"{first.name}_play"
+    second = first.parent.add_joint(name=name, type=first.type, axis=list(first.axis), pos=list(first.pos))
+    if play <= 0.0:
+        second.stiffness[0], second.damping[0] = stiffness, damping
+        return name
+    in_degrees = bool(spec.compiler.degree) and first.type == mujoco.mjtJoint.mjJNT_HINGE
+    half = math.degrees(play) if in_degrees else play
+    second.range[:] = (-half, half)
+    second.limited = 1
+    compiled = spec.compile()
+    data = mujoco.MjData(compiled)
+    mujoco.mj_forward(compiled, data)
+    mass = np.zeros((compiled.nv, compiled.nv))
+    mujoco.mj_fullM(compiled, data, mass)
+    dof = int(compiled.jnt_dofadr[compiled.joint(name).id])
+    moved = 1.0 / float(np.linalg.inv(mass)[dof, dof])
+    # An acceleration is (1 - d) times what it is without the limit, less what the limit pulls: a spring for a small impedance d.
+    free = 1.0 - _IMPEDANCE
+    second.solimp_limit[:2] = (_IMPEDANCE, _IMPEDANCE)
+    second.solref_limit[:] = (-stiffness * free / moved, -damping * free / moved)
+    return name
