@@ -12,7 +12,7 @@ from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.reached_bounds import ReachedBound
 from rigsight.identify.transfer.conicity import ConicityEstimate
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Record
 
@@ -38,13 +38,12 @@ class RecordIdentification:
     record: Record
     amplitude: float  # amplitude of its input, as given or measured; for a free motion that of its output
     paths: tuple[PathIdentification, ...]  # the path to the motion first, then the paths from the motion
-    offsets: PhysicalEstimates | None = None  # rest positions by (2.26) and (2.27); None if there are none
+    offsets: PhysicalEstimates | None = None  # rest positions, of `own`; None if there are none
     conicity: ConicityEstimate | None = None  # delta_0 with its statement; None if c_y is not known
     # Angular frequency at which the measured magnitude is largest [rad/s]; None if it has no peak.
     resonance: float | None = None
     warnings: tuple[str, ...] = ()  # warnings for the user, a sentence each
-    # Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it
-    # failed.
+    # Parameters of a fit of this record alone, in the time domain; None if it failed.
     own: PhysicalEstimates | None = None
     moved: str = ""  # the output to which the amplitude of a free motion refers
 
@@ -67,7 +66,7 @@ class RecordIdentification:
     def estimates(self) -> dict[str, tuple[float, float]]:
         """Value and standard error of every physical parameter found, by name."""
         found: dict[str, tuple[float, float]] = {}
-        for part in (*(path.physical for path in self.paths), self.offsets, self.own):
+        for part in (self.own, *(path.physical for path in self.paths)):
             if part is not None:
                 errors = part.standard_errors
                 found.update({name: (part.values[name], errors[name]) for name in part.names})
@@ -93,13 +92,12 @@ class JointIdentification:
 
     fit: JointFit  # the joint fit, with a fit of each record alone
     names: tuple[str, ...]  # the fitted parameters
-    # Lateral parameters that the fit held at the mean of the single records' estimates: if no set fits all
+    # Parameters of what follows the motion that the fit held at the mean of the single records' estimates: if no set fits all
     # records, a wrong yaw angle would bias them. None if they were fitted with the others, or not at all.
     pooled: PhysicalEstimates | None
     statement: str  # whether one set fits all records, and which records differ, in words
     conicity: ConicityEstimate | None  # delta_0 with its statement; None if c_y is not known
     scores: tuple[RecordScore, ...]  # score of every record
-    left_out: tuple[str, ...]  # estimation records that the fit did not use
 
 
 @dataclass(frozen=True)
@@ -156,12 +154,11 @@ class Identification:
     reached
         Parameters of the joint fit that stand at a bound which the records ask them to pass.
     views
-        The linearized rig, for each set of constants of the records; empty for the built-in rigs with one motion, whose transfer
-        functions are fitted record by record.
+        The linearized rig, for each set of constants of the records; empty if the fit failed.
     identifiability
-        Parameters that the records determine together; None for these built-in rigs.
+        Parameters that the records determine together; None if the fit failed.
     meanings
-        Meaning of each parameter, by name; empty for these built-in rigs.
+        Meaning of each parameter, by name.
     hysteresis
         The rig with hysteresis effects; None if not requested. If there is one, it is the `model`.
     given

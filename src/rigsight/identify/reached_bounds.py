@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from rigsight.identify.fit.covariance import LEVEL
 from rigsight.identify.information import Information
-from rigsight.identify.transfer.running_gear_parameters import LEVEL
 
 _STOPPED = 0.1
 """Distance to the bound over the step that is asked for: a search that could still move would not stop before most of it."""

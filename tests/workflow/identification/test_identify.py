@@ -106,7 +106,8 @@ def test_the_results_are_complete(
 ) -> None:
     out = linear_folder.parent / "out"
     figures = {"bode_low.svg", "bode_high.svg", "responses.svg", "amplitudes.svg"}
-    assert {path.name for path in out.iterdir()} == {"identification.json", "model.json", *figures}
+    files = {"identification.json", "identification.html", "model.json", *figures}
+    assert {path.name for path in out.iterdir()} == files
     assert written["schema_version"] == 1
     assert set(written["figures"]) == figures
     for file in figures:

@@ -14,8 +14,8 @@ from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from rigsight.errors import InputError
+from rigsight.identify import PhysicalEstimates
 from rigsight.identify.fit.covariance import colored_covariance
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Hold, Record
 
