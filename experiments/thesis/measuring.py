@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from driven_offsets import driven_offsets
-from thesis_formulas import lateral_parameters, offsets, yaw_parameters
+from thesis_formulas import ROLLING, lateral_parameters, offsets, yaw_parameters
 from transfer_step import fit_step
 from virtual_rig import CONSTANTS, STEP_START
 
@@ -22,7 +22,7 @@ from rigsight.identify import estimate_conicity, fit_frequency_response
 from rigsight.identify.transfer.record_response import record_response
 from rigsight.metrics import rms
 from rigsight.records import Record
-from rigsight.rigs import ROLLING, evaluated
+from rigsight.rigs import evaluated
 
 PAIRS = (("u", "psi"), ("psi", "y"))
 CUTS = {"psi": 80.0, "y": 30.0}

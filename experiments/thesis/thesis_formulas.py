@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.effects.symbols import derivative
@@ -17,11 +18,15 @@ from rigsight.errors import InputError
 from rigsight.identify import PhysicalEstimates, TransferFit
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.records import Record
-from rigsight.rigs import ROLLING, RUNNING_GEAR, Rig, evaluated, relative_slopes
+from rigsight.rigs import RUNNING_GEAR, Rig, evaluated
 
 _POSITIVE = frozenset({"J_z", "k_c", "k_d", "l_0", "c_y"})
 _RESTS = 1e-3
 _LEAST_SAMPLES = 20
+
+assert RUNNING_GEAR.follower is not None
+ROLLING = RUNNING_GEAR.follower
+"""The lateral displacement, which follows the yaw angle."""
 
 
 def yaw_parameters(
@@ -75,6 +80,20 @@ def motion_parameters(
         [(constant_errors or {}).get(name, 0.0) for name in slopes],
         method,
     )
+
+
+def relative_slopes(expression: sp.Expr, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the relative change of an expression for one of each of its names: its powers, where it is a product.
+
+    Parameters
+    ----------
+    expression, values
+        As for `evaluated`.
+    """
+    return {
+        symbol.name: evaluated(derivative(expression, symbol) * symbol / expression, values)
+        for symbol in sorted(expression.free_symbols, key=str)
+    }
 
 
 def lateral_parameters(

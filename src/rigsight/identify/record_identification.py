@@ -162,30 +162,31 @@ class _Reading:
     def motion(self) -> tuple[PathIdentification, RecordResponse | None]:
         """Return the path from the input to the motion, and how its response was read."""
         signals = [signal.name for signal in (*self.rig.inputs, *self.rig.outputs)]
-        return self._read(self.rig.outputs[0].name, self.has_forms, instrument_of(self.record, signals))
+        first = self.rig.mechanism.sensors[0]
+        return self._read(first, self.has_forms, instrument_of(self.record, signals))
 
     def to(self, sensor: Sensor, motion: PathIdentification) -> PathIdentification:
         """Return the path to a further sensor: from the motion if it reads what follows that, else from the input."""
         follower = self.rig.follower
         if follower is None or sensor.reads != follower.symbol:
-            return self._read(sensor.name, has_form=False, instrument=None)[0]
+            return self._read(sensor, has_form=False, instrument=None)[0]
         if sensor.name not in self.record:
             unknown = " and ".join(sorted(parameters_of_form(self.rig, "pt1")))
             problem = f"the record has no {sensor.name}, so {unknown} cannot be identified from it."
             return PathIdentification(motion.response, sensor.name, problem=problem)
-        return self._read(sensor.name, self.has_forms, None, motion)[0]
+        return self._read(sensor, self.has_forms, None, motion)[0]
 
     def _read(
         self,
-        response: str,
+        sensor: Sensor,
         has_form: bool,
         instrument: str | None,
         motion: PathIdentification | None = None,
     ) -> tuple[PathIdentification, RecordResponse | None]:
         """Return the path from the input, or from the motion if that is given, and how its response was read."""
         record, drive = self.record, self.rig.inputs[0].name
-        path = PathIdentification(drive if motion is None else motion.response, response)
-        if record.kind == "step" or response not in record:
+        path = PathIdentification(drive if motion is None else motion.response, sensor.name)
+        if record.kind == "step" or sensor.name not in record:
             return path, None
         # A measured motion has no content above the Nyquist frequency, whatever the hold of the input.
         hold: Hold = record.hold if self.rig.is_driven and motion is None else "band_limited"
@@ -198,8 +199,8 @@ class _Reading:
         seen = None
         try:
             seen = record_response(
-                record, path.source, response, order, method, resolution, hold, band,
-                instrument=instrument, drive=drive, moves_freely=has_form,
+                record, path.source, sensor.name, order, method, resolution, hold, band,
+                instrument=instrument, drive=drive, moves_freely=has_form, upper_cut=sensor.upper_cut,
             )  # fmt: skip
             path = replace(path, measured=seen.response, coherence=seen.coherence)
             if has_form:

@@ -43,7 +43,6 @@ _PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thes
 _CLEAR = 100.0
 """Power over variance (20 dB) above which a local model of a noisy response can be trusted."""
 _MOSTLY, _LEAST_SHARE = 0.8, 0.05
-_THESIS_CUTS = {"pt2": 80.0, "pt1": 30.0}
 _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 
 
@@ -87,8 +86,9 @@ def record_response(
     instrument: str | None = None,
     drive: str | None = None,
     moves_freely: bool = False,
+    upper_cut: float = math.inf,
 ) -> RecordResponse:
-    """Return the frequency response of one record."""
+    """Return the frequency response of one record; only the method of the thesis reads its cut."""
     check_option("The method", method, METHODS)
     drive, unused = drive or source, ""
     if instrument is not None and method not in _BAND_LINES:
@@ -97,7 +97,8 @@ def record_response(
     plain, fit = None, None
     if method == "thesis":
         periodic, note = _mean_period(record, drive)
-        found, width, shared = _noted(_thesis(periodic, source, response, order), note), _line(periodic), 1.0
+        whole = _thesis(periodic, source, response, order, upper_cut)
+        found, width, shared = _noted(whole, note), _line(periodic), 1.0
     elif method == "h1":
         width = resolution or _SEGMENTS * _line(record)
         found, shared = averaged_response(record, source, response, width, hold=hold), _HANN_LINES
@@ -212,14 +213,13 @@ def _coherence(record: Record, source: str, response: str, hold: Hold) -> Freque
         return None
 
 
-def _thesis(record: Record, source: str, response: str, order: Order) -> FrequencyResponse:
+def _thesis(record: Record, source: str, response: str, order: Order, upper_cut: float) -> FrequencyResponse:
     omega = line_frequencies(record.n_samples, record.dt)
     power = np.abs(np.fft.rfft(record[source] - np.mean(record[source]))[1 : omega.size + 1]) ** 2
     width = min(15, power.size)
     smooth = np.convolve(power, np.full(width, 1.0 / width), mode="same")
     heard = omega[excited(omega, smooth, None, f"Record '{record.name}': the source '{source}'")]
-    # The cuts are those of the thesis's rig, whose resonance is near 12 rad/s.
-    upper = min(_THESIS_CUTS[order], float(heard[-1]))
+    upper = min(upper_cut, float(heard[-1]))
     return thesis_response(record, source, response, _THESIS_DROPS[order], upper, float(heard[0]))
 
 

@@ -90,18 +90,20 @@ def _pooled(found: Sequence[RecordIdentification], known: Mapping[str, float]) -
 def held_parameters(campaign: Campaign, records: Sequence[Record]) -> dict[str, float]:
     """Return values for parameters that these records do not determine: no spring, outputs that were not measured."""
     rig = campaign.rig
-    known: dict[str, float] = {}
-    names = {parameter.name for parameter in rig.parameters}
+    if not rig.has_one_motion:
+        return {}
+    own, known = {p.name: p for p in rig.parameters}, dict[str, float]()
+    resting = {str(symbol) for symbol in rig.motion.rest.free_symbols} & own.keys()
     if campaign.absent_spring is not None:
-        known |= {campaign.absent_spring: 0.0} | {str(s): 0.0 for s in rig.motion.rest.free_symbols}
-    elif rig.is_driven and "force_off" in names:
+        known |= {campaign.absent_spring: 0.0} | dict.fromkeys(resting, 0.0)
+    elif rig.is_driven and resting:
         # With a linear spring, a constant force and a shifted rest position cannot be distinguished.
-        known["force_off"] = 0.0
-    if rig.downstream and not any(symbol.name in r for symbol in rig.downstream for r in records):
-        placeholders = {"l_0": 1.0, "c_y": 1.0, "y_off": 0.0}
-        known |= {
-            name: campaign.parameters.get(name, placeholders[name]) for name in rig.downstream_parameters
-        }
+        known |= {str(symbol): 0.0 for symbol in rig.motion.bias.free_symbols if str(symbol) in own}
+    following = [s.name for s in rig.mechanism.sensors if s.reads.free_symbols & rig.downstream.keys()]
+    if not any(name in record for name in following for record in records):
+        for name in rig.downstream_parameters:
+            default = own[name].default
+            known[name] = campaign.given.get(name, 1.0 if default is None else default)
     return known
 
 

@@ -43,7 +43,7 @@ from rigsight.identify.record_identification import EstimationOptions, identify_
 from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
-from rigsight.rigs import Rig, is_built_in_motion
+from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
@@ -156,10 +156,7 @@ def identify_rig(
 
 def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | None) -> dict[str, float]:
     """Return parameters that these records do not determine; of parameters determined up to a common factor, one."""
-    rig = campaign.rig
-    held = {}
-    if is_built_in_motion(rig):
-        held = held_parameters(campaign, records)
+    held = held_parameters(campaign, records)
     return held if factor is None else {**held, factor.held: factor.value}
 
 

@@ -44,11 +44,11 @@ def identification_warnings(
     reported += [f"Record '{r.record.name}': {text}" for r in found for text in r.warnings]
     for view in views:
         reported += _of_view(view, campaign)
-    unseen = [symbol.name for symbol in rig.downstream if not _is_recorded(campaign, symbol.name)]
-    if rig.has_one_motion and unseen:
-        names = ", ".join(p.name for p in rig.parameters if p.name in rig.downstream_parameters)
+    names = [p.name for p in rig.parameters if rig.has_one_motion and p.name in rig.downstream_parameters]
+    if joint.pooled is None and names and not set(names) & set(joint.names):
+        missing = ", ".join(symbol.name for symbol in rig.downstream)
         reported.append(
-            f"No estimation record has {', '.join(unseen)}: {names} in the model are given or placeholders, not identified."
+            f"No estimation record has {missing}: {', '.join(names)} in the model are given or placeholders, not identified."
         )
     if not joint.fit.fit.success:
         reported.append(joint.statement)
@@ -129,10 +129,6 @@ def _of_view(view: LinearView, campaign: Campaign) -> list[str]:
             f"{why}"
         )
     return reported
-
-
-def _is_recorded(campaign: Campaign, name: str) -> bool:
-    return any(name in record for record in campaign.estimation)
 
 
 def beyond_identified_amplitudes(campaign: Campaign) -> list[str]:
