@@ -11,12 +11,16 @@ _STUDIES = Path(__file__).parents[2] / "experiments"
 
 
 def of_study(study: str, name: str) -> ModuleType:
-    """Return a module of a study that imports nothing beside it."""
+    """Return a module of a study, with what it imports from its own folder."""
+    sys.path.insert(0, str(_STUDIES / study))
     spec = importlib.util.spec_from_file_location(f"{study}_{name}", _STUDIES / study / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     # A dataclass looks its module up there.
     sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.pop(0)
     return module

@@ -10,14 +10,16 @@ from scipy.signal import lfilter
 
 from rigsight.errors import InputError
 from rigsight.excitation import step
-from rigsight.identify import TransferFit
+from rigsight.identify import TransferFit, TransferForm
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
 
 from .studies import of_study
 
+over_time = of_study("thesis", "form_over_time").over_time
 fit_step = of_study("thesis", "transfer_step").fit_step
+PT1 = TransferForm("pt1", with_dead_time=True)
 GEAR_VALUES = {
     "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27,
     "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "psi_off": 1e-3, "l_0": 0.25, "c_y": 0.98, "y_off": -5e-4,
@@ -123,3 +125,26 @@ def test_errors_from_short_steps_allow_for_a_disturbance_that_rings_as_the_rig_d
         found.append(pulls(fit_step(seen, "u", "psi", "pt2", 40.0, 44.0), truth))
     # 16 pulls of each of four parameters: three standard deviations of their rms.
     assert np.sqrt(np.mean(np.square(found), axis=0)) == pytest.approx(1.0, abs=3.0 / np.sqrt(32.0))
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_the_answer_over_time_is_the_one_of_the_simulator(hold: str) -> None:
+    """Another code, another method: generated Runge-Kutta kernel against matrix exponentials."""
+    t = 5e-3 * np.arange(600)
+    u = step(t, 0.6, 0.5) + np.where(t > 1.0, 0.3 * np.sin(9.0 * (t - 1.0)), 0.0)
+    record = Record(name="r", dt=5e-3, signals={"u": u}, units={}, hold=hold)  # type: ignore[arg-type]
+    values = {**GEAR_VALUES, "psi_off": 0.0, "y_off": 0.0}
+    simulated = simulate(compose(RUNNING_GEAR), values, record, accuracy=1e-8)
+    theta = TransferForm("pt2").vector(np.sqrt(81.0 / 0.56), 2.0 / (2.0 * np.sqrt(81.0 * 0.56)), 0.0)
+    theta[0] = 0.81 / 81.0
+    answer = over_time(TransferForm("pt2"), u, 5e-3, hold, theta)  # type: ignore[arg-type]
+    assert answer == pytest.approx(simulated["psi"], abs=1e-6 * np.max(np.abs(answer)))
+
+
+@pytest.mark.parametrize("dead_time", [0.0125, 0.02])
+def test_a_dead_time_shifts_the_answer_also_between_samples(dead_time: float) -> None:
+    t = 5e-3 * np.arange(400)
+    theta = PT1.vector(3.0, 1.0, dead_time)
+    answer = over_time(PT1, step(t, 1.0, 0.1), 5e-3, "zoh", theta)
+    since = np.maximum(t - 0.1 - dead_time, 0.0)
+    assert answer == pytest.approx(1.0 - np.exp(-3.0 * since), abs=1e-9)

@@ -10,12 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.excitation import linear_sweep, step
+from rigsight.excitation import linear_sweep
 from rigsight.frequency import FrequencyResponse, local_polynomial_response, local_rational_response
 from rigsight.identify import TransferFit, TransferForm, fit_frequency_response
 from rigsight.records import Record
-from rigsight.rigs import RUNNING_GEAR
-from rigsight.simulate import compose, simulate
 
 PT2 = TransferForm("pt2", with_dead_time=True)
 PT1 = TransferForm("pt1", with_dead_time=True)
@@ -197,24 +195,23 @@ def test_the_wrong_form_is_named_by_its_misfit() -> None:
     assert "the model order is too low" in fit.message
 
 
+@pytest.mark.parametrize("dead_time", [0.0, 0.0125, 0.02])
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
-def test_the_answer_over_time_is_the_one_of_the_simulator(hold: str) -> None:
-    """Another code, another method: generated Runge-Kutta kernel against matrix exponentials."""
-    t = 5e-3 * np.arange(600)
-    u = step(t, 0.6, 0.5) + np.where(t > 1.0, 0.3 * np.sin(9.0 * (t - 1.0)), 0.0)
-    record = Record(name="r", dt=5e-3, signals={"u": u}, units={}, hold=hold)  # type: ignore[arg-type]
-    values = {**GEAR_VALUES, "psi_off": 0.0, "y_off": 0.0}
-    simulated = simulate(compose(RUNNING_GEAR), values, record, accuracy=1e-8)
-    theta = TransferForm("pt2").vector(np.sqrt(81.0 / 0.56), 2.0 / (2.0 * np.sqrt(81.0 * 0.56)), 0.0)
-    theta[0] = 0.81 / 81.0
-    answer = TransferForm("pt2").over_time(u, 5e-3, hold, theta)  # type: ignore[arg-type]
-    assert answer == pytest.approx(simulated["psi"], abs=1e-6 * np.max(np.abs(answer)))
-
-
-@pytest.mark.parametrize("dead_time", [0.0125, 0.02])
-def test_a_dead_time_shifts_the_answer_also_between_samples(dead_time: float) -> None:
-    t = 5e-3 * np.arange(400)
+def test_the_sampled_response_is_that_of_samples_over_time(hold: str, dead_time: float) -> None:
+    """The response to a pulse that has died out within the record, held on steps or straight lines."""
+    dt, n = 5e-3, 4000
+    t = dt * np.arange(n)
     theta = PT1.vector(3.0, 1.0, dead_time)
-    answer = PT1.over_time(step(t, 1.0, 0.1), 5e-3, "zoh", theta)
-    since = np.maximum(t - 0.1 - dead_time, 0.0)
-    assert answer == pytest.approx(1.0 - np.exp(-3.0 * since), abs=1e-9)
+
+    def after(time: np.ndarray) -> np.ndarray:
+        """Response to a unit step, or to a unit ramp, at time zero."""
+        since = np.maximum(time - dead_time, 0.0)
+        moved = 1.0 - np.exp(-3.0 * since)
+        return moved if hold == "zoh" else since - moved / 3.0
+
+    # A pulse on straight lines begins a sample before it.
+    ahead, now, behind = after(t + dt), after(t), after(t - dt)
+    answer = now - behind if hold == "zoh" else (ahead - 2.0 * now + behind) / dt
+    lines = np.fft.rfft(answer)[1:400]
+    found = PT1.sampled_response(2.0 * np.pi * np.arange(1, 400) / (n * dt), dt, hold, theta)  # type: ignore[arg-type]
+    assert found == pytest.approx(lines, abs=1e-9)

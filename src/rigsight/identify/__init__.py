@@ -41,6 +41,6 @@ from rigsight.identify.transfer.conicity import ConicityEstimate as ConicityEsti
 from rigsight.identify.transfer.conicity import estimate_conicity as estimate_conicity
 from rigsight.identify.transfer.physical_parameters import PhysicalEstimates as PhysicalEstimates
 from rigsight.identify.transfer.physical_parameters import physical_parameters as physical_parameters
-from rigsight.identify.transfer.transfer_fit import TransferFit as TransferFit
+from rigsight.identify.transfer.transfer_form import TransferFit as TransferFit
 from rigsight.identify.transfer.transfer_form import TransferForm as TransferForm
 from rigsight.identify.transfer.transfer_function import fit_frequency_response as fit_frequency_response

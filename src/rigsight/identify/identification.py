@@ -13,7 +13,7 @@ from rigsight.identify.linear_view import LinearView
 from rigsight.identify.reached_bounds import ReachedBound
 from rigsight.identify.transfer.conicity import ConicityEstimate
 from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
-from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.identify.transfer.transfer_form import TransferFit
 from rigsight.records.record import Record
 
 

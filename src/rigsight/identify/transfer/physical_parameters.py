@@ -14,8 +14,7 @@ from scipy.stats import norm
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 from rigsight.identify.fit.covariance import LEVEL, propagated_covariance
-from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.identify.transfer.transfer_form import Order, TransferForm
+from rigsight.identify.transfer.transfer_form import Order, TransferFit, TransferForm
 from rigsight.rigs import Rig, evaluated
 
 

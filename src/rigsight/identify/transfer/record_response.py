@@ -21,8 +21,7 @@ from rigsight.frequency import (
 )
 from rigsight.frequency.signal_pair import excited, line_frequencies
 from rigsight.identify.transfer.relative_fit import fit_with_relative_error
-from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.identify.transfer.transfer_form import Order
+from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.records.periods import mean_period
 from rigsight.records.record import Hold, Record

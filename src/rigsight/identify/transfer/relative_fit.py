@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.identify.transfer.transfer_form import Order
+from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
 
 _SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))

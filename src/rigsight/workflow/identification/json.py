@@ -22,7 +22,7 @@ from rigsight.identify.identification import (
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.transfer.conicity import ConicityEstimate
 from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
-from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.identify.transfer.transfer_form import TransferFit
 from rigsight.json_data import json_data
 
 SCHEMA_VERSION = 1
