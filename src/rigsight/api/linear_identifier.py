@@ -110,8 +110,8 @@ class LinearIdentifier(CampaignEstimator):
         Raises
         ------
         InputError
-            If the campaign cannot be used, the method is unknown, a record is too short for the requested resolution, no record
-            shows the motion, or an effect is unknown or cannot be calibrated on the rig.
+            If the campaign cannot be used, the method is unknown, a record is too short for the requested resolution,
+            or an effect is unknown or cannot be calibrated on the rig.
         """
         options = checked_options(self.method, self.resolution)
         jobs = checked_jobs(self.n_jobs)
