@@ -100,7 +100,7 @@ def held_parameters(campaign: Campaign, records: Sequence[Record]) -> dict[str, 
         # With a linear spring, a constant force and a shifted rest position cannot be distinguished.
         known |= {str(symbol): 0.0 for symbol in rig.motion.bias.free_symbols if str(symbol) in own}
     following = [s.name for s in rig.mechanism.sensors if s.reads.free_symbols & rig.downstream.keys()]
-    if not any(name in record for name in following for record in records):
+    if rig.downstream and not any(name in record for name in following for record in records):
         for name in rig.downstream_parameters:
             default = own[name].default
             known[name] = campaign.given.get(name, 1.0 if default is None else default)
