@@ -45,7 +45,7 @@ def identification_warnings(
     for view in views:
         reported += _of_view(view, campaign)
     names = [p.name for p in rig.parameters if rig.has_one_motion and p.name in rig.downstream_parameters]
-    if joint.pooled is None and names and not set(names) & set(joint.names):
+    if rig.downstream and joint.pooled is None and names and not set(names) & set(joint.names):
         missing = ", ".join(symbol.name for symbol in rig.downstream)
         reported.append(
             f"No estimation record has {missing}: {', '.join(names)} in the model are given or placeholders, not identified."
