@@ -22,8 +22,12 @@ from rigsight.identify.transfer.physical_parameters import (
     parameters_of_form,
     physical_parameters,
 )
-from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
-from rigsight.identify.transfer.relative_fit import fit_with_relative_error
+from rigsight.identify.transfer.record_response import (
+    Method,
+    RecordResponse,
+    fit_with_relative_error,
+    record_response,
+)
 from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.identify.undetermined import POORLY_KNOWN

@@ -20,7 +20,6 @@ from rigsight.frequency import (
     thesis_response,
 )
 from rigsight.frequency.signal_pair import excited, line_frequencies
-from rigsight.identify.transfer.relative_fit import fit_with_relative_error
 from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.records.periods import mean_period
@@ -42,6 +41,7 @@ _PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thes
 _CLEAR = 100.0
 """Power over variance (20 dB) above which a local model of a noisy response can be trusted."""
 _MOSTLY, _LEAST_SHARE = 0.8, 0.05
+_SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))
 _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 
 
@@ -190,6 +190,26 @@ class _Local:
             wanted=self.wanted,
             instrument=instrument,
         )
+
+
+def fit_with_relative_error(
+    response: FrequencyResponse, order: Order, magnitude_only: bool
+) -> tuple[TransferFit, float]:
+    """Return a fit and the relative error, the same for every line, with which the form explains the response.
+
+    With the variances of the noise alone, the few most certain lines would dominate, wherever they are.
+    """
+    assert response.variance is not None
+    for share in _SHARES:
+        variance = response.variance + (share * response.magnitude) ** 2
+        fit = fit_frequency_response(
+            replace(response, variance=variance, noise_shares=None, noise_lines=None),
+            order,
+            magnitude_only=magnitude_only,
+        )
+        if fit.misfit <= 1.0:
+            break
+    return fit, share
 
 
 def _noted(found: FrequencyResponse, note: str) -> FrequencyResponse:
