@@ -18,6 +18,7 @@ from rigsight.identify.linear_view import measured_responses
 from rigsight.identify.transfer.conicity import estimate_conicity
 from rigsight.identify.transfer.physical_parameters import (
     PhysicalEstimates,
+    form_gives_parameters,
     form_of,
     parameters_of_form,
     physical_parameters,
@@ -177,7 +178,8 @@ class _Reading:
             unknown = " and ".join(sorted(parameters_of_form(self.rig, "pt1")))
             problem = f"the record has no {sensor.name}, so {unknown} cannot be identified from it."
             return PathIdentification(motion.response, sensor.name, problem=problem)
-        return self._read(sensor, self.has_forms, None, motion)[0]
+        has_form = self.has_forms and form_gives_parameters(self.rig, "pt1")
+        return self._read(sensor, has_form, None, motion)[0]
 
     def _read(
         self,

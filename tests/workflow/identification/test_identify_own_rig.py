@@ -260,3 +260,26 @@ def test_given_values_that_diverge_within_a_sample_are_no_start(monkeypatch: pyt
     # Without another start they are all there is: nothing is found, but nothing breaks.
     monkeypatch.setattr(identified_rig, "linear_start", lambda *_: diverging)
     assert identify_campaign(campaign, options).joint.statement
+
+
+def test_a_length_that_was_measured_leaves_the_response_of_what_follows_without_a_form() -> None:
+    text = rig_file_text("running_gear").replace("[parameters.l_0]", "[constants.l_0]")
+    text = text.replace('log = true\nabout = "distance', 'about = "distance')
+    rng, rig = (
+        np.random.default_rng(1),
+        rig_of_text(text.replace('name = "running_gear"', 'name = "measured"')),
+    )
+    values = {
+        "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "l_0": 0.25,
+        "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "psi_off": 0.0, "c_y": 0.98, "y_off": 0.0,
+    }  # fmt: skip
+    record = recorded("one", rig, values, {"u": multisine(rng, 1.0, 60.0)}, rng)
+    constants = {name: values[name] for name in ("v", "r_0", "b", "k_tau", "l_0")}
+    found = identify_campaign(
+        make_campaign(rig, [record], constants=constants), checked_options("local_rational", None)
+    )
+    yaw, lateral = found.records[0].paths
+    assert yaw.fit is not None
+    assert lateral.fit is None
+    assert lateral.measured is not None
+    assert found.joint.fit.fit.values["c_y"] == pytest.approx(0.98, rel=0.01)

@@ -81,13 +81,24 @@ def parameters_of_form(rig: Rig, order: Order) -> frozenset[str]:
     return frozenset(own & read)
 
 
+def form_gives_parameters(rig: Rig, order: Order) -> bool:
+    """Return True if gain, break frequency and damping ratio have one further unknown parameter each, in this order."""
+    unknown = parameters_of_form(rig, order)
+    for expression in expressions_of_form(rig, order).values():
+        own = unknown & {symbol.name for symbol in expression.free_symbols}
+        if len(own) != 1:
+            return False
+        unknown -= own
+    return True
+
+
 def physical_parameters(rig: Rig, fit: TransferFit, constants: Mapping[str, float]) -> PhysicalEstimates:
     """Return the parameters of a rig of one motion that follow from a fitted form.
 
     Parameters
     ----------
     rig
-        Stiffness, inertia and damping, or gain and rate of the follower, have one unknown parameter each.
+        One of which `form_gives_parameters` holds.
     fit
         PT2 from the input to the motion, or PT1 from the motion to the follower.
     constants
@@ -103,10 +114,10 @@ def physical_parameters(rig: Rig, fit: TransferFit, constants: Mapping[str, floa
     numbers = {**constants, **{symbol.name: fit.values[name] for name, symbol in fitted.items()}}
     unknown, found = set(parameters_of_form(rig, fit.form.order)), dict[sp.Symbol, sp.Expr]()
     for name, expression in forms.items():
-        # Gain, break frequency and damping ratio have one further unknown each, in this order.
         known = expression.xreplace(found)
         (symbol,) = (s for s in known.free_symbols if s.name in unknown)
-        found[symbol] = sp.solve(known - fitted[name], symbol)[0]
+        # Of a root of two signs, the last solution is the positive one.
+        found[symbol] = sp.solve(known - fitted[name], symbol)[-1]
         unknown.remove(symbol.name)
     values = {symbol.name: evaluated(expression, numbers) for symbol, expression in found.items()}
     if not next(iter(values.values())) > 0.0:

@@ -40,7 +40,7 @@ from rigsight.identify.linear_view import (
 )
 from rigsight.identify.reached_bounds import reached_bounds
 from rigsight.identify.record_identification import EstimationOptions, identify_record, with_own_fit
-from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates, form_gives_parameters
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
 from rigsight.rigs import Rig
@@ -70,10 +70,7 @@ def _has_forms(campaign: Campaign) -> bool:
     rig = campaign.rig
     if campaign.modelled or not (rig.has_one_motion and rig.is_driven) or campaign.given_without_spring:
         return False
-    own, motion = {p.name for p in rig.parameters}, rig.motion
-    parts = (motion.stiffness, motion.inertia, motion.damping)
-    is_known = {symbol.name for symbol in motion.drive_gain.free_symbols} <= campaign.constants.keys()
-    return is_known and all(getattr(part, "name", None) in own for part in parts)
+    return rig.motion.stiffness != 0 and form_gives_parameters(rig, "pt2")
 
 
 def identify_rig(
