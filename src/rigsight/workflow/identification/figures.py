@@ -37,7 +37,7 @@ _FORMS = {"pt1": "PT1", "pt2": "PT2"}
 def identification_figures(identification: Identification) -> dict[str, tuple[str, str]]:
     """Return file name -> what the figure shows, and the figure as SVG."""
     found: dict[str, tuple[str, str]] = {}
-    by_record = _has_forms(identification)
+    by_record = _is_by_record(identification)
     for number, view in enumerate(() if by_record else identification.views, 1):
         if view.measured is not None:
             file = RESPONSES_FILE if number == 1 else f"responses_{number}.svg"
@@ -65,14 +65,17 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
     return found
 
 
-def _has_forms(identification: Identification) -> bool:
-    """Return True if each record has curves of its own: PT2 and PT1, or the dynamic stiffness of an element."""
-    return any(fitted_curve(path) is not None for record in identification.records for path in record.paths)
+def _is_by_record(identification: Identification) -> bool:
+    """Return True if each record has curves of its own (PT2 and PT1, or the dynamic stiffness of an element), or only measured ones."""
+    paths = [path for record in identification.records for path in record.paths]
+    common = any(view.measured is not None for view in identification.views)
+    return not common or any(fitted_curve(path) is not None for path in paths)
 
 
 def bode_figure(record: RecordIdentification, identification: Identification) -> Figure | None:
     """Return the Bode plot of one record, measured against fitted; None where it has no frequency response."""
-    if not _has_forms(identification):
+    chained = {path.source for path in record.paths} & {path.response for path in record.paths}
+    if not (_is_by_record(identification) or chained):
         measured = {(path.source, path.response): path for path in record.paths}
         return _grid(measured, {}, identification.units) if measured else None
     panels = _panels(record, identification)
@@ -84,9 +87,9 @@ def responses_figure(identification: Identification) -> Figure | None:
 
     Of a rig of several inputs or sensors it is the grid of their responses, all records together.
     """
-    if not _has_forms(identification):
+    if not _is_by_record(identification):
         views = [view for view in identification.views if view.measured is not None]
-        return view_figure(views[0], identification.units) if views else None
+        return view_figure(views[0], identification.units)
     columns = _columns(identification)
     return overlaid_responses(columns) if columns else None
 
