@@ -66,7 +66,7 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
 
 
 def _is_by_record(identification: Identification) -> bool:
-    """Return True if each record has curves of its own (PT2 and PT1, or the dynamic stiffness of an element), or only measured ones."""
+    """Return True if records have curves of their own (PT2 and PT1, or a dynamic stiffness), or only measured ones."""
     paths = [path for record in identification.records for path in record.paths]
     common = any(view.measured is not None for view in identification.views)
     return not common or any(fitted_curve(path) is not None for path in paths)
