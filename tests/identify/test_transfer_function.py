@@ -15,6 +15,9 @@ from rigsight.frequency import FrequencyResponse, local_polynomial_response, loc
 from rigsight.identify import TransferFit, TransferForm, fit_frequency_response
 from rigsight.records import Record
 
+from ..experiments.studies import of_study
+
+over_time = of_study("thesis", "form_over_time").over_time
 PT2 = TransferForm("pt2", with_dead_time=True)
 PT1 = TransferForm("pt1", with_dead_time=True)
 OMEGA = np.geomspace(0.5, 80.0, 120)
@@ -107,7 +110,7 @@ def test_errors_from_a_local_model_are_the_scatter_of_repeated_records(method) -
     u[1000:10_000] = linear_sweep(t[:9000], 1.0, 1.0, 40.0)
     theta = PT2.vector(12.0, 0.3, 0.0)
     theta[0] = 1.0
-    clean = PT2.over_time(u, 5e-3, "foh", theta)
+    clean = over_time(PT2, u, 5e-3, "foh", theta)
     rng = np.random.default_rng(4)
     values, errors, naive = [], [], []
     for _ in range(60):
