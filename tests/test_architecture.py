@@ -22,7 +22,6 @@ NAME_A_RIG = {
     "discover/terms/hysteresis.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/transfer/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
-    "identify/transfer/running_gear_parameters.py": "API: equation (2.21) of the thesis, yaw parameters",
     "rigs/__init__.py": "the built-in rigs",
     "rigs/built_in.py": "the built-in rigs",
     "workflow/demo.py": "the demo is the running gear of the thesis",

@@ -30,9 +30,8 @@ from rigsight.identify import (
     GreyBoxFit,
     characteristic_scales,
     fit_frequency_response,
-    lateral_parameters,
     linear_start,
-    yaw_parameters,
+    physical_parameters,
 )
 from rigsight.identify.transfer.conicity import creep_factor
 from rigsight.records import Record
@@ -149,8 +148,8 @@ def by_response(record: Record) -> Estimate:
     yaw = local_rational_response(record, "u", "psi", hold=record.hold, band=YAW_BAND)
     lateral = local_rational_response(record, "psi", "y", band=LATERAL_BAND)
     parts = [
-        yaw_parameters(fit_frequency_response(yaw, "pt2"), CONSTANTS),
-        lateral_parameters(fit_frequency_response(lateral, "pt1"), CONSTANTS),
+        physical_parameters(RUNNING_GEAR, fit_frequency_response(yaw, "pt2"), CONSTANTS),
+        physical_parameters(RUNNING_GEAR, fit_frequency_response(lateral, "pt1"), CONSTANTS),
     ]
     found = [next(part for part in parts if name in part.names) for name in NAMES]
     limits = np.array([part.interval(name) for part, name in zip(found, NAMES, strict=True)])

@@ -11,23 +11,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from driven_offsets import driven_offsets
+from thesis_formulas import ROLLING, lateral_parameters, offsets, yaw_parameters
+from transfer_step import fit_step
 from virtual_rig import CONSTANTS, STEP_START
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response, thesis_response
-from rigsight.identify import (
-    driven_offsets,
-    estimate_conicity,
-    fit_frequency_response,
-    fit_step,
-    lateral_parameters,
-    offsets,
-    yaw_parameters,
-)
+from rigsight.identify import estimate_conicity, fit_frequency_response
 from rigsight.identify.transfer.record_response import record_response
 from rigsight.metrics import rms
 from rigsight.records import Record
-from rigsight.rigs import ROLLING, evaluated
+from rigsight.rigs import evaluated
 
 PAIRS = (("u", "psi"), ("psi", "y"))
 CUTS = {"psi": 80.0, "y": 30.0}

@@ -21,6 +21,7 @@ from measuring import our_pair
 from parameter_tables import text
 from rich.console import Group
 from rich.table import Table
+from thesis_formulas import creep_error_of_sine, lateral_parameters
 from virtual_rig import (
     AMPLITUDES,
     CONSTANTS,
@@ -36,12 +37,7 @@ from virtual_rig import (
     thesis_sweep,
 )
 
-from rigsight.identify import (
-    creep_error_of_sine,
-    estimate_conicity,
-    fit_frequency_response,
-    lateral_parameters,
-)
+from rigsight.identify import estimate_conicity, fit_frequency_response
 from rigsight.identify.hysteresis import SpectralRatio, peak
 from rigsight.identify.transfer.conicity import conicity_slope
 from rigsight.metrics import nrmse

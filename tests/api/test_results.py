@@ -28,6 +28,7 @@ FILES = {
     "diagnosis": {"diagnosis.json", "model.json", "report.html"},
     "identification": {
         "identification.json",
+        "identification.html",
         "model.json",
         "bode_fit.svg",
         "responses.svg",

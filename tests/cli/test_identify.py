@@ -19,7 +19,7 @@ def test_identify_leaves_all_results_and_shows_the_table(
     assert code == 0, stderr
     figures = ["amplitudes.svg", "bode_fit.svg", "responses.svg"]
     assert sorted(path.name for path in out.iterdir()) == sorted(
-        [*figures, "identification.json", "model.json"]
+        [*figures, "identification.html", "identification.json", "model.json"]
     )
     for part in ("amplitude [input]", "k [N/m]", "resonance [rad/s]", "Only one estimation record", "score"):
         assert part in stdout

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import PathIdentification, RecordIdentification
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.records import Kind, Record
 
 UNITS = {"k": "N/m", "d": "N s/m", "u": "A", "tau": "N m"}

@@ -71,7 +71,7 @@ def of_motion(share: float) -> Proposal:
     )
     damping = effect_named("quadratic_damping")
     cause = ProposedCause(damping, Family.DAMPING_LAW, "yaw_dynamics", share, {"c_2": 90.0})
-    return Proposal((cause,), (cause,), frozenset({damping.name}), share, 0.01, (force,))
+    return Proposal((cause,), (cause,), frozenset({damping.name}), share, 0.01, forces=(force,))
 
 
 def candidate(

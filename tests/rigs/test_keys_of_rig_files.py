@@ -85,6 +85,7 @@ USED: dict[str, Any] = {
     "sensors.travel.reads": "2*x",
     "sensors.travel.unit": "mm",
     "sensors.travel.about": "scale",
+    "sensors.travel.upper_cut": 80.0,
     "states.w.rate": "2*f*(u - w)",
     "states.w.unit": "kV",
     "states.w.start": 0.1,

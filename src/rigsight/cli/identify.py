@@ -66,10 +66,9 @@ def identify(
 ) -> None:
     """Identify the parameters of the rig from frequency responses and steps, for each record and for all together.
 
-    Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR; all files or none. For rigs
-    with several motions or from a rig file it also writes identification.html with the responses of every sensor to every input,
-    the poles, and which parameters the records determine. With
-    --effect, model.json holds the rig with these effects.
+    Writes identification.json, model.json, amplitudes.svg, plots of the responses (for rigs of one motion a Bode plot for each
+    record) and identification.html with the responses of every sensor to every input, the poles, and which parameters the records
+    determine into DIR; all files or none. With --effect, model.json holds the rig with these effects.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.identify import run_identify

@@ -25,8 +25,6 @@ from rigsight.records.record import Hold
 from rigsight.records.signals import is_constant, moves_beyond_noise
 from rigsight.rigs import Rig
 
-_CUTS = (80.0, 30.0)
-"""Where the thesis cuts the response of the motion to the input, and of what follows it to the motion (4.3 and 4.5) [rad/s]."""
 _LEAST_CLEARNESS = 10.0
 """Power over variance (10 dB) from which a measured line is compared; a fit needs more, while an error is shown with its
 floor."""
@@ -70,22 +68,20 @@ class ResponseError:
 def signal_paths(rig: Rig) -> tuple[SignalPath, ...]:
     """Return the paths of a rig: input to first output, and that to each output behind it.
 
-    On a rig of several motions they are each input to each sensor. The cuts are those of the thesis where a state follows the
-    motion, none on other rigs.
+    On a rig of several motions they are each input to each sensor.
     """
     if not rig.has_one_motion:
         prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
         inputs = tuple(signal.name for signal in rig.inputs)
         return tuple(
-            SignalPath(source, signal.name, "pt2", math.inf, source not in prescribing, inputs)
+            SignalPath(source, sensor.name, "pt2", sensor.upper_cut, source not in prescribing, inputs)
             for source in inputs
-            for signal in rig.outputs
+            for sensor in rig.mechanism.sensors
         )
-    cut, cut_behind = (math.inf, math.inf) if rig.follower is None else _CUTS
-    source, first, *behind = (rig.inputs[0].name, *(signal.name for signal in rig.outputs))
+    source, (first, *behind) = rig.inputs[0].name, rig.mechanism.sensors
     return (
-        SignalPath(source, first, "pt2", cut, rig.is_driven),
-        *(SignalPath(first, name, "pt1", cut_behind, False, drive=source) for name in behind),
+        SignalPath(source, first.name, "pt2", first.upper_cut, rig.is_driven),
+        *(SignalPath(first.name, s.name, "pt1", s.upper_cut, False, drive=source) for s in behind),
     )
 
 
@@ -190,6 +186,7 @@ def _response(
         clear_alone=True,
         with_coherence=False,
         wanted=wanted,
+        upper_cut=path.upper_cut,
         drive=path.drive or None,
     ).response
 

@@ -82,38 +82,74 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """The result of a discovery."""
+    """The result of a discovery.
 
-    title: str  # of the campaign
-    rig: str  # its name
-    method: str  # ``"full"`` or ``"discrepancy"``
-    form: str  # ``"weak"``, ``"pointwise"``, or ``"linearized responses"`` for several joints
-    equations: tuple[str, ...]  # as plain text, one per state
-    latex: tuple[str, ...]  # the same as LaTeX
-    rig_parameters: Mapping[str, Coefficient]  # the rig's own
-    terms: tuple[Term, ...]  # terms of the equation first, then those that were offered
-    alternatives: tuple[Alternative, ...]  # all supports that were polished, best first
-    # Inclusion probability of each term in the equation of the hysteretic force; empty if there is no such force.
+    Attributes
+    ----------
+    title, rig, method
+        Title of the campaign, name of the rig, and method (``"full"`` or ``"discrepancy"``).
+    form
+        ``"weak"`` or ``"pointwise"``; ``"linearized responses"`` for a rig of several joints.
+    equations, latex
+        The equations as plain text and as LaTeX, one per state.
+    rig_parameters
+        The rig's own parameters.
+    terms
+        Terms of the equation first, then those that were offered.
+    alternatives
+        All supports that were polished, best first.
+    force_equation
+        Inclusion probability of each term in the equation of the hysteretic force; empty if there is no such force.
+    held_out
+        Names of the records by which supports were selected.
+    held_out_error
+        Free-run error on these records in units of the noise floor.
+    held_out_nrmse, noise_floor
+        The same error, and the noise floor, relative to the standard deviation of the measured output (dimensionless).
+    independent
+        Number of independent samples of that error (dimensionless, not an integer).
+    runs
+        Free runs of the model, for plots.
+    output, unit
+        Name and unit of the first output.
+    model
+        Content of ``model.json``.
+    warnings
+        Warnings before the equations are used, one sentence each.
+    joints
+        Missing force per joint, with the joint of the equation first; empty for a rig with one joint.
+    by_record
+        Result for each record alone, or the reason why there is none; empty unless requested.
+    given
+        Parameter values of the given simulation, to compare with.
+    records
+        The records of the campaign.
+    """
+
+    title: str
+    rig: str
+    method: str
+    form: str
+    equations: tuple[str, ...]
+    latex: tuple[str, ...]
+    rig_parameters: Mapping[str, Coefficient]
+    terms: tuple[Term, ...]
+    alternatives: tuple[Alternative, ...]
     force_equation: Mapping[str, float]
-    held_out: tuple[str, ...]  # names of the records by which supports were selected
-    held_out_error: float  # free-run error on these records in units of the noise floor
-    held_out_nrmse: float  # the same error relative to the standard deviation of the measured output
-    noise_floor: float  # in the same unit
-    independent: float  # number of independent samples of that error, not an integer
-    runs: tuple[Run, ...]  # free runs of the model, for plots
-    output: str  # name of the first output
+    held_out: tuple[str, ...]
+    held_out_error: float
+    held_out_nrmse: float
+    noise_floor: float
+    independent: float
+    runs: tuple[Run, ...]
+    output: str
     unit: str
-    model: Mapping[str, Any]  # content of ``model.json``
-    warnings: tuple[str, ...]  # before the equations are used, one sentence each
-    joints: tuple[
-        JointForce, ...
-    ] = ()  # missing force per joint, with that of the equation first; empty for one joint
-    # Result for each record alone, or the reason why there is none; empty unless requested.
+    model: Mapping[str, Any]
+    warnings: tuple[str, ...]
+    joints: tuple[JointForce, ...] = ()
     by_record: tuple[tuple[str, Discovery | str], ...] = ()
-    given: Mapping[str, float] = field(
-        default_factory=dict
-    )  # parameter values of the given simulation, to compare with
-    records: tuple[Record, ...] = ()  # those of the campaign
+    given: Mapping[str, float] = field(default_factory=dict)
+    records: tuple[Record, ...] = ()
 
     @property
     def kept(self) -> tuple[Term, ...]:

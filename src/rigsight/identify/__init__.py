@@ -38,14 +38,9 @@ from rigsight.identify.start.equation_error import EffectRegression as EffectReg
 from rigsight.identify.start.linear_start import linear_start as linear_start
 from rigsight.identify.start.scales import characteristic_scales as characteristic_scales
 from rigsight.identify.transfer.conicity import ConicityEstimate as ConicityEstimate
-from rigsight.identify.transfer.conicity import creep_error_of_sine as creep_error_of_sine
 from rigsight.identify.transfer.conicity import estimate_conicity as estimate_conicity
-from rigsight.identify.transfer.driven_offsets import driven_offsets as driven_offsets
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates as PhysicalEstimates
-from rigsight.identify.transfer.running_gear_parameters import lateral_parameters as lateral_parameters
-from rigsight.identify.transfer.running_gear_parameters import offsets as offsets
-from rigsight.identify.transfer.running_gear_parameters import yaw_parameters as yaw_parameters
-from rigsight.identify.transfer.transfer_fit import TransferFit as TransferFit
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates as PhysicalEstimates
+from rigsight.identify.transfer.physical_parameters import physical_parameters as physical_parameters
+from rigsight.identify.transfer.transfer_form import TransferFit as TransferFit
 from rigsight.identify.transfer.transfer_form import TransferForm as TransferForm
 from rigsight.identify.transfer.transfer_function import fit_frequency_response as fit_frequency_response
-from rigsight.identify.transfer.transfer_step import fit_step as fit_step

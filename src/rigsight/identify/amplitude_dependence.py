@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rigsight.identify.identification import RecordIdentification
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.records.record import Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
@@ -34,7 +34,7 @@ def amplitude_dependence(
     compared = _comparable(records)
     if len(compared) < 2:
         return _why_not(records), ()
-    parts = ([*(path.physical for path in r.paths), r.own] for _, group in compared for r in group)
+    parts = (_numbers(r) for _, group in compared for r in group)
     names = [
         name
         for part in zip(*parts, strict=True)
@@ -142,6 +142,12 @@ def _by_amplitude(records: Sequence[RecordIdentification]) -> list[tuple[float, 
         else:
             groups.append((found.amplitude, [found]))
     return groups
+
+
+def _numbers(found: RecordIdentification) -> list[PhysicalEstimates | None]:
+    """Return the parameters of the paths of a record; where no path gives any, those of its own fit."""
+    of_paths = [path.physical for path in found.paths]
+    return [*of_paths, None if any(own is not None for own in of_paths) else found.own]
 
 
 def _determined(found: PhysicalEstimates) -> list[str]:

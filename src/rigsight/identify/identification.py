@@ -12,8 +12,8 @@ from rigsight.identify.information import ReachedBound
 from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.transfer.conicity import ConicityEstimate
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
-from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
+from rigsight.identify.transfer.transfer_form import TransferFit
 from rigsight.records.record import Record
 
 
@@ -38,12 +38,12 @@ class RecordIdentification:
     record: Record
     amplitude: float  # amplitude of its input, as given or measured; for a free motion that of its output
     paths: tuple[PathIdentification, ...]  # the path to the motion first, then the paths from the motion
-    offsets: PhysicalEstimates | None = None  # rest positions by (2.26) and (2.27); None if there are none
+    offsets: PhysicalEstimates | None = None  # rest positions, of `own`; None if there are none
     conicity: ConicityEstimate | None = None  # delta_0 with its statement; None if c_y is not known
     # Angular frequency at which the measured magnitude is largest [rad/s]; None if it has no peak.
     resonance: float | None = None
     warnings: tuple[str, ...] = ()  # warnings for the user, a sentence each
-    # Parameters of a fit of this record alone, in the time domain; None if they follow from `paths`, or if it failed.
+    # Parameters of a fit of this record alone, in the time domain; None if it failed.
     own: PhysicalEstimates | None = None
     moved: str = ""  # the output to which the amplitude of a free motion refers
 
@@ -66,7 +66,7 @@ class RecordIdentification:
     def estimates(self) -> dict[str, tuple[float, float]]:
         """Value and standard error of every physical parameter found, by name."""
         found: dict[str, tuple[float, float]] = {}
-        for part in (*(path.physical for path in self.paths), self.offsets, self.own):
+        for part in (self.own, *(path.physical for path in self.paths)):
             if part is not None:
                 errors = part.standard_errors
                 found.update({name: (part.values[name], errors[name]) for name in part.names})
@@ -92,13 +92,12 @@ class JointIdentification:
 
     fit: JointFit  # the joint fit, with a fit of each record alone
     names: tuple[str, ...]  # the fitted parameters
-    # Lateral parameters that the fit held at the mean of the single records' estimates: if no set fits all
+    # Parameters of what follows the motion that the fit held at the mean of the single records' estimates: if no set fits all
     # records, a wrong yaw angle would bias them. None if they were fitted with the others, or not at all.
     pooled: PhysicalEstimates | None
     statement: str  # whether one set fits all records, and which records differ, in words
     conicity: ConicityEstimate | None  # delta_0 with its statement; None if c_y is not known
     scores: tuple[RecordScore, ...]  # score of every record
-    left_out: tuple[str, ...]  # estimation records that the fit did not use
 
 
 @dataclass(frozen=True)
@@ -128,32 +127,57 @@ class HysteresisIdentification:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """The result of ``rigsight identify``."""
+    """The result of ``rigsight identify``.
 
-    title: str  # of the campaign
-    rig: str  # name of the rig
-    method: str  # how frequency responses were estimated
-    units: dict[str, str]  # by parameter and signal
-    records: tuple[RecordIdentification, ...]  # estimation records in the order of the campaign
-    amplitude_statement: str  # whether the parameters change with the amplitude, in one sentence
-    changing: tuple[str, ...]  # names of those that do
-    joint: JointIdentification  # one set for all records
-    model: dict[str, Any]  # content of ``model.json``
-    warnings: tuple[str, ...]  # each with the name of its record
-    reached: tuple[
-        ReachedBound, ...
-    ] = ()  # parameters of the joint fit at a bound which the records ask them to pass
-    # The linearized rig, for each set of constants of the records; empty for the built-in rigs with one motion, whose transfer
-    # functions are fitted record by record.
+    Attributes
+    ----------
+    title
+        Title of the campaign.
+    rig
+        Name of the rig.
+    method
+        Method by which frequency responses were estimated.
+    units
+        Unit by parameter and signal.
+    records
+        Estimation records in the order of the campaign.
+    amplitude_statement
+        Whether the parameters change with the amplitude, in one sentence.
+    changing
+        Names of those that do.
+    joint
+        One set for all records.
+    model
+        Content of ``model.json``.
+    warnings
+        All warnings, each with the name of its record.
+    reached
+        Parameters of the joint fit that stand at a bound which the records ask them to pass.
+    views
+        The linearized rig, for each set of constants of the records; empty if the fit failed.
+    identifiability
+        Parameters that the records determine together; None if the fit failed.
+    meanings
+        Meaning of each parameter, by name.
+    hysteresis
+        The rig with hysteresis effects; None if not requested. If there is one, it is the `model`.
+    given
+        Parameter values of the given simulation, to compare with.
+    """
+
+    title: str
+    rig: str
+    method: str
+    units: dict[str, str]
+    records: tuple[RecordIdentification, ...]
+    amplitude_statement: str
+    changing: tuple[str, ...]
+    joint: JointIdentification
+    model: dict[str, Any]
+    warnings: tuple[str, ...]
+    reached: tuple[ReachedBound, ...] = ()
     views: tuple[LinearView, ...] = ()
-    # Parameters that the records determine together; None for these built-in rigs.
     identifiability: Identifiability | None = None
-    meanings: dict[str, str] = field(
-        default_factory=dict
-    )  # of each parameter, by name; empty for these built-in rigs
-    hysteresis: HysteresisIdentification | None = (
-        None  # the rig with hysteresis effects; the `model` if there is one
-    )
-    given: dict[str, float] = field(
-        default_factory=dict
-    )  # parameter values of the given simulation, to compare with
+    meanings: dict[str, str] = field(default_factory=dict)
+    hysteresis: HysteresisIdentification | None = None
+    given: dict[str, float] = field(default_factory=dict)

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.linalg import orth
 from scipy.stats import norm
 
+from rigsight.identify.fit.covariance import LEVEL
 from rigsight.identify.fit.derivatives import central_sensitivities, place_of_fit
 from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
-from rigsight.identify.transfer.running_gear_parameters import LEVEL
 from rigsight.identify.undetermined import POORLY_KNOWN, conditional_errors
 from rigsight.records.record import Floats
 from rigsight.units import characteristic_value

@@ -9,11 +9,11 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from rigsight.errors import InputError
+from rigsight.identify.fit.covariance import LEVEL
 from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.start.linear_start import linear_start
 from rigsight.identify.start.scales import characteristic_scales
-from rigsight.identify.transfer.running_gear_parameters import LEVEL
 from rigsight.records.record import Record
 from rigsight.simulate import Structure
 

@@ -1,9 +1,9 @@
-"""Results of a single estimation record: transfer functions, physical parameters, offsets, and undetermined parameters."""
+"""Results of a single estimation record: responses, transfer functions, physical parameters, and undetermined parameters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,28 +11,31 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
-from rigsight.frequency.signal_pair import TooShortError
+from rigsight.frequency.signal_pair import TooShortError, pair_unit
 from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.identification import PathIdentification, RecordIdentification
-from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
-from rigsight.identify.transfer.driven_offsets import driven_offsets
-from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
-from rigsight.identify.transfer.relative_fit import fit_with_relative_error
-from rigsight.identify.transfer.running_gear_parameters import (
+from rigsight.identify.linear_view import measured_responses
+from rigsight.identify.transfer.conicity import estimate_conicity
+from rigsight.identify.transfer.physical_parameters import (
     PhysicalEstimates,
-    axis_parameters,
-    lateral_parameters,
-    static_lateral,
-    yaw_parameters,
+    form_gives_parameters,
+    form_of,
+    parameters_of_form,
+    physical_parameters,
 )
-from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.identify.transfer.transfer_form import Order
+from rigsight.identify.transfer.record_response import (
+    Method,
+    RecordResponse,
+    fit_with_relative_error,
+    record_response,
+)
+from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
-from rigsight.identify.transfer.transfer_step import fit_step, input_at_rest
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
-from rigsight.records.signals import instrument_of
-from rigsight.rigs import Rig, evaluated
+from rigsight.records.signals import instrument_of, is_constant
+from rigsight.rigs import Rig
+from rigsight.rigs.parts import Sensor
 
 _SURE = 0.1
 """Relative standard error above which a line is no evidence of a peak."""
@@ -56,131 +59,161 @@ class EstimationOptions:
 
 
 def identify_record(
-    record: Record, rig: Rig, constants: Mapping[str, float], options: EstimationOptions
+    record: Record,
+    rig: Rig,
+    constants: Mapping[str, float],
+    options: EstimationOptions,
+    has_forms: bool = True,
 ) -> RecordIdentification:
-    """Identify the rig from one record."""
-    amplitude = record.amplitude if record.amplitude is not None else measured_amplitude(record, rig)[0]
-    if not rig.is_driven:
-        return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, options),))
-    forward = _driven_forward(record, constants.get("gain", 1.0))
-    instrument = instrument_of(record, [signal.name for signal in (*rig.inputs, *rig.outputs)])
-    motion, seen = _motion(forward, rig, constants, options, instrument)
+    """Return the responses that one record alone shows, with their PT2 and PT1 if the equations of its rig have such forms."""
+    measured_size, moved = measured_amplitude(record, rig)
+    amplitude = record.amplitude if record.amplitude is not None else measured_size
+    if not rig.has_one_motion:
+        paths = _to_each_input(record, rig, options)
+        return RecordIdentification(record, amplitude, paths, moved="" if paths else moved)
+    source = rig.inputs[0].name
+    if is_constant(record[source]) and record.kind != "step":
+        return RecordIdentification(record, amplitude, (), moved=moved)
+    reading = _Reading(record, rig, {**constants, **record.constants}, options, has_forms)
+    motion, seen = reading.motion()
+    paths = (motion, *(reading.to(sensor, motion) for sensor in rig.mechanism.sensors[1:]))
     unused = "" if seen is None else seen.unused_instrument
-    paths, warnings = [motion], _resolution_warning(motion, seen, record)
+    warnings = [f"{p.source} -> {p.response}: {p.problem}" for p in paths if p.problem]
+    warnings += _resolution_warning(motion, seen, record)
     warnings += [f"{motion.source} -> {motion.response}: read without the reference. {unused}"] * bool(unused)
-    if rig.downstream:
-        paths.append(_lateral(record, rig, constants, options, motion))
-    warnings = [*(f"{p.source} -> {p.response}: {p.problem}" for p in paths if p.problem), *warnings]
     return RecordIdentification(
-        record=record,
-        amplitude=amplitude,
-        paths=tuple(paths),
-        offsets=_offsets(forward, rig, paths),
-        conicity=_conicity(paths[1:], constants),
-        resonance=_resonance(motion),
-        warnings=tuple(warnings),
+        record, amplitude, paths, resonance=_resonance(motion), warnings=tuple(warnings)
     )
 
 
-def _driven_forward(record: Record, gain: float) -> Record:
-    """Reverse the input of an axis with a negative drive gain, because transfer functions need positive gains."""
-    return record if gain > 0.0 else record.with_signals(u=-record["u"])
+def with_own_fit(
+    found: RecordIdentification, rig: Rig, own: PhysicalEstimates, constants: Mapping[str, float]
+) -> RecordIdentification:
+    """Return the results of a record with the parameters that were fitted to it over time.
+
+    A step, and an element, have the parameters of their paths from this fit, and so has every record its rest positions.
+    """
+    paths = tuple(_with_parameters(path, found.record, rig, own, constants) for path in found.paths)
+    offsets = None
+    if any(path.physical is not None for path in paths):
+        of_paths = {name for path in paths if path.physical is not None for name in path.physical.names}
+        resting = rig.motion.rest + rig.motion.bias
+        resting += rig.follower.displacement if rig.follower is not None else 0
+        names = {symbol.name for symbol in resting.free_symbols} & set(own.names) - of_paths
+        offsets = own.only(frozenset(names))
+    conicity = None
+    lateral = paths[1].physical if len(paths) > 1 else None
+    if lateral is not None and "c_y" in lateral.names and {"r_0", "b"} <= constants.keys():
+        conicity = estimate_conicity(
+            lateral.values["c_y"], lateral.standard_errors["c_y"], constants["r_0"], constants["b"]
+        )
+    return replace(found, paths=paths, own=own, offsets=offsets, conicity=conicity)
 
 
-def _motion(
+def _with_parameters(
+    path: PathIdentification,
     record: Record,
     rig: Rig,
+    own: PhysicalEstimates,
     constants: Mapping[str, float],
-    options: EstimationOptions,
-    instrument: str | None,
-) -> tuple[PathIdentification, RecordResponse | None]:
-    source, response = rig.inputs[0].name, rig.outputs[0].name
-
-    def physical(fit: TransferFit) -> PhysicalEstimates:
-        if rig.downstream:
-            return yaw_parameters(fit, constants)
-        return axis_parameters(fit, abs(evaluated(rig.motion.drive_gain, constants)))
-
-    path = PathIdentification(source, response)
-    seen = None
-    try:
-        if record.kind == "step":
-            fit = fit_step(record, source, response, "pt2")
-        else:
-            seen = record_response(
-                record,
-                source,
-                response,
-                "pt2",
-                options.method,
-                options.resolution,
-                record.hold,
-                instrument=instrument,
-                moves_freely=True,
-            )
-            path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(seen, "pt2", options)
-        return _judged(path, fit, physical), seen
-    except InputError as error:
-        if options.resolution is not None and isinstance(error, TooShortError):
-            raise
-        return replace(path, problem=str(error)), seen
-
-
-def _lateral(
-    record: Record,
-    rig: Rig,
-    constants: Mapping[str, float],
-    options: EstimationOptions,
-    motion: PathIdentification,
 ) -> PathIdentification:
-    path = PathIdentification("psi", "y")
-    if "y" not in record:
-        return replace(
-            path, problem="the record has no y, so l_0, c_y and y_off cannot be identified from it."
-        )
-    band = None
-    if motion.measured is not None:
-        # Where psi is below its noise, the noise would act as a source.
-        band = (float(motion.measured.omega[0]), float(motion.measured.omega[-1]))
-    # psi is measured, so it has no content above the Nyquist frequency, whatever the hold of the current.
-    smooth: Hold = "band_limited"
-    try:
-        if record.kind == "step":
-            fit = fit_step(_from_rest(record, motion.fit), "psi", "y", "pt1")
-        else:
-            seen = record_response(
-                record,
-                "psi",
-                "y",
-                "pt1",
-                options.method,
-                options.resolution,
-                smooth,
-                band,
-                drive=rig.inputs[0].name,
-                moves_freely=True,
-            )
-            path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(seen, "pt1", options)
-        return _judged(path, fit, lambda found: lateral_parameters(found, constants))
-    except InputError as error:
-        return replace(path, problem=str(error))
-
-
-def _dynamic_stiffness(record: Record, rig: Rig, options: EstimationOptions) -> PathIdentification:
-    path = PathIdentification(rig.inputs[0].name, rig.outputs[0].name)
-    if record.kind == "step":
+    if path.physical is not None or path.problem or not rig.has_one_motion:
         return path
-    try:
-        seen = record_response(
-            record, path.source, path.response, "pt2", options.method, options.resolution, "band_limited"
+    if not rig.is_driven:
+        parts = rig.motion.stiffness + rig.motion.damping
+        names = {symbol.name for symbol in parts.free_symbols} & {p.name for p in rig.parameters}
+        return replace(path, physical=own.only(frozenset(names)))
+    if record.kind != "step":
+        return path
+    order: Order = "pt2" if path.source == rig.inputs[0].name else "pt1"
+    physical = own.only(parameters_of_form(rig, order))
+    if physical is None:
+        return path
+    unit = pair_unit(record, path.source, path.response)
+    fit = form_of(rig, order, physical, constants, (path.source, path.response, unit))
+    return replace(path, physical=physical, fit=fit)
+
+
+def _to_each_input(record: Record, rig: Rig, options: EstimationOptions) -> tuple[PathIdentification, ...]:
+    """Return the responses of all sensors to the inputs that move in a record."""
+    measured = measured_responses([record], rig, options.method, options.resolution)
+    if measured is None:
+        return ()
+    return tuple(
+        PathIdentification(
+            source.name,
+            response.name,
+            measured=measured.found.get((source.name, response.name)),
+            problem=measured.problems.get((source.name, response.name), ""),
         )
-    except InputError as error:
-        if options.resolution is not None and isinstance(error, TooShortError):
-            raise
-        return replace(path, problem=str(error))
-    return replace(path, measured=seen.response, coherence=seen.coherence)
+        for source in rig.inputs
+        for response in rig.outputs
+        if response.name in record and not is_constant(record[source.name])
+    )
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """How the responses of one record of a rig of one motion are read."""
+
+    record: Record
+    rig: Rig
+    constants: Mapping[str, float]
+    options: EstimationOptions
+    has_forms: bool
+
+    def motion(self) -> tuple[PathIdentification, RecordResponse | None]:
+        """Return the path from the input to the motion, and how its response was read."""
+        signals = [signal.name for signal in (*self.rig.inputs, *self.rig.outputs)]
+        first = self.rig.mechanism.sensors[0]
+        return self._read(first, self.has_forms, instrument_of(self.record, signals))
+
+    def to(self, sensor: Sensor, motion: PathIdentification) -> PathIdentification:
+        """Return the path to a further sensor: from the motion if it reads what follows that, else from the input."""
+        follower = self.rig.follower
+        if follower is None or sensor.reads != follower.symbol:
+            return self._read(sensor, has_form=False, instrument=None)[0]
+        if sensor.name not in self.record:
+            unknown = " and ".join(sorted(parameters_of_form(self.rig, "pt1")))
+            problem = f"the record has no {sensor.name}, so {unknown} cannot be identified from it."
+            return PathIdentification(motion.response, sensor.name, problem=problem)
+        has_form = self.has_forms and form_gives_parameters(self.rig, "pt1")
+        return self._read(sensor, has_form, None, motion)[0]
+
+    def _read(
+        self,
+        sensor: Sensor,
+        has_form: bool,
+        instrument: str | None,
+        motion: PathIdentification | None = None,
+    ) -> tuple[PathIdentification, RecordResponse | None]:
+        """Return the path from the input, or from the motion if that is given, and how its response was read."""
+        record, drive = self.record, self.rig.inputs[0].name
+        path = PathIdentification(drive if motion is None else motion.response, sensor.name)
+        if record.kind == "step" or sensor.name not in record:
+            return path, None
+        # A measured motion has no content above the Nyquist frequency, whatever the hold of the input.
+        hold: Hold = record.hold if self.rig.is_driven and motion is None else "band_limited"
+        band = None
+        if motion is not None and motion.measured is not None:
+            # Where the motion is below its noise, the noise would act as a source.
+            band = (float(motion.measured.omega[0]), float(motion.measured.omega[-1]))
+        order: Order = "pt2" if motion is None else "pt1"
+        method, resolution = self.options.method, self.options.resolution
+        seen = None
+        try:
+            seen = record_response(
+                record, path.source, sensor.name, order, method, resolution, hold, band,
+                instrument=instrument, drive=drive, moves_freely=has_form, upper_cut=sensor.upper_cut,
+            )  # fmt: skip
+            path = replace(path, measured=seen.response, coherence=seen.coherence)
+            if has_form:
+                path = _judged(path, _fit(seen, order, self.options), self.rig, self.constants)
+        except InputError as error:
+            if resolution is not None and isinstance(error, TooShortError):
+                raise
+            path = replace(path, problem=str(error))
+        return path, seen
 
 
 def _fit(seen: RecordResponse, order: Order, options: EstimationOptions) -> TransferFit:
@@ -243,18 +276,8 @@ def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float
     return {**fit.values, "gain": -fit.values["gain"]}
 
 
-def _from_rest(record: Record, motion: TransferFit | None) -> Record:
-    """Set the first sample of psi to the rest position of the fit; its noise would count as a step of the source."""
-    record = replace(record, hold="foh")
-    if motion is None:
-        return record
-    psi = record["psi"].copy()
-    psi[0] = motion.values["offset"]
-    return record.with_signals(psi=psi)
-
-
 def _judged(
-    path: PathIdentification, fit: TransferFit, physical: Callable[[TransferFit], PhysicalEstimates]
+    path: PathIdentification, fit: TransferFit, rig: Rig, constants: Mapping[str, float]
 ) -> PathIdentification:
     """Return the path with the fit if it can be used, otherwise with the reason why not."""
     if not fit.success:
@@ -263,7 +286,7 @@ def _judged(
     if not fit.standard_errors["gain"] < POORLY_KNOWN * abs(gain):
         # A wrong sign would be attributed to a sensor.
         return replace(path, problem=_undetermined(["the gain"], fit.misfit))
-    found = physical(fit)
+    found = physical_parameters(rig, fit, constants)
     errors = found.standard_errors
     poor = [name for name in found.names if not errors[name] < POORLY_KNOWN * abs(found.values[name])]
     if len(poor) > 1 or (poor and fit.form.order == "pt1"):
@@ -304,49 +327,6 @@ def _resolution_warning(motion: PathIdentification, seen: RecordResponse | None,
         f"record at least "
         f"{longer:.3g} s."
     ]
-
-
-def _offsets(record: Record, rig: Rig, paths: list[PathIdentification]) -> PhysicalEstimates | None:
-    motion = paths[0]
-    if motion.fit is None:
-        return None
-    lateral = paths[1] if len(paths) > 1 and paths[1].physical is not None else None
-    rest = next(symbol.name for symbol in rig.motion.rest.free_symbols)
-    if record.kind == "step":
-        return _step_offsets(record, rest, motion.fit, lateral)
-    return driven_offsets(record, motion.fit, None if lateral is None else lateral.fit, rest)
-
-
-def _step_offsets(
-    record: Record, rest: str, fit: TransferFit, lateral: PathIdentification | None
-) -> PhysicalEstimates:
-    """Return the offsets of a step from the responses at rest before it, by (2.26) and (2.27)."""
-    first = input_at_rest(record, fit.source)
-    at_rest = fit.values["offset"]
-    slope = np.array([1.0, -first])
-    variance = float(slope @ fit.covariance_of("offset", "gain") @ slope)
-    names, values, covariance = [rest], {rest: at_rest - first * fit.values["gain"]}, np.array([[variance]])
-    if lateral is not None and lateral.fit is not None and lateral.physical is not None:
-        l_0, l_0_error = lateral.physical.values["l_0"], lateral.physical.standard_errors["l_0"]
-        names.append("y_off")
-        per_radian, per_length = static_lateral(l_0)
-        values["y_off"] = lateral.fit.values["offset"] - per_radian * at_rest
-        own = fit.standard_errors["offset"]
-        error = math.hypot(
-            lateral.fit.standard_errors["offset"], per_radian * own, per_length * at_rest * l_0_error
-        )
-        shared = -per_radian * own**2
-        covariance = np.array([[variance, shared], [shared, error**2]])
-    return PhysicalEstimates(tuple(names), values, covariance, "rest before the step, (2.26) and (2.27)")
-
-
-def _conicity(lateral: list[PathIdentification], constants: Mapping[str, float]) -> ConicityEstimate | None:
-    if not lateral or lateral[0].physical is None:
-        return None
-    found = lateral[0].physical
-    return estimate_conicity(
-        found.values["c_y"], found.standard_errors["c_y"], constants["r_0"], constants["b"]
-    )
 
 
 def _resonance(motion: PathIdentification) -> float | None:

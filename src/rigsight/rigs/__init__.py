@@ -3,16 +3,13 @@
 from rigsight.rigs.built_in import AXIS as AXIS
 from rigsight.rigs.built_in import ELEMENT as ELEMENT
 from rigsight.rigs.built_in import RIGS as RIGS
-from rigsight.rigs.built_in import ROLLING as ROLLING
 from rigsight.rigs.built_in import RUNNING_GEAR as RUNNING_GEAR
 from rigsight.rigs.built_in import declared_rig as declared_rig
-from rigsight.rigs.built_in import has_built_in_parameters as has_built_in_parameters
 from rigsight.rigs.built_in import is_built_in_motion as is_built_in_motion
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.built_in import rotational as rotational
 from rigsight.rigs.coupled_inertia import has_short_inverse as has_short_inverse
 from rigsight.rigs.evaluation import evaluated as evaluated
-from rigsight.rigs.evaluation import relative_slopes as relative_slopes
 from rigsight.rigs.one_motion import Follower as Follower
 from rigsight.rigs.one_motion import Motion as Motion
 from rigsight.rigs.parts import Coordinate as Coordinate

@@ -92,9 +92,6 @@ ELEMENT = RIGS["element"]
 """A force element on a bench that prescribes the motion."""
 RUNNING_GEAR = RIGS["running_gear"]
 """The running gear of the thesis."""
-assert RUNNING_GEAR.follower is not None
-ROLLING = RUNNING_GEAR.follower
-"""Its lateral displacement, which follows the yaw angle."""
 
 
 _TURNING = {"m": "rad", "N": "N m", "kg": "kg m^2"}
@@ -134,18 +131,3 @@ def is_built_in_motion(rig: Rig) -> bool:
         The rig.
     """
     return any(rig.mechanism == own.mechanism for own in _of_one_motion())
-
-
-def has_built_in_parameters(rig: Rig) -> bool:
-    """Return True if a rig has the equations and the parameters of a built-in one of one motion.
-
-    Parameters
-    ----------
-    rig
-        The rig; from a file it may have the same equations with a known mass among its constants.
-    """
-    names = {parameter.name for parameter in rig.parameters}
-    return any(
-        rig.mechanism == own.mechanism and names == {parameter.name for parameter in own.parameters}
-        for own in _of_one_motion()
-    )

@@ -1,4 +1,4 @@
-"""Value of an expression of a rig's declaration, and its derivatives."""
+"""Value of an expression of a rig's declaration."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 
 _KINKS = {"positive_part": lambda value: max(value, 0.0)}
@@ -49,20 +48,6 @@ def array_function(
     modules = [{"positive_part": lambda value: np.maximum(value, 0.0)}, "numpy"]
     function: Callable[..., Any] = sp.lambdify(symbols, expression, modules, cse=True)
     return function
-
-
-def relative_slopes(expression: sp.Expr, values: Mapping[str, float]) -> dict[str, float]:
-    """Return the relative change of an expression for one of each of its names: its powers, where it is a product.
-
-    Parameters
-    ----------
-    expression, values
-        As for `evaluated`.
-    """
-    return {
-        symbol.name: evaluated(derivative(expression, symbol) * symbol / expression, values)
-        for symbol in sorted(expression.free_symbols, key=str)
-    }
 
 
 @lru_cache(maxsize=1024)

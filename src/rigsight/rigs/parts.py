@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -97,24 +98,15 @@ class Drive:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A place where effects of the sensor act, and a column of a record.
+    """A place where effects of the sensor act, and a column of a record."""
 
-    Attributes
-    ----------
-    name
-        Its name, and that of its reading in control laws.
-    reads
-        What an ideal one shows.
-    unit
-        SI unit.
-    about
-        What it is.
-    """
-
-    name: str
-    reads: sp.Expr
-    unit: str
-    about: str = ""
+    name: str  # also that of its reading in control laws
+    reads: sp.Expr  # what an ideal one shows
+    unit: str  # SI unit
+    about: str = ""  # what it is
+    # Angular frequency beyond which its frequency response is not compared [rad/s]; a habit of those who publish it, so rigs that
+    # differ in nothing else are the same.
+    upper_cut: float = field(default=math.inf, compare=False)
 
 
 @dataclass(frozen=True)

@@ -182,7 +182,14 @@ class Rig:
     def downstream_parameters(self) -> frozenset[str]:
         """Names of the parameters of which the motion knows nothing."""
         motion = self.motion
-        parts = (motion.stiffness, motion.damping, motion.rest, motion.bias, motion.inertia)
+        parts = (
+            motion.stiffness,
+            motion.damping,
+            motion.drive_gain,
+            motion.rest,
+            motion.bias,
+            motion.inertia,
+        )
         own = {symbol.name for part in parts if part is not None for symbol in part.free_symbols}
         return frozenset(parameter.name for parameter in self.parameters if parameter.name not in own)
 

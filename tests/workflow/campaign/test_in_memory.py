@@ -13,7 +13,7 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.records import Record, Role
-from rigsight.rigs import has_built_in_parameters, is_built_in_motion
+from rigsight.rigs import is_built_in_motion
 from rigsight.workflow.campaign.in_memory import make_campaign, make_model
 from rigsight.workflow.campaign.model_file import model_of, read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
@@ -91,7 +91,6 @@ def test_a_record_of_angles_turns_the_axis() -> None:
     assert [p.unit for p in made.rig.parameters] == ["kg m^2", "N m s/rad", "N m/rad", "rad", "N m"]
     np.testing.assert_allclose(made.records[0]["x"], np.radians(given["x"]), rtol=1e-14)
     assert is_built_in_motion(made.rig)
-    assert has_built_in_parameters(made.rig)
 
 
 def test_effects_are_named_or_declared() -> None:

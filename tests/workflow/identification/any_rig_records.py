@@ -13,7 +13,7 @@ from rigsight.records.record import Record, Role
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.campaign.in_memory import make_campaign
-from rigsight.workflow.identification import any_rig
+from rigsight.workflow.identification import rig as identified_rig
 from rigsight.workflow.identify import checked_options, identify_campaign
 
 Floats = NDArray[np.float64]
@@ -65,6 +65,6 @@ def identified(
 ) -> Identification:
     """Identify from start values a fifth beside the truth: how such are found is not the question here."""
     start = {p.name: 1.2 * truth[p.name] for p in rig.parameters}
-    monkeypatch.setattr(any_rig, "linear_start", lambda *_: start)
+    monkeypatch.setattr(identified_rig, "linear_start", lambda *_: start)
     campaign = make_campaign(rig, records, constants=constants)
     return identify_campaign(campaign, checked_options("local_rational", None))

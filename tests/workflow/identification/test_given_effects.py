@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.errors import InputError
 from rigsight.identify.identification import Identification
 from rigsight.records import Record
 from rigsight.workflow.campaign.in_memory import make_campaign, make_model
@@ -111,9 +110,10 @@ def test_the_parameters_of_rig_and_effect_are_found_together(case: Case) -> None
     assert effect_parameters.keys() <= content["records"][0]["parameters"].keys()
 
 
-def test_methods_of_linear_rigs_are_refused() -> None:
-    with pytest.raises(InputError, match="without effects"):
-        identify_campaign(recorded(CASES[0]), checked_options("h1", None))
+def test_effects_take_the_transfer_function_and_leave_the_response() -> None:
+    for record in identify_campaign(recorded(CASES[0]), checked_options("h1", None)).records:
+        assert record.motion.fit is None
+        assert record.motion.measured is None or record.motion.measured.method.startswith("H1")
 
 
 def test_a_campaign_that_starts_at_its_bounds(shared_data: Path) -> None:

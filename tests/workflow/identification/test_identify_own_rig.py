@@ -16,7 +16,7 @@ from rigsight.rigs import RIGS, read_rig_file, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.workflow.campaign.in_memory import make_campaign
 from rigsight.workflow.discover import regression_data
-from rigsight.workflow.identification import any_rig
+from rigsight.workflow.identification import rig as identified_rig
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import checked_options, identify_campaign, run_identify, write_identification
 
@@ -130,17 +130,6 @@ def test_one_mass_with_names_of_its_own_is_identified_from_files(tmp_path: Path)
     assert found.views[0].modes[0].natural_frequency == pytest.approx(np.sqrt(400.0 / 0.8), rel=1e-3)
     page = (tmp_path / "out" / "identification.html").read_text("utf-8")
     assert f"rigsight identify {tmp_path} --method local_polynomial --out {tmp_path / 'out'}" in page
-
-
-def test_an_estimator_for_built_in_rigs_alone_is_refused_with_the_reason() -> None:
-    stage = rig_of_text(STAGE)
-    t = np.linspace(0.0, 1.0, 50)
-    record = Record("one", 0.02, {"current": np.sin(9.0 * t), "scale": np.cos(9.0 * t)}, {})
-    reported = (
-        r"for the rig 'stage' .*h1 and thesis are for built-in rigs of one motion.* is 'h1'.*'local_rational'"
-    )
-    with pytest.raises(InputError, match=reported):
-        identify_campaign(make_campaign(stage, [record]), checked_options("h1", None))
 
 
 @pytest.mark.slow
@@ -269,5 +258,28 @@ def test_given_values_that_diverge_within_a_sample_are_no_start(monkeypatch: pyt
     found = identify_campaign(campaign, options).joint.fit.fit
     assert found.values["leaf"] == pytest.approx(400.0, rel=0.01)
     # Without another start they are all there is: nothing is found, but nothing breaks.
-    monkeypatch.setattr(any_rig, "linear_start", lambda *_: diverging)
+    monkeypatch.setattr(identified_rig, "linear_start", lambda *_: diverging)
     assert identify_campaign(campaign, options).joint.statement
+
+
+def test_a_length_that_was_measured_leaves_the_response_of_what_follows_without_a_form() -> None:
+    text = rig_file_text("running_gear").replace("[parameters.l_0]", "[constants.l_0]")
+    text = text.replace('log = true\nabout = "distance', 'about = "distance')
+    rng, rig = (
+        np.random.default_rng(1),
+        rig_of_text(text.replace('name = "running_gear"', 'name = "measured"')),
+    )
+    values = {
+        "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "l_0": 0.25,
+        "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "psi_off": 0.0, "c_y": 0.98, "y_off": 0.0,
+    }  # fmt: skip
+    record = recorded("one", rig, values, {"u": multisine(rng, 1.0, 60.0)}, rng)
+    constants = {name: values[name] for name in ("v", "r_0", "b", "k_tau", "l_0")}
+    found = identify_campaign(
+        make_campaign(rig, [record], constants=constants), checked_options("local_rational", None)
+    )
+    yaw, lateral = found.records[0].paths
+    assert yaw.fit is not None
+    assert lateral.fit is None
+    assert lateral.measured is not None
+    assert found.joint.fit.fit.values["c_y"] == pytest.approx(0.98, rel=0.01)

@@ -4,7 +4,7 @@ delta_0 enters the equations of the rig only in the product v c_y, with ``c_y = 
 2.12). So in every record, for any input, the sensitivity to delta_0 is the sensitivity to ln c_y times ``(dc_y/dd) / c_y``, and
 the Cramer-Rao bound of delta_0 is that of c_y over ``|dc_y/dd|``, about 0.7 on this rig: an error of 1 % of c_y, of the speed v,
 or of the ratio of the two sensors' scales causes one of 0.014 rad. No record or static relation avoids this; only the accuracy
-of c_y can be improved, see `creep_error_of_sine` and `lateral_parameters` with a known l_0.
+of c_y can be improved, by a sine at the break frequency or a known l_0 (`experiments/thesis/thesis_formulas.py`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from scipy.stats import norm
 
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
-from rigsight.identify.transfer.running_gear_parameters import LEVEL
-from rigsight.rigs import ROLLING, evaluated
+from rigsight.identify.fit.covariance import LEVEL
+from rigsight.rigs import evaluated
 from rigsight.rigs.built_in import RUNNING_GEAR
 
 (_CREEP_FACTOR,) = (a.value for a in RUNNING_GEAR.alternatives if a.parameter.name == "delta_0")
@@ -140,39 +140,6 @@ def estimate_conicity(
             " It differs from zero, but its interval is wider than the range of plausible conicities."
         )
     return ConicityEstimate(value, unbounded, error, interval, level, reached, statement)
-
-
-def creep_error_of_sine(
-    omega: float,
-    psi_amplitude: float,
-    y_noise: float,
-    n_samples: int,
-    l_0: float,
-    omega_b: float,
-) -> tuple[float, float]:
-    """Return the smallest possible relative standard errors of l_0 and of c_y from a sine record.
-
-    Cramer-Rao bound for white noise on y and an exact psi. With ``G = 2 l_0 omega_b / (s + omega_b)`` and
-    ``omega_b = v c_y / (2 l_0)``: ``dG/d ln c_y = 2 l_0 omega_b s / (s + omega_b)^2`` and
-    ``dG/d ln l_0 = 2 l_0 omega_b^2 / (s + omega_b)^2``. They are 90 degrees apart at every frequency, so l_0 and c_y are
-    independent in every sine record, and the first is largest at the break frequency, which is best for c_y.
-
-    Parameters
-    ----------
-    omega
-        Angular frequency of the sine [rad/s].
-    psi_amplitude
-        Amplitude of the yaw angle [rad].
-    y_noise
-        Standard deviation of the noise of y [m].
-    n_samples
-        Number of samples of the record, which has whole periods.
-    l_0, omega_b
-        Distance [m] and break frequency [rad/s].
-    """
-    common = evaluated(ROLLING.static_gain, {"l_0": l_0}) * omega_b / (omega**2 + omega_b**2)
-    per_sine = y_noise * math.sqrt(2.0 / n_samples) / psi_amplitude
-    return per_sine / (common * omega_b), per_sine / (common * omega)
 
 
 def _bounded(c_y: float, largest: float, r_0: float, b: float) -> float:

@@ -20,9 +20,7 @@ from rigsight.frequency import (
     thesis_response,
 )
 from rigsight.frequency.signal_pair import excited, line_frequencies
-from rigsight.identify.transfer.relative_fit import fit_with_relative_error
-from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.identify.transfer.transfer_form import Order
+from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
 from rigsight.records.record import Hold, Record
 from rigsight.records.signals import mean_period
@@ -43,7 +41,7 @@ _PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thes
 _CLEAR = 100.0
 """Power over variance (20 dB) above which a local model of a noisy response can be trusted."""
 _MOSTLY, _LEAST_SHARE = 0.8, 0.05
-_THESIS_CUTS = {"pt2": 80.0, "pt1": 30.0}
+_SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))
 _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 
 
@@ -87,8 +85,9 @@ def record_response(
     instrument: str | None = None,
     drive: str | None = None,
     moves_freely: bool = False,
+    upper_cut: float = math.inf,
 ) -> RecordResponse:
-    """Return the frequency response of one record."""
+    """Return the frequency response of one record; only the method of the thesis reads its cut."""
     check_option("The method", method, METHODS)
     drive, unused = drive or source, ""
     if instrument is not None and method not in _BAND_LINES:
@@ -97,7 +96,8 @@ def record_response(
     plain, fit = None, None
     if method == "thesis":
         periodic, note = _mean_period(record, drive)
-        found, width, shared = _noted(_thesis(periodic, source, response, order), note), _line(periodic), 1.0
+        whole = _thesis(periodic, source, response, order, upper_cut)
+        found, width, shared = _noted(whole, note), _line(periodic), 1.0
     elif method == "h1":
         width = resolution or _SEGMENTS * _line(record)
         found, shared = averaged_response(record, source, response, width, hold=hold), _HANN_LINES
@@ -192,6 +192,26 @@ class _Local:
         )
 
 
+def fit_with_relative_error(
+    response: FrequencyResponse, order: Order, magnitude_only: bool
+) -> tuple[TransferFit, float]:
+    """Return a fit and the relative error, the same for every line, with which the form explains the response.
+
+    With the variances of the noise alone, the few most certain lines would dominate, wherever they are.
+    """
+    assert response.variance is not None
+    for share in _SHARES:
+        variance = response.variance + (share * response.magnitude) ** 2
+        fit = fit_frequency_response(
+            replace(response, variance=variance, noise_shares=None, noise_lines=None),
+            order,
+            magnitude_only=magnitude_only,
+        )
+        if fit.misfit <= 1.0:
+            break
+    return fit, share
+
+
 def _noted(found: FrequencyResponse, note: str) -> FrequencyResponse:
     return replace(found, method=f"{found.method}, {note}") if note else found
 
@@ -212,14 +232,13 @@ def _coherence(record: Record, source: str, response: str, hold: Hold) -> Freque
         return None
 
 
-def _thesis(record: Record, source: str, response: str, order: Order) -> FrequencyResponse:
+def _thesis(record: Record, source: str, response: str, order: Order, upper_cut: float) -> FrequencyResponse:
     omega = line_frequencies(record.n_samples, record.dt)
     power = np.abs(np.fft.rfft(record[source] - np.mean(record[source]))[1 : omega.size + 1]) ** 2
     width = min(15, power.size)
     smooth = np.convolve(power, np.full(width, 1.0 / width), mode="same")
     heard = omega[excited(omega, smooth, None, f"Record '{record.name}': the source '{source}'")]
-    # The cuts are those of the thesis's rig, whose resonance is near 12 rad/s.
-    upper = min(_THESIS_CUTS[order], float(heard[-1]))
+    upper = min(upper_cut, float(heard[-1]))
     return thesis_response(record, source, response, _THESIS_DROPS[order], upper, float(heard[0]))
 
 

@@ -1,4 +1,4 @@
-"""Response of a PT1 or a PT2 with dead time: over frequency with derivatives, and over time.
+"""Response of a PT1 or a PT2 with dead time: over frequency, with derivatives, and its fit.
 
 ``G(s) = k e^(-s T) / (1 + s / omega_b)`` (PT1, thesis equation 2.7) and
 ``G(s) = k e^(-s T) omega_b^2 / (s^2 + 2 zeta omega_b s + omega_b^2)`` (PT2, thesis equation 2.9).
@@ -6,14 +6,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.signal import lfilter
 
+from rigsight.errors import InputError
 from rigsight.records.record import Hold
 
 Order = Literal["pt1", "pt2"]
@@ -99,34 +99,11 @@ class TransferForm:
         return np.column_stack(columns)
 
     def sampled_response(
-        self, n_samples: int, dt: float, hold: Hold, theta: NDArray[np.float64]
+        self, omega: NDArray[np.float64], dt: float, hold: Hold, theta: NDArray[np.float64]
     ) -> NDArray[np.complex128]:
-        """Return the response of samples to those of a held input at each line of a record, shape (n_samples // 2 + 1,).
+        """Return the ratio of samples to those of a held input, shape (n_frequencies,).
 
-        Exact like `over_time`. What a slow form still does after the end of the record is a free motion.
-        """
-        pulse = np.zeros(n_samples)
-        pulse[1] = 1.0
-        turn = np.exp(2j * np.pi * np.fft.rfftfreq(n_samples))
-        return np.asarray(np.fft.rfft(self.over_time(pulse, dt, hold, theta)) * turn)
-
-    def over_time(
-        self, u: NDArray[np.float64], dt: float, hold: Hold, theta: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return the response from rest to an input that is zero up to its first sample, shape (n_samples,).
-
-        Exact for ``"zoh"`` and ``"foh"``, also for a dead time between two samples; ``"band_limited"`` is treated as ``"foh"``.
-
-        Parameters
-        ----------
-        u
-            Samples of the input, the first one zero, shape (n_samples,).
-        dt
-            Sample time [s].
-        hold
-            Hold of the input between samples.
-        theta
-            Parameters, shape (n_parameters,).
+        Exact for ``"zoh"`` and ``"foh"`` but for free motions, also for a dead time between two samples.
         """
         gain, omega_b, zeta, dead_time = self._split(theta)
         if self.order == "pt1":
@@ -135,16 +112,126 @@ class TransferForm:
             a = np.array([[0.0, 1.0], [-(omega_b**2), -2.0 * zeta * omega_b]])
             b = np.array([0.0, omega_b**2])
         phi, constant, ramp = _transition(a, b, dt)
-        later = np.zeros_like(ramp) if hold == "zoh" else ramp / dt
-        states = _states(phi, constant - later, later, u)
+        z = np.exp(1j * omega * dt)[:, None]
+        # Slope of the input after a sample over this sample.
+        rise = np.zeros_like(z) if hold == "zoh" else (z - 1.0) / dt
+        shifted = z[:, :, None] * np.eye(b.size) - phi
+        states = np.linalg.solve(shifted, (constant + ramp * rise)[:, :, None])[:, :, 0]
         # The response at t - T is between two samples: one exact step from the sample before it.
         whole = int(np.floor(dead_time / dt))
         phi, constant, ramp = _transition(a, b, dt - (dead_time - whole * dt))
-        rise = np.zeros_like(u) if hold == "zoh" else np.append(np.diff(u), 0.0) / dt
-        ahead = states @ phi[0] + constant[0] * u + ramp[0] * rise
-        answer = np.zeros_like(u)
-        answer[whole + 1 :] = ahead[: max(u.size - whole - 1, 0)]
-        return np.asarray(gain * answer)
+        ahead = states @ phi[0] + constant[0] + ramp[0] * rise[:, 0]
+        return np.asarray(gain * ahead * z[:, 0] ** -(whole + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class TransferFit:
+    """A PT1 or PT2 with its uncertainty.
+
+    Attributes
+    ----------
+    form
+        Order, and whether a dead time was fitted.
+    names
+        ``gain`` [unit], ``omega_b`` [rad/s], ``zeta`` (PT2), ``dead_time`` [s] (if fitted), ``offset`` (from steps: the response
+        at rest, in its unit).
+    values, standard_errors
+        By name; an error is infinite if the data do not determine the parameter.
+    covariance
+        In the order of `names`, shape (n_parameters, n_parameters).
+    residuals
+        Measured minus fitted, not weighted: complex or magnitudes per line, or samples, shape (n_data,).
+    misfit
+        RMS of the residuals in units of their expected size; about 1 if noise explains them, NaN if there are no variances.
+    success, message
+        Whether the fit can be used, and notes on it.
+    source, response, unit
+        The signals, and the unit of the gain.
+    method
+        Name of the method.
+    records
+        Names of the fitted records.
+    free_motion, free_motion_covariance
+        Weights of the free motions fitted to a `PlainRatio`, shape (n_motions,), and their covariance; empty for other data.
+    """
+
+    form: TransferForm
+    names: tuple[str, ...]
+    values: dict[str, float]
+    standard_errors: dict[str, float]
+    covariance: NDArray[np.float64]
+    residuals: NDArray[np.float64] | NDArray[np.complex128]
+    misfit: float
+    success: bool
+    message: str
+    source: str
+    response: str
+    unit: str
+    method: str
+    records: tuple[str, ...] = ()
+    free_motion: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    free_motion_covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def residual_rms(self) -> float:
+        """RMS of the residuals, in the unit of the fitted quantity."""
+        return float(np.sqrt(np.mean(np.abs(self.residuals) ** 2)))
+
+    def covariance_of(self, *names: str) -> NDArray[np.float64]:
+        """Return the covariance of some parameters in the order given, shape (n, n)."""
+        rows = [self.names.index(name) for name in names]
+        return self.covariance[np.ix_(rows, rows)]
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """Parameters as a vector of the form, shape (n_parameters,)."""
+        theta = self.form.vector(
+            self.values["omega_b"], self.values.get("zeta", 1.0), self.values.get("dead_time", 0.0)
+        )
+        theta[0] = self.values["gain"]
+        return theta
+
+    def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return G(j omega) of the fit, dead time included, shape (n_frequencies,)."""
+        return self.form.response(omega, self.theta)
+
+    def standard_error_at(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the standard error ``sqrt(E |G - truth|^2)`` of G(j omega) by the delta method, shape (n_frequencies,)."""
+        theta = self.theta
+        _, chain = self.form.natural(theta)
+        slopes = self.form.derivatives(omega, theta) / chain
+        own = self.covariance_of(*self.form.names)
+        return np.asarray(np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", slopes.conj(), own, slopes).real, 0.0)))
+
+    def to_control(self, pade_order: int | None = None) -> Any:
+        """Return the fit as a ``control.TransferFunction``.
+
+        Parameters
+        ----------
+        pade_order
+            Order of the Pade approximation of the dead time. None returns the rational part alone, because a rational transfer
+            function cannot represent a dead time exactly.
+
+        Raises
+        ------
+        InputError
+            If the order is below 1, or if it is given although no dead time was fitted.
+        """
+        import control
+
+        gain, omega_b = self.values["gain"], self.values["omega_b"]
+        if self.form.order == "pt1":
+            rational = control.tf([gain * omega_b], [1.0, omega_b])
+        else:
+            rational = control.tf([gain * omega_b**2], [1.0, 2.0 * self.values["zeta"] * omega_b, omega_b**2])
+        if pade_order is None:
+            return rational
+        if pade_order < 1 or not self.form.with_dead_time:
+            raise InputError(
+                f"A Pade approximation of order {pade_order} needs an order of at least 1 and a fit with dead time. Omit "
+                f"pade_order to get the rational part."
+            )
+        return rational * control.tf(*control.pade(self.values["dead_time"], pade_order))
 
 
 def _transition(
@@ -158,16 +245,3 @@ def _transition(
     augmented[n, n + 1] = 1.0
     moved = expm(augmented * time)
     return moved[:n, :n], moved[:n, n], moved[:n, n + 1]
-
-
-def _states(
-    phi: NDArray[np.float64], now: NDArray[np.float64], later: NDArray[np.float64], u: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Solve ``x[i+1] = phi x[i] + now u[i] + later u[i+1]`` from rest, shape (n_samples, n_states)."""
-    if now.size == 1:
-        return np.asarray(lfilter([later[0], now[0]], [1.0, -phi[0, 0]], u))[:, None]
-    trace = float(np.trace(phi))
-    adjugate = phi - trace * np.eye(2)
-    numerators = np.array([later, now + adjugate @ later, adjugate @ now])
-    denominator = [1.0, -trace, float(np.linalg.det(phi))]
-    return np.column_stack([lfilter(numerators[:, i], denominator, u) for i in range(2)])

@@ -20,8 +20,7 @@ from scipy.optimize import least_squares
 from rigsight.errors import InputError, check_option
 from rigsight.frequency import FrequencyResponse, PlainRatio, hold_response
 from rigsight.identify.fit.covariance import propagated_covariance, sandwich_covariance
-from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.identify.transfer.transfer_form import Order, TransferForm
+from rigsight.identify.transfer.transfer_form import Order, TransferFit, TransferForm
 from rigsight.identify.undetermined import POORLY_KNOWN
 
 Weighting = Literal["variance", "uniform", "relative"]
@@ -133,8 +132,7 @@ class _Problem:
         ratio = self.measured
         if not isinstance(ratio, PlainRatio) or ratio.hold == "band_limited":
             return self.form.response(self.omega, theta)
-        lines = np.round(self.omega * ratio.n_samples * ratio.dt / (2.0 * np.pi)).astype(np.intp)
-        sampled = self.form.sampled_response(ratio.n_samples, ratio.dt, ratio.hold, theta)[lines]
+        sampled = self.form.sampled_response(self.omega, ratio.dt, ratio.hold, theta)
         return np.asarray(sampled / hold_response(self.omega, ratio.dt, ratio.hold))
 
     def errors(self, theta: NDArray[np.float64]) -> NDArray[np.complex128] | NDArray[np.float64]:

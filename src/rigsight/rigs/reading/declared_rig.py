@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import sympy as sp
@@ -85,7 +86,7 @@ def _mechanism(declaration: Declaration, order: list[Path]) -> Mechanism:
             for name, own in table.drives.items()
         ),
         sensors=tuple(
-            Sensor(name, sympy(("sensors", name, "reads")), own.unit, own.about)
+            Sensor(name, sympy(("sensors", name, "reads")), own.unit, own.about, own.upper_cut or math.inf)
             for name, own in table.sensors.items()
         ),
         states=tuple(

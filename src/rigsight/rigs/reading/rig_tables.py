@@ -77,6 +77,7 @@ class _SensorTable(_Table):
     reads: Formula
     unit: Text
     about: Text = ""
+    upper_cut: Annotated[Number, Field(gt=0.0)] | None = None
 
 
 class _StateTable(_Table):

@@ -37,7 +37,8 @@ _FORMS = {"pt1": "PT1", "pt2": "PT2"}
 def identification_figures(identification: Identification) -> dict[str, tuple[str, str]]:
     """Return file name -> what the figure shows, and the figure as SVG."""
     found: dict[str, tuple[str, str]] = {}
-    for number, view in enumerate(identification.views, 1):
+    by_record = _is_by_record(identification)
+    for number, view in enumerate(() if by_record else identification.views, 1):
         if view.measured is not None:
             file = RESPONSES_FILE if number == 1 else f"responses_{number}.svg"
             what = (
@@ -47,13 +48,13 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
                 f"{what}{_of_constants(view)}",
                 svg_text(view_figure(view, identification.units), file),
             )
-    for record in () if identification.views else identification.records:
+    for record in identification.records if by_record else ():
         drawing = bode_figure(record, identification)
         if drawing is not None:
             file = _free_name(f"bode_{_plain(record.record.name)}", found)
             what = f"Bode plot of record '{record.record.name}', measured against fitted, 95 % bands"
             found[file] = (what, svg_text(drawing, file))
-    drawing = None if identification.views else responses_figure(identification)
+    drawing = responses_figure(identification) if by_record else None
     if drawing is not None:
         what = "Magnitudes of all records in one plot, measured and fitted (as Figures 5.6 and 5.7 of the thesis)"
         found[RESPONSES_FILE] = (what, svg_text(drawing, RESPONSES_FILE))
@@ -64,9 +65,17 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
     return found
 
 
+def _is_by_record(identification: Identification) -> bool:
+    """Return True if records have curves of their own (PT2 and PT1, or a dynamic stiffness), or only measured ones."""
+    paths = [path for record in identification.records for path in record.paths]
+    common = any(view.measured is not None for view in identification.views)
+    return not common or any(fitted_curve(path) is not None for path in paths)
+
+
 def bode_figure(record: RecordIdentification, identification: Identification) -> Figure | None:
     """Return the Bode plot of one record, measured against fitted; None where it has no frequency response."""
-    if identification.identifiability is not None:
+    chained = {path.source for path in record.paths} & {path.response for path in record.paths}
+    if not (_is_by_record(identification) or chained):
         measured = {(path.source, path.response): path for path in record.paths}
         return _grid(measured, {}, identification.units) if measured else None
     panels = _panels(record, identification)
@@ -78,9 +87,9 @@ def responses_figure(identification: Identification) -> Figure | None:
 
     Of a rig of several inputs or sensors it is the grid of their responses, all records together.
     """
-    if identification.identifiability is not None:
+    if not _is_by_record(identification):
         views = [view for view in identification.views if view.measured is not None]
-        return view_figure(views[0], identification.units) if views else None
+        return view_figure(views[0], identification.units)
     columns = _columns(identification)
     return overlaid_responses(columns) if columns else None
 
@@ -193,6 +202,8 @@ def fitted_curve(path: PathIdentification) -> FittedCurve | None:
         return None
     omega = np.geomspace(measured.omega[0], measured.omega[-1], _GRID)
     if fit is None:
+        if not {"k", "d"} <= physical.values.keys():
+            return None
         # The dynamic stiffness of an element.
         values = physical.values["k"] + 1j * omega * physical.values["d"]
         errors = physical.standard_errors

@@ -71,7 +71,7 @@ def with_hysteresis(
 ) -> Identification:
     """Calibrate a structure to the records of an identification, beginning at its joint fit."""
     joint = identification.joint
-    fitted = [record for record in campaign.estimation if record.name not in joint.left_out]
+    fitted = campaign.estimation
     outputs = [s.name for s in structure.rig.outputs if all(s.name in record for record in fitted)]
     free = _free(structure, identification, campaign, outputs)
     prepare_kernels([structure, special_structure(structure, free)[0]], n_jobs, listener)

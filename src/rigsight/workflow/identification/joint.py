@@ -10,80 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
-from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
 from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.fit.windows import cut
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
-from rigsight.identify.information import ReachedBound, information, reached_bounds
 from rigsight.identify.joint import JointFit
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.signals import roughness
 from rigsight.report.quantities import gap_percent
 from rigsight.report.wording import sentence_case
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Structure
 
 _DIFFERENT = 0.01
 """Probability of equally large differences by chance, below which the records do not have a common parameter set."""
 _SMALL_LOSS = 0.01
-UNSERVED = 0.9
+_UNSERVED = 0.9
 """NRMSE from which a fit does not follow a motion at all."""
-_LATERAL = ("l_0", "c_y")
 _ORIGIN = attrgetter("origin")
 _BELOW = 1e-6
 
 
-def identify_jointly(campaign: Campaign, found: Sequence[RecordIdentification]) -> JointIdentification:
-    """Fit one set to all estimation records that show the motion, and one to each alone; score every record."""
-    records = [r.record for r in found if not r.motion.problem]
-    if not records:
-        reasons = "\n".join(f"- {r.record.name}: {r.motion.problem}" for r in found)
-        raise InputError(
-            f"No estimation record shows the motion of the rig, so nothing can be identified.\n{reasons}"
-        )
-    structure = compose(campaign.rig)
-    known = held_parameters(campaign, records)
-    fit = fit_jointly(
-        structure, records, campaign.constants, known=known, start=_start(found, known), group_of=_ORIGIN
-    )
-    pooled = _pooled(found) if fit.probability < _DIFFERENT and not known.keys() & _LATERAL else None
-    if pooled is not None:
-        fit = fit_jointly(
-            structure,
-            records,
-            campaign.constants,
-            known={**known, **pooled.values},
-            start=fit.fit.values,
-            output_noise=fit.noise,
-            group_of=_ORIGIN,
-        )
-    amplitudes = {r.record.name: r.amplitude for r in found}
-    scores = (
-        *_estimation_scores(fit, records, amplitudes),
-        *(_validation_score(fit, record, campaign, None) for record in campaign.validation),
-    )
-    errors = {**fit.fit.standard_errors, **(pooled.standard_errors if pooled else {})}
-    conicity = None
-    if "c_y" in errors:
-        conicity = estimate_conicity(
-            fit.fit.values["c_y"], errors["c_y"], campaign.constants["r_0"], campaign.constants["b"]
-        )
-    names = {record.name for record in records}
-    return JointIdentification(
-        fit=fit,
-        names=fit.fit.free,
-        pooled=pooled,
-        statement=_statement(fit, scores, records),
-        conicity=conicity,
-        scores=scores,
-        left_out=tuple(r.record.name for r in found if r.record.name not in names),
-    )
-
-
-def fit_any_rig_jointly(
+def identify_jointly(
     campaign: Campaign,
     structure: Structure,
     found: Sequence[RecordIdentification],
@@ -91,79 +41,69 @@ def fit_any_rig_jointly(
     known: Mapping[str, float],
     length: float | None,
 ) -> JointIdentification:
-    """Fit one set of parameters to all estimation records of a rig of any shape, and one to each; score every record."""
+    """Fit one set of parameters to all estimation records, and one to each; score every record."""
     records = [r.record for r in found]
     windows = cut(records, length)
     fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=_ORIGIN)
+    pooled = _pooled(found, known) if fit.probability < _DIFFERENT else None
+    if pooled is not None:
+        held, noise, values = {**known, **pooled.values}, fit.noise, fit.fit.values
+        fit = fit_jointly(structure, windows, campaign.constants, held, values, noise, group_of=_ORIGIN)
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
         *_estimation_scores(fit, windows, amplitudes),
         *(_validation_score(fit, record, campaign, length) for record in campaign.validation),
     )
+    errors = {**fit.fit.standard_errors, **({} if pooled is None else pooled.standard_errors)}
+    conicity, constants = None, campaign.constants
+    if "c_y" in errors and {"r_0", "b"} <= constants.keys():
+        conicity = estimate_conicity(fit.fit.values["c_y"], errors["c_y"], constants["r_0"], constants["b"])
     return JointIdentification(
         fit=fit,
         names=fit.fit.free,
-        pooled=None,
+        pooled=pooled,
         statement=_statement(fit, scores, records),
-        conicity=None,
+        conicity=conicity,
         scores=scores,
-        left_out=(),
     )
 
 
-def bounds_of(joint: JointFit, records: Sequence[Record]) -> tuple[ReachedBound, ...]:
-    """Return the parameters of a fit of whole records that stand at a bound which the records ask them to pass."""
-    fit = joint.fit
-    if not (math.isfinite(fit.cost) and fit.residuals):
-        return ()
-    scales = characteristic_scales(fit.structure.rig, records, fit.values)
-    known = information(GreyBoxFit(fit.structure, records, scales, joint.noise), fit)
-    return reached_bounds(known, fit.standard_errors)
+def _pooled(found: Sequence[RecordIdentification], known: Mapping[str, float]) -> PhysicalEstimates | None:
+    """Return the mean of the records' own parameters of what follows the motion, weighted by inverse variances.
 
-
-def _pooled(found: Sequence[RecordIdentification]) -> PhysicalEstimates | None:
-    """Return the mean of the records' own lateral parameters, weighted by inverse variances; None where there are none."""
+    None if no record shows them, or if they are held.
+    """
     own = [path.physical for r in found for path in r.paths[1:] if path.physical is not None]
-    if not own:
+    if not own or known.keys() & set(own[0].names):
         return None
     values, errors = {}, []
-    for name in _LATERAL:
+    for name in own[0].names:
         estimates = np.array([[p.values[name], p.standard_errors[name]] for p in own])
         weights = estimates[:, 1] ** -2.0
         values[name] = float(weights @ estimates[:, 0] / weights.sum())
         scatter = float(np.sum(weights * (estimates[:, 0] - values[name]) ** 2)) / max(len(own) - 1, 1)
         errors.append(math.sqrt(max(scatter, 1.0) / weights.sum()))
-    return PhysicalEstimates(
-        _LATERAL,
-        values,
-        np.diag(np.square(errors)),
-        "mean over the records, with the measured psi as input",
-    )
-
-
-def _start(found: Sequence[RecordIdentification], known: Mapping[str, float]) -> dict[str, float]:
-    """Return the median of the values of the single records."""
-    names = {name for r in found if not r.motion.problem for name in r.estimates} - set(known)
-    return {
-        name: float(np.median([r.estimates[name][0] for r in found if name in r.estimates])) for name in names
-    }
+    method = "mean over the records, with the measured motion as input"
+    return PhysicalEstimates(own[0].names, values, np.diag(np.square(errors)), method, own[0].positive)
 
 
 def held_parameters(campaign: Campaign, records: Sequence[Record]) -> dict[str, float]:
     """Return values for parameters that these records do not determine: no spring, outputs that were not measured."""
     rig = campaign.rig
-    known: dict[str, float] = {}
-    names = {parameter.name for parameter in rig.parameters}
+    if not rig.has_one_motion:
+        return {}
+    own, known = {p.name: p for p in rig.parameters}, dict[str, float]()
+    resting = {str(symbol) for symbol in rig.motion.rest.free_symbols} & own.keys()
     if campaign.absent_spring is not None:
-        known |= {campaign.absent_spring: 0.0} | {str(s): 0.0 for s in rig.motion.rest.free_symbols}
-    elif rig.is_driven and "force_off" in names:
+        known |= {campaign.absent_spring: 0.0} | dict.fromkeys(resting, 0.0)
+    elif rig.is_driven and resting:
         # With a linear spring, a constant force and a shifted rest position cannot be distinguished.
-        known["force_off"] = 0.0
-    if rig.downstream and not any(symbol.name in r for symbol in rig.downstream for r in records):
-        placeholders = {"l_0": 1.0, "c_y": 1.0, "y_off": 0.0}
-        known |= {
-            name: campaign.parameters.get(name, placeholders[name]) for name in rig.downstream_parameters
-        }
+        known |= {str(symbol): 0.0 for symbol in rig.motion.bias.free_symbols if str(symbol) in own}
+    following = [s.name for s in rig.mechanism.sensors if s.reads.free_symbols & rig.downstream.keys()]
+    if rig.downstream and not any(name in record for name in following for record in records):
+        for name in rig.downstream_parameters:
+            default = own[name].default
+            known[name] = campaign.given.get(name, 1.0 if default is None else default)
     return known
 
 
@@ -218,7 +158,7 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
 
 def _moves(samples: NDArray[np.float64]) -> bool:
     """Return True if a fit that leaves no more than the noise of an output would follow it: at rest there is only noise."""
-    return roughness(samples) < UNSERVED * float(np.std(samples))
+    return roughness(samples) < _UNSERVED * float(np.std(samples))
 
 
 def _leaves_motion(relative: float, samples: NDArray[np.float64]) -> bool:
@@ -242,7 +182,7 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
         for score in scores
         if score.role == "estimation"
         for name in score.nrmse
-        if not score.nrmse[name] < UNSERVED and _moves(by_name[score.record][name])
+        if not score.nrmse[name] < _UNSERVED and _moves(by_name[score.record][name])
     ]
     if fit.probability >= _DIFFERENT and unserved:
         return (

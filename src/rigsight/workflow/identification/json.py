@@ -9,6 +9,7 @@ from scipy.stats import norm
 
 from rigsight.frequency import FrequencyResponse
 from rigsight.frequency.signal_pair import ratio_unit
+from rigsight.identify.fit.covariance import LEVEL
 from rigsight.identify.hysteresis.derived import Derived
 from rigsight.identify.identifiability import Identifiability
 from rigsight.identify.identification import (
@@ -20,8 +21,8 @@ from rigsight.identify.identification import (
 )
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.transfer.conicity import ConicityEstimate
-from rigsight.identify.transfer.running_gear_parameters import LEVEL, PhysicalEstimates
-from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
+from rigsight.identify.transfer.transfer_form import TransferFit
 from rigsight.json_data import json_data
 
 SCHEMA_VERSION = 1
@@ -51,7 +52,7 @@ def identification_json(identification: Identification, figures: Mapping[str, st
         ],
         "records": [_record(record, units) for record in identification.records],
     }
-    # Rigs of one motion with transfer functions of their own have neither.
+    # A fit that failed determines nothing.
     if identification.identifiability is not None:
         content["identifiability"] = _identifiability(identification.identifiability)
         content["linear"] = [_view(view, units) for view in identification.views]
@@ -147,7 +148,8 @@ def _joint(identification: Identification, units: Mapping[str, str]) -> dict[str
         "probability": fit.probability,
         "success": fit.fit.success,
         "message": fit.fit.message,
-        "left_out": joint.left_out,
+        # Every estimation record is fitted; the key is that of older files.
+        "left_out": [],
         "parameters": {
             name: {
                 "value": fit.fit.values[name],

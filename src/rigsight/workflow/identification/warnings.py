@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,10 +14,8 @@ from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.fit.windows import cut
 from rigsight.identify.identification import JointIdentification, RecordIdentification
 from rigsight.identify.linear_view import LinearView
-from rigsight.identify.transfer.record_response import driven_band
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.records import Record
-from rigsight.rigs import evaluated
 
 _TOLERANCE = 0.02
 """Relative tolerance with which an amplitude counts as inside the identified range."""
@@ -32,73 +29,27 @@ _NOT_OF_ANY_RIG = (
 )
 
 
-def out_of_band(
-    found: RecordIdentification, campaign: Campaign, joint: JointIdentification
-) -> RecordIdentification:
-    """Report if a record could not be identified because it does not excite the resonance that the other records show."""
-    motion = found.motion
-    omega_0 = _resonance(campaign, joint)
-    if not motion.problem or motion.measured is None or omega_0 is None:
-        return found
-    low, high = driven_band(found.record, motion.source)
-    if low <= omega_0 <= high:
-        return found
-    reported = (
-        f"this record excites '{motion.source}' from {low:.3g} to {high:.3g} rad/s, but the other records show a resonance at "
-        f"{omega_0:.3g} rad/s. Measure again with excitation there."
-    )
-    path = replace(motion, problem=reported)
-    rest = tuple(text for text in found.warnings if motion.problem not in text)
-    return replace(
-        found,
-        paths=(path, *found.paths[1:]),
-        warnings=(f"{motion.source} -> {motion.response}: {reported}", *rest),
-    )
-
-
-def _resonance(campaign: Campaign, joint: JointIdentification) -> float | None:
-    motion, values = campaign.rig.motion, joint.fit.fit.values
-    if motion.inertia is None:
-        return None
-    stiffness, inertia = (evaluated(part, values) for part in (motion.stiffness, motion.inertia))
-    return math.sqrt(stiffness / inertia) if stiffness > 0.0 else None
-
-
-def campaign_warnings(
+def identification_warnings(
     campaign: Campaign,
     found: Sequence[RecordIdentification],
+    views: Sequence[LinearView],
     joint: JointIdentification,
 ) -> list[str]:
-    """Return the notes of the records, of their identifications and of the joint fit, a sentence each."""
+    """Return the notes on records, responses, poles and fit, a sentence each."""
+    rig = campaign.rig
     reported = list(campaign.notes)
     reported += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
-    reported += closed_loop_notes(campaign.records, campaign.rig, _OF_EACH_RECORD)
+    used = _OF_EACH_RECORD if rig.has_one_motion else _NOT_OF_ANY_RIG
+    reported += closed_loop_notes(campaign.records, rig, used)
     reported += [f"Record '{r.record.name}': {text}" for r in found for text in r.warnings]
-    reported += _not_the_whole(found)
-    reported += [f"Record '{name}' was left out of the joint fit." for name in joint.left_out]
-    if joint.pooled is None and campaign.rig.downstream and "c_y" not in joint.names:
-        missing = ", ".join(symbol.name for symbol in campaign.rig.downstream)
-        names = ", ".join(
-            p.name for p in campaign.rig.parameters if p.name in campaign.rig.downstream_parameters
-        )
-        reported.append(
-            f"No estimation record has {missing}: {names} in the model are given or "
-            "placeholders, not identified."
-        )
-    if not joint.fit.fit.success:
-        reported.append(joint.statement)
-    return reported
-
-
-def any_rig_warnings(
-    campaign: Campaign, views: Sequence[LinearView], joint: JointIdentification
-) -> list[str]:
-    """Return the notes on records, responses, poles and fit of a general rig, a sentence each."""
-    reported = list(campaign.notes)
-    reported += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
-    reported += closed_loop_notes(campaign.records, campaign.rig, _NOT_OF_ANY_RIG)
     for view in views:
-        reported += _of_view(view, [effect.name for effect in campaign.modelled])
+        reported += _of_view(view, campaign)
+    names = [p.name for p in rig.parameters if rig.has_one_motion and p.name in rig.downstream_parameters]
+    if rig.downstream and joint.pooled is None and names and not set(names) & set(joint.names):
+        missing = ", ".join(symbol.name for symbol in rig.downstream)
+        reported.append(
+            f"No estimation record has {missing}: {', '.join(names)} in the model are given or placeholders, not identified."
+        )
     if not joint.fit.fit.success:
         reported.append(joint.statement)
     return list(dict.fromkeys(reported))
@@ -109,7 +60,7 @@ def offsets_of_records(
 ) -> list[str]:
     """Return the sensor offsets that were estimated in each record, or a hint that they should be estimated."""
     fit, rig = joint.fit.fit, campaign.rig
-    fitted = cut([r for r in campaign.estimation if r.name not in joint.left_out], length)
+    fitted = cut(campaign.estimation, length)
     units = {signal.name: signal.unit for signal in rig.outputs}
     names = [record.origin for record in fitted]
     if not fit.offset_names:
@@ -133,8 +84,8 @@ def offsets_of_records(
     return reported
 
 
-def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
-    reported = []
+def _of_view(view: LinearView, campaign: Campaign) -> list[str]:
+    reported, effects = [], [effect.name for effect in campaign.modelled]
     where = (
         f" ({', '.join(f'{name} = {value:g}' for name, value in view.constants.items())})"
         if view.constants
@@ -154,10 +105,12 @@ def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
         return reported
     # The transient of a rig that does not return to rest does not decay within a record: its responses are no evidence.
     returns = near_rest.stability == "stable"
-    reported += [
-        f"{source} -> {response}{where}: {problem}"
-        for (source, response), problem in view.measured.problems.items()
-    ]
+    if not campaign.rig.has_one_motion:
+        # The responses along one motion are read, and their problems told, record by record.
+        reported += [
+            f"{source} -> {response}{where}: {problem}"
+            for (source, response), problem in view.measured.problems.items()
+        ]
     off = {pair: view.misfit(*pair) for pair in view.measured.found}
     beside = [
         f"{source} -> {response} ({off[source, response]:.2g})"
@@ -178,30 +131,9 @@ def _of_view(view: LinearView, effects: Sequence[str]) -> list[str]:
     return reported
 
 
-def _not_the_whole(found: Sequence[RecordIdentification]) -> list[str]:
-    """Report the paths on which the residual of the fitted form is far above the noise."""
-    reported = []
-    for first in {(path.source, path.response): path for r in found for path in r.paths}.values():
-        misfits = [
-            path.fit.misfit
-            for r in found
-            for path in r.paths
-            if path.fit is not None and path.response == first.response and path.fit.misfit > MISFIT
-        ]
-        if misfits:
-            form = "PT1" if first.response == "y" else "linear equation"
-            span = f"{min(misfits):.3g} to {max(misfits):.3g}" if len(misfits) > 1 else f"{misfits[0]:.3g}"
-            reported.append(
-                f"{first.source} -> {first.response}: the model order of the {form} is too low, or an effect is missing. "
-                f"In {len(misfits)} of {len(found)} records its residual is {span} times the noise. 'rigsight diagnose' finds "
-                "missing effects."
-            )
-    return reported
-
-
-def beyond_identified_amplitudes(campaign: Campaign, joint: JointIdentification) -> list[str]:
+def beyond_identified_amplitudes(campaign: Campaign) -> list[str]:
     """Report validation records with an amplitude outside the range of the fitted records."""
-    fitted = [r for r in campaign.estimation if r.name not in joint.left_out]
+    fitted = campaign.estimation
     given = all(record.amplitude is not None for record in (*fitted, *campaign.validation))
     units = {signal.name: signal.unit for signal in (*campaign.rig.inputs, *campaign.rig.outputs)}
 

@@ -1,4 +1,4 @@
-"""`rigsight identify` on general rigs: frequency responses, one fit in the time domain, poles, and identifiability."""
+"""The identification of a rig: frequency responses, one fit in the time domain, poles, and identifiability."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign, with_weighed_spring
-from rigsight.errors import InputError, SimulationError, check_option
+from rigsight.errors import SimulationError, check_option
 from rigsight.identify import (
     FitResult,
     GreyBoxFit,
@@ -20,13 +20,12 @@ from rigsight.identify import (
     off_bounds,
     swallowed_by_offsets,
 )
-from rigsight.identify.amplitude_dependence import amplitude_dependence, measured_amplitude
+from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.fit.windows import cut, window_length
 from rigsight.identify.identifiability import helpful_sensors, identifiability, relative_errors
 from rigsight.identify.identification import (
     Identification,
     JointIdentification,
-    PathIdentification,
     RecordIdentification,
 )
 from rigsight.identify.information import Information, information, reached_bounds
@@ -38,19 +37,18 @@ from rigsight.identify.linear_view import (
     measured_responses,
     near_rest,
 )
-from rigsight.identify.record_identification import EstimationOptions
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
+from rigsight.identify.record_identification import EstimationOptions, identify_record, with_own_fit
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates, form_gives_parameters
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
-from rigsight.records.signals import is_constant
-from rigsight.rigs import Rig, evaluated, has_built_in_parameters, is_built_in_motion
+from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
-from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters
+from rigsight.workflow.identification.joint import held_parameters, identify_jointly
 from rigsight.workflow.identification.warnings import (
-    any_rig_warnings,
     beyond_identified_amplitudes,
+    identification_warnings,
     offsets_of_records,
 )
 from rigsight.workflow.run.kernels import prepare_kernels
@@ -62,71 +60,57 @@ METHODS_OF_ANY_RIG = ("local_rational", "local_polynomial")
 _STEPS_AFTER_RECORDS = 3
 
 
-def has_transfer_forms(campaign: Campaign) -> bool:
-    """Return True for rigs with the equations of a built-in one of one motion: their transfer functions are fitted by record.
+def _has_forms(campaign: Campaign) -> bool:
+    """Return True if each number of the transfer function of one driven mass on a spring gives one parameter.
 
-    A rig with the same equations from a file has other names, or knows a number that a transfer function would estimate. Records
-    with different constants have no common transfer function, and records without excitation have none. Offsets that differ
-    between records, and the effects of the given simulation, are estimated only in the time domain. Without a spring, or with a
-    negative one, the forms do not hold.
+    Not where effects of the simulation bend it, or where the mass is known or the gain of the drive is not.
     """
     rig = campaign.rig
-    if campaign.modelled or not has_built_in_parameters(rig):
+    if campaign.modelled or not (rig.has_one_motion and rig.is_driven) or campaign.given_without_spring:
         return False
-    if any(record.constants or record.free_offsets for record in campaign.records):
-        return False
-    if any(is_constant(record[rig.inputs[0].name]) for record in campaign.estimation):
-        return False
-    return campaign.given_without_spring is None and not _diverges(campaign)
+    return rig.motion.stiffness != 0 and form_gives_parameters(rig, "pt2")
 
 
-def _diverges(campaign: Campaign) -> bool:
-    """Return True if the equation of one driven mass that fits the records best is unstable within a record."""
-    rig, motion = campaign.rig, campaign.rig.motion
-    if motion.inertia is None:
-        return False
-    try:
-        values = {**campaign.constants, **linear_start(rig, campaign.estimation, campaign.constants, {})}
-    except InputError:
-        return False
-    equation = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
-    return longest_free_run(np.roots(equation).astype(np.complex128), campaign.estimation) is not None
-
-
-def identify_any_rig(
+def identify_rig(
     campaign: Campaign, options: EstimationOptions, n_jobs: int, listener: Listener
 ) -> Identification:
-    """Identify a rig of any shape."""
+    """Identify a rig by the estimation records of a campaign."""
     campaign = with_weighed_spring(campaign)
     rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
-    check_option(
-        f"The method for the rig '{rig.name}' with these records (h1 and thesis are for built-in rigs of one motion that returns "
-        "to rest, without effects, each record driven and without constants or offsets of its own)",
-        options.method,
-        METHODS_OF_ANY_RIG,
-    )
+    if not rig.has_one_motion:
+        check_option(
+            f"The method for the rig '{rig.name}' (h1 and thesis are for rigs of one motion)",
+            options.method,
+            METHODS_OF_ANY_RIG,
+        )
     records = campaign.estimation
     prepare_kernels([structure], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(records) + _STEPS_AFTER_RECORDS, listener)
     found = []
+    # Threads suffice: linear algebra releases the GIL. Multithreaded linear algebra would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"):
-        parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
-        for record in parallel(delayed(_record)(record, rig, options) for record in records):
-            found.append(record)
-            stage.finished(record.record.name)
         factor = campaign.open_factor
         held = _held(campaign, records, factor)
         start, length = _begin(campaign, records, held)
+        # A rig that drifts or diverges has no break frequency, or none of a stable form.
+        has_forms = length is None and _has_forms(campaign)
+        parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
+        for record in parallel(
+            delayed(identify_record)(record, rig, campaign.constants, options, has_forms)
+            for record in records
+        ):
+            found.append(record)
+            stage.finished(record.record.name)
         if campaign.modelled:
             windows = cut(records, length)
             start = start_with_effects(campaign, windows, start, held, _sizes(rig, windows))
         swallowed = _swallowed(structure, cut(records, length), {**campaign.constants, **start}, held)
         held |= {name: start[name] for name in swallowed}
-        joint = fit_any_rig_jointly(campaign, structure, found, start, held, length)
+        joint = identify_jointly(campaign, structure, found, start, held, length)
         stage.finished("one set for all records")
         errors = joint.fit.fit.standard_errors
         known, joint = _with_errors(joint, structure, cut(records, length), factor)
-        found = [_with_own(record, joint) for record in found]
+        found = [_with_own(record, joint, campaign) for record in found]
         stage.finished("identifiability")
         views = tuple(_views(structure, joint.fit.fit.values, records, options, known))
     units = {p.name: p.unit for p in structure.parameters}
@@ -152,9 +136,9 @@ def identify_any_rig(
         warnings=(
             *(bound.sentence for bound in reached),
             *([] if factor is None else [factor.sentence]),
-            *any_rig_warnings(campaign, views, joint),
+            *identification_warnings(campaign, found, views, joint),
             *offsets_of_records(campaign, joint, {name: start[name] for name in swallowed}, length),
-            *(beyond_identified_amplitudes(campaign, joint) if len(rig.inputs) <= 1 else ()),
+            *(beyond_identified_amplitudes(campaign) if len(rig.inputs) <= 1 else ()),
         ),
         reached=reached,
         views=views,
@@ -165,31 +149,9 @@ def identify_any_rig(
     return identification
 
 
-def _record(record: Record, rig: Rig, options: EstimationOptions) -> RecordIdentification:
-    """Return the responses that one record alone shows, to the inputs that move in it."""
-    measured = measured_responses([record], rig, options.method, options.resolution)
-    paths = [
-        PathIdentification(
-            source.name,
-            response.name,
-            measured=measured.found.get((source.name, response.name)),
-            problem=measured.problems.get((source.name, response.name), ""),
-        )
-        for source in rig.inputs
-        for response in rig.outputs
-        if measured is not None and response.name in record and not is_constant(record[source.name])
-    ]
-    measured_size, moved = measured_amplitude(record, rig)
-    amplitude = record.amplitude if record.amplitude is not None else measured_size
-    return RecordIdentification(record, amplitude, tuple(paths), moved="" if paths else moved)
-
-
 def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | None) -> dict[str, float]:
     """Return parameters that these records do not determine; of parameters determined up to a common factor, one."""
-    rig = campaign.rig
-    held = {}
-    if is_built_in_motion(rig):
-        held = held_parameters(campaign, records)
+    held = held_parameters(campaign, records)
     return held if factor is None else {**held, factor.held: factor.value}
 
 
@@ -313,7 +275,9 @@ def _with_unknown(result: FitResult, name: str) -> FitResult:
     return replace(result, free=free, covariance=covariance, standard_errors={n: errors[n] for n in free})
 
 
-def _with_own(found: RecordIdentification, joint: JointIdentification) -> RecordIdentification:
+def _with_own(
+    found: RecordIdentification, joint: JointIdentification, campaign: Campaign
+) -> RecordIdentification:
     """Give a record the parameters of its own fit."""
     own = next(kind.fit for kind in joint.fit.kinds if kind.kind == found.record.name)
     if not np.isfinite(own.cost):
@@ -321,7 +285,7 @@ def _with_own(found: RecordIdentification, joint: JointIdentification) -> Record
     positive = frozenset(p.name for p in own.structure.parameters if p.logarithmic)
     values = {name: own.values[name] for name in own.free}
     estimates = PhysicalEstimates(own.free, values, own.covariance, "fitted over time", positive)
-    return replace(found, own=estimates)
+    return with_own_fit(found, campaign.rig, estimates, {**campaign.constants, **found.record.constants})
 
 
 def _views(
@@ -335,7 +299,10 @@ def _views(
         return []
     views = []
     for group in by_constants(records):
-        measured = measured_responses(group, structure.rig, options.method, options.resolution)
+        # Responses of all records together are estimated by a local method; those of each record by any.
+        measured = None
+        if options.method in METHODS_OF_ANY_RIG:
+            measured = measured_responses(group, structure.rig, options.method, options.resolution)
         try:
             views.append(linear_view(structure, values, group, measured, known))
         except SimulationError:

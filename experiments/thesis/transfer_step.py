@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from form_over_time import over_time
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, expm, solve_continuous_lyapunov, toeplitz
 from scipy.optimize import Bounds, least_squares, minimize
@@ -21,8 +22,7 @@ from scipy.optimize import Bounds, least_squares, minimize
 from rigsight.errors import InputError, check_option
 from rigsight.frequency.signal_pair import pair_unit
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance, sandwich_covariance
-from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.identify.transfer.transfer_form import Order, TransferForm
+from rigsight.identify.transfer.transfer_form import Order, TransferFit, TransferForm
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
 from rigsight.records.signals import is_constant
@@ -151,7 +151,7 @@ class _Problem:
 
     def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return measured minus fitted, shape (n_samples,)."""
-        fitted = self.form.over_time(self.u, self.dt, self.hold, theta[:-1])[1:]
+        fitted = over_time(self.form, self.u, self.dt, self.hold, theta[:-1])[1:]
         return np.asarray(self.measured - theta[-1] - fitted)
 
     def slopes(self, theta: NDArray[np.float64], upper: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -192,7 +192,7 @@ class _Problem:
             np.geomspace(low, high, _GRID_FREQUENCIES), dampings, delays
         ):
             theta = self.form.vector(float(omega_b), float(zeta), float(delay))
-            shape = self.form.over_time(self.u, self.dt, self.hold, theta)[1:]
+            shape = over_time(self.form, self.u, self.dt, self.hold, theta)[1:]
             centered = shape - np.mean(shape)
             theta[0] = centered @ self.measured / max(float(centered @ centered), 1e-300)
             offset = float(np.mean(self.measured - theta[0] * shape))

@@ -9,14 +9,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from form_over_time import over_time
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from rigsight.errors import InputError
+from rigsight.identify import PhysicalEstimates
 from rigsight.identify.fit.covariance import colored_covariance
-from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
-from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.identify.transfer.transfer_form import TransferFit
 from rigsight.records.record import Hold, Record
 
 _LEAST_SAMPLES = 20
@@ -93,7 +94,7 @@ def _unexplained(record: Record, fit: TransferFit, found: NDArray[np.float64]) -
     theta = fit.form.vector(named["omega_b"], named.get("zeta", 1.0), named.get("dead_time", 0.0))
     theta[0] = named["gain"]
     source = record[fit.source]
-    moved = fit.form.over_time(source - source[0], record.dt, record.hold, theta)
+    moved = over_time(fit.form, source - source[0], record.dt, record.hold, theta)
     return np.asarray(record[fit.response] - named["gain"] * source[0] - moved)
 
 

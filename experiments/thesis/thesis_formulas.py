@@ -1,4 +1,4 @@
-"""Physical parameters of the running gear from a PT2 and a PT1, with their uncertainty.
+"""Physical parameters of the running gear from a PT2 and a PT1 by the thesis's formulas, with their uncertainty.
 
 Thesis, equations (2.21), (2.24), (2.26) and (2.27). The position of the factor v follows from (2.12) and the lateral equation,
 ``c_y = 2 l_0 omega_b / v``; in (2.25) it is on the wrong side, which has no effect for v = 1 m/s.
@@ -8,67 +8,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
-from rigsight.identify.fit.covariance import LEVEL as LEVEL
+from rigsight.identify import PhysicalEstimates, TransferFit
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.transfer.transfer_fit import TransferFit
-from rigsight.records.record import Record
-from rigsight.rigs import AXIS, ROLLING, RUNNING_GEAR, Rig, evaluated, relative_slopes
+from rigsight.records import Record
+from rigsight.rigs import RUNNING_GEAR, Rig, evaluated
 
 _POSITIVE = frozenset({"J_z", "k_c", "k_d", "l_0", "c_y"})
 _RESTS = 1e-3
 _LEAST_SAMPLES = 20
 
-
-@dataclass(frozen=True, eq=False)
-class PhysicalEstimates:
-    """Physical parameters with their joint uncertainty.
-
-    Attributes
-    ----------
-    names
-        In the order of `covariance`.
-    values, standard_errors
-        By name, in SI units.
-    covariance
-        Shape (n_parameters, n_parameters).
-    method
-        Equations and records from which they were computed.
-    positive
-        Names of those that are positive by definition.
-    """
-
-    names: tuple[str, ...]
-    values: dict[str, float]
-    covariance: NDArray[np.float64]
-    method: str
-    positive: frozenset[str] = _POSITIVE
-
-    @property
-    def standard_errors(self) -> dict[str, float]:
-        """Standard error by name; infinite if the records do not determine the parameter."""
-        return dict(zip(self.names, map(float, np.sqrt(np.diag(self.covariance))), strict=True))
-
-    def interval(self, name: str, level: float = LEVEL) -> tuple[float, float]:
-        """Return the confidence interval of a parameter.
-
-        The interval of a parameter that is positive by definition is symmetric in its logarithm.
-        """
-        value, error = self.values[name], self.standard_errors[name]
-        width = float(norm.ppf(0.5 + 0.5 * level))
-        if not math.isfinite(error):
-            return (0.0 if name in self.positive else -math.inf), math.inf
-        if name in self.positive:
-            factor = math.exp(min(width * error / value, 700.0))
-            return value / factor, value * factor
-        return value - width * error, value + width * error
+assert RUNNING_GEAR.follower is not None
+ROLLING = RUNNING_GEAR.follower
+"""The lateral displacement, which follows the yaw angle."""
 
 
 def yaw_parameters(
@@ -122,6 +80,20 @@ def motion_parameters(
         [(constant_errors or {}).get(name, 0.0) for name in slopes],
         method,
     )
+
+
+def relative_slopes(expression: sp.Expr, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the relative change of an expression for one of each of its names: its powers, where it is a product.
+
+    Parameters
+    ----------
+    expression, values
+        As for `evaluated`.
+    """
+    return {
+        symbol.name: evaluated(derivative(expression, symbol) * symbol / expression, values)
+        for symbol in sorted(expression.free_symbols, key=str)
+    }
 
 
 def lateral_parameters(
@@ -209,7 +181,7 @@ def _propagated(
     joint = np.diag(np.concatenate([np.zeros(n), np.square(independent_errors)]))
     joint[:n, :n] = covariance
     chain = np.array(list(values.values()))[:, None] * powers / inputs
-    return PhysicalEstimates(tuple(values), values, propagated_covariance(joint, chain), method)
+    return PhysicalEstimates(tuple(values), values, propagated_covariance(joint, chain), method, _POSITIVE)
 
 
 def offsets(
@@ -277,8 +249,34 @@ def _mean(samples: NDArray[np.float64]) -> tuple[float, float]:
     return mean, float(np.sqrt(variance[0, 0]))
 
 
-def axis_parameters(fit: TransferFit, gain: float) -> PhysicalEstimates:
-    """Return m, d and k of a PT2 from input to displacement, ``m x'' + d x' + k x = gain u``."""
-    check_fit(fit, "pt2", "axis", "x / u")
-    method = f"gain, break frequency and damping of the {fit.method}"
-    return motion_parameters(AXIS, fit, {AXIS.motion.drive_gain.name: gain}, None, method)
+def creep_error_of_sine(
+    omega: float,
+    psi_amplitude: float,
+    y_noise: float,
+    n_samples: int,
+    l_0: float,
+    omega_b: float,
+) -> tuple[float, float]:
+    """Return the smallest possible relative standard errors of l_0 and of c_y from a sine record.
+
+    Cramer-Rao bound for white noise on y and an exact psi. With ``G = 2 l_0 omega_b / (s + omega_b)`` and
+    ``omega_b = v c_y / (2 l_0)``: ``dG/d ln c_y = 2 l_0 omega_b s / (s + omega_b)^2`` and
+    ``dG/d ln l_0 = 2 l_0 omega_b^2 / (s + omega_b)^2``. They are 90 degrees apart at every frequency, so l_0 and c_y are
+    independent in every sine record, and the first is largest at the break frequency, which is best for c_y.
+
+    Parameters
+    ----------
+    omega
+        Angular frequency of the sine [rad/s].
+    psi_amplitude
+        Amplitude of the yaw angle [rad].
+    y_noise
+        Standard deviation of the noise of y [m].
+    n_samples
+        Number of samples of the record, which has whole periods.
+    l_0, omega_b
+        Distance [m] and break frequency [rad/s].
+    """
+    common = evaluated(ROLLING.static_gain, {"l_0": l_0}) * omega_b / (omega**2 + omega_b**2)
+    per_sine = y_noise * math.sqrt(2.0 / n_samples) / psi_amplitude
+    return per_sine / (common * omega_b), per_sine / (common * omega)

@@ -10,10 +10,14 @@ from scipy.signal import lfilter
 
 from rigsight.errors import InputError
 from rigsight.excitation import log_sweep
-from rigsight.identify import TransferFit, TransferForm, driven_offsets
+from rigsight.identify import TransferFit, TransferForm
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
+
+from .studies import of_study
+
+driven_offsets = of_study("thesis", "driven_offsets").driven_offsets
 
 VALUES = {
     "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98,
