@@ -177,10 +177,10 @@ def _half_closed(remainder: float) -> float:
 
 
 def _plainest(models: Sequence[FittedModel], like: FittedModel, effects: Sequence[Effect]) -> FittedModel:
-    """Return of the models that explain as much as one of them that with the fewest numbers, the first in the catalogue."""
+    """Return of the models that explain as much as one of them that with the fewest numbers, the first among the candidates."""
     order = {effect.name: place for place, effect in enumerate(effects)}
     tied = [model for model in models if model.error_over_noise <= SEARCH.alike_pairs * like.error_over_noise]
-    return min(tied, key=lambda model: (model.n_free, order[model.names[0]]))
+    return min(tied, key=lambda model: (model.n_free, order.get(model.names[0], len(order))))
 
 
 def refit_singles(
