@@ -226,9 +226,9 @@ def _plane(
 @in_style
 def missing_force(force: MissingForce) -> Figure:
     """Draw a missing force over velocity and displacement, each with its mean and two standard errors, and over time."""
-    figure = new_figure(8.4, 2.5, layout=None)
-    over_v, over_x, over_t = figure.subplots(1, 3, sharey=True)
-    set_margins(figure, 0.75, 0.12, 0.5, 0.12, between=(0.18, 0.0))
+    figure = new_figure(PAGE_WIDTH, 3.9)
+    panels = figure.subplot_mosaic("vx;tt", sharey=True)
+    over_v, over_x, over_t = panels["v"], panels["x"], panels["t"]
     factor, unit = shown_in(force.unit, force.force)
     every = max(1, force.force.size // _MOST_POINTS)
     for ax, signal, name, signal_unit in (
@@ -236,8 +236,8 @@ def missing_force(force: MissingForce) -> Figure:
         (over_x, force.displacement, "displacement", force.motion_unit),
     ):
         x_factor, x_unit = shown_in(signal_unit, signal)
-        points = {"color": MEASURED, "markersize": 2.0, "alpha": 0.35}
-        ax.plot(x_factor * signal[::every], factor * force.force[::every], ".", **points)
+        x, y = x_factor * signal[::every], factor * force.force[::every]
+        ax.plot(x, y, ".", color=MEASURED, markersize=2.0, alpha=0.35)
         mean = force.over(signal)
         at, line, band = (np.array(own) for own in (mean.signal, mean.force, mean.std))
         low, high = factor * (line - _BAND * band), factor * (line + _BAND * band)
@@ -250,5 +250,6 @@ def missing_force(force: MissingForce) -> Figure:
     first = np.array(force.records) == force.records[0]
     over_t.plot(force.time[first], factor * force.force[first], color=MEASURED, linewidth=0.8)
     over_t.set_xlabel(f"time in {force.records[0]} [s]")
-    over_v.set_ylabel(f"missing force [{unit}]")
+    for ax in (over_v, over_t):
+        ax.set_ylabel(f"missing force [{unit}]")
     return figure

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rigsight.effects import family_of, kind_of
-from rigsight.errors import InputError, RigsightError, SimulationError
+from rigsight.errors import InputError, SimulationError
 from rigsight.records import Record
 from rigsight.simulate import compose
 from rigsight_bench.trials.measured.base import Base
@@ -92,10 +92,23 @@ def draw_measured_trial(folder: Path, seed: int, trial: int) -> Trial:
     SimulationError
         If no effect that was drawn reaches its strength.
     """
-    cell = shuffled(measured_cells(folder), trial, seed)
+    cells, failed = measured_cells(folder), dict[Path, SimulationError]()
+    # A campaign whose equations leave more than any effect could add has no trials: another one stands for it.
+    for cell in (shuffled(cells, trial + n, seed) for n in range(len(cells))):
+        if cell.path in failed:
+            continue
+        try:
+            return _of_campaign(folder, cell, seed, trial)
+        except SimulationError as error:
+            failed[cell.path] = error
+    reasons = "; ".join(f"{path.parent.name}: {error}" for path, error in failed.items())
+    raise SimulationError(f"Trial {trial} of seed {seed} cannot be drawn: {reasons}")
+
+
+def _of_campaign(folder: Path, cell: MeasuredCell, seed: int, trial: int) -> Trial:
     base, offered = measured_base(cell.path), measured_spots(cell.path)
     assert isinstance(base, Base)
-    reason: RigsightError | None = None
+    reason = SimulationError("No effect can be added.")
     for attempt in range(_ATTEMPTS):
         rng = np.random.default_rng([seed, trial, attempt])
         spot = offered[cell.spot if attempt < _SAME else int(rng.integers(len(offered)))]
@@ -105,7 +118,7 @@ def draw_measured_trial(folder: Path, seed: int, trial: int) -> Trial:
             return _trial(folder, cell.path, equations, spot, own, strength, {"seed": seed, "trial": trial})
         except SimulationError as error:
             reason = error
-    raise SimulationError(f"Trial {trial} of seed {seed} cannot be drawn: {reason}")
+    raise reason
 
 
 def base_beside(base: Base, spot: Spot) -> Base:
