@@ -27,7 +27,7 @@ from rigsight.simulate import Structure
 _DIFFERENT = 0.01
 """Probability of equally large differences by chance, below which the records do not have a common parameter set."""
 _SMALL_LOSS = 0.01
-_UNSERVED = 0.9
+UNSERVED = 0.9
 """NRMSE from which a fit does not follow a motion at all."""
 _ORIGIN = attrgetter("origin")
 _BELOW = 1e-6
@@ -158,7 +158,7 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
 
 def _moves(samples: NDArray[np.float64]) -> bool:
     """Return True if a fit that leaves no more than the noise of an output would follow it: at rest there is only noise."""
-    return roughness(samples) < _UNSERVED * float(np.std(samples))
+    return roughness(samples) < UNSERVED * float(np.std(samples))
 
 
 def _leaves_motion(relative: float, samples: NDArray[np.float64]) -> bool:
@@ -182,7 +182,7 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
         for score in scores
         if score.role == "estimation"
         for name in score.nrmse
-        if not score.nrmse[name] < _UNSERVED and _moves(by_name[score.record][name])
+        if not score.nrmse[name] < UNSERVED and _moves(by_name[score.record][name])
     ]
     if fit.probability >= _DIFFERENT and unserved:
         return (

@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign, with_weighed_spring
-from rigsight.errors import SimulationError, check_option
+from rigsight.errors import RigsightError, SimulationError, check_option
 from rigsight.identify import (
     FitResult,
     GreyBoxFit,
@@ -45,14 +45,14 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
-from rigsight.workflow.identification.joint import held_parameters, identify_jointly
+from rigsight.workflow.identification.joint import UNSERVED, held_parameters, identify_jointly
 from rigsight.workflow.identification.warnings import (
     beyond_identified_amplitudes,
     identification_warnings,
     offsets_of_records,
 )
 from rigsight.workflow.run.kernels import prepare_kernels
-from rigsight.workflow.run.progress import Listener, Stage
+from rigsight.workflow.run.progress import Listener, Stage, silent
 
 IDENTIFYING = "Identifying"
 METHODS_OF_ANY_RIG = ("local_rational", "local_polynomial")
@@ -101,6 +101,10 @@ def identify_rig(
         ):
             found.append(record)
             stage.finished(record.record.name)
+        if has_forms and all(record.paths and record.motion.problem for record in found):
+            loose = _without_spring(campaign, options, n_jobs)
+            if loose is not None:
+                return loose
         if campaign.modelled:
             windows = cut(records, length)
             start = start_with_effects(campaign, windows, start, held, _sizes(rig, windows))
@@ -147,6 +151,28 @@ def identify_rig(
     )
     stage.finished("poles and responses")
     return identification
+
+
+def _without_spring(campaign: Campaign, options: EstimationOptions, n_jobs: int) -> Identification | None:
+    """Return the identification of a rig that may have no spring; None if that does not follow the records.
+
+    Such a rig has no break frequency in a record. Its stiffness is estimated only if it shows, as one that is given as zero.
+    """
+    rig = campaign.rig
+    absent = {p.name: 0.0 for p in rig.parameters if p.name == str(rig.motion.stiffness) and p.lower <= 0.0}
+    if not absent or options.method not in METHODS_OF_ANY_RIG:
+        return None
+    try:
+        found = identify_rig(
+            replace(campaign, parameters={**campaign.parameters, **absent}), options, n_jobs, silent
+        )
+    except RigsightError:
+        return None
+    scores = [score for score in found.joint.scores if score.role == "estimation"]
+    if any(not value < UNSERVED for score in scores for value in score.nrmse.values()):
+        return None
+    note = "No record shows a transfer function of these equations: all were fitted in the time domain."
+    return replace(found, warnings=(note, *found.warnings))
 
 
 def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | None) -> dict[str, float]:
