@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigsight.diagnose.search.worth_fitting import worth_combining, worth_fitting
+from rigsight.diagnose.search.worth_fitting import worth_fitting
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.inverse import Proposal, ProposedCause
 from rigsight.rigs import AXIS
@@ -41,26 +41,3 @@ def test_where_no_family_explains_enough_all_are_fitted() -> None:
     assert len(fitted(cause("coulomb_friction", 0.2))) == len(CATALOGUE)
     assert len(fitted(cause("coulomb_friction", 0.8), by_chance=0.9)) == len(CATALOGUE)
     assert worth_fitting(AXIS, None, CATALOGUE) == CATALOGUE
-
-
-def combined(explained: float, noise: float | None, *taken: ProposedCause) -> set[str]:
-    judged = frozenset(e.name for e in CATALOGUE if not e.states)
-    proposal = Proposal(taken, taken, judged, explained, 0.1, noise)
-    return {effect.name for effect in worth_combining(proposal, CATALOGUE)}
-
-
-def test_where_families_together_leave_the_larger_part_only_those_and_what_is_not_judged_are_combined() -> (
-    None
-):
-    kept = combined(0.3, 0.01, cause("coulomb_friction", 0.3))
-    assert {"coulomb_friction", "flexible_mode"} <= kept
-    assert not kept & {"stribeck_friction", "cubic_stiffness"}
-
-
-def test_all_are_combined_where_the_motion_does_not_tell() -> None:
-    friction = cause("coulomb_friction", 0.3)
-    whole = {effect.name for effect in CATALOGUE}
-    assert combined(0.8, 0.01, friction) == whole
-    assert combined(0.3, 0.6, friction) == whole
-    assert combined(0.3, None, friction) == whole
-    assert combined(0.0, 0.01) == whole

@@ -20,7 +20,7 @@ from rigsight.diagnose.search.several.pairs import refit_singles
 from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
 from rigsight.diagnose.search.several.several_effects import several_effects
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
-from rigsight.diagnose.search.worth_fitting import worth_combining, worth_fitting
+from rigsight.diagnose.search.worth_fitting import worth_fitting
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
@@ -42,7 +42,7 @@ class SingleModels:
     search: Search  # where and for which effects was searched
     # What the motion says of the missing force before any fit; None where the sensors do not show the motion.
     proposal: Proposal | None
-    effects: tuple[Effect, ...]  # candidates that are worth fitting
+    effects: tuple[Effect, ...]  # all candidates, also those that were not worth a fit alone
 
 
 @dataclass(frozen=True)
@@ -78,10 +78,10 @@ def single_models(
     say("re-identified")
     proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, noise)
     say("missing force")
-    effects = worth_fitting(campaign.rig, proposal, effects)
+    alone = worth_fitting(campaign.rig, proposal, effects)
     while True:
         context = _with_known_motion(campaign, context, reidentified)
-        search, singles = _singles(context, reidentified, effects, say, prepare)
+        search, singles = _singles(context, reidentified, alone, say, prepare)
         lowered = lowered_by_extensions(context, reidentified, singles)
         if lowered.fit.cost > (1.0 - SEARCH.worth_restarting) * reidentified.fit.cost:
             break
@@ -91,7 +91,7 @@ def single_models(
     before = _before(campaign, context, reidentified)
     if campaign.given:
         say("given simulation")
-    return SingleModels(windowing, context, before, reidentified, singles, search, proposal, effects)
+    return SingleModels(windowing, context, before, reidentified, singles, search, proposal, tuple(effects))
 
 
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:
@@ -152,10 +152,15 @@ def with_several_effects(
         if _explained(cut, cut.singles, at_floor):
             return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms)
     checks = Checks(context, rng, VERDICT.at_floor, most_remainder)
-    together = worth_combining(models.proposal, models.effects)
     found = several_effects(
-        context, models.reidentified, models.singles, together, forms, checks, lower_bound, prepare
+        context, models.reidentified, models.singles, models.effects, forms, checks, lower_bound, prepare
     )
+    named = {effect.name for model in found for effect in model.effects}
+    unfitted = [e for e in models.effects if e.name in named - {model.names[0] for model in models.singles}]
+    if unfitted:
+        # The parts of a set compete with it, and tell the share of each.
+        parts = fit_candidates(context, models.reidentified, unfitted, say, models.singles)
+        models = replace(models, singles=parts)
     models = replace(models, singles=refit_singles(context, models.singles, found))
     if whole and not is_predictable(context, models.reidentified, found, allowed, rng):
         cut = cut or _in_windows(campaign, noise, models)
