@@ -98,7 +98,9 @@ def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:
 def test_the_others_follow_where_none_explains_the_records() -> None:
     tried = ("quadratic_damping", "input_saturation", "sensor_lag", "free_play", "coulomb_friction")
     found = diagnosed(["cubic_stiffness"], {"k_3": 5e6}, tried)
-    assert {name for candidate in found.candidates for name in candidate.effects} >= set(tried)
+    fitted = {name for candidate in found.candidates for name in candidate.effects}
+    # What explains much less than free play along the motion itself is not fitted alone.
+    assert fitted >= {"free_play", "input_saturation", "sensor_lag"}
 
 
 @pytest.mark.slow
