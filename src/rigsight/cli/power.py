@@ -78,9 +78,14 @@ def _table(found: Power) -> Table:
     from rich.markup import escape
     from rich.table import Table
 
+    from rigsight.report.wording import unit_text
+
     table = Table("Effect", "Where", "Named from", box=box.SIMPLE)
     for size in found.sizes:
-        values = [f"{name} = {value:.3g} {unit}".strip() for name, (value, unit) in size.parameters.items()]
+        values = [
+            f"{name} = {value:.3g} {unit_text(unit)}".strip()
+            for name, (value, unit) in size.parameters.items()
+        ]
         words = values[0] + (f" (with {', '.join(values[1:])})" if values[1:] else "") if values else ""
         table.add_row(size.effect.replace("_", " "), escape(size.where), escape(words or size.reason))
     return table
