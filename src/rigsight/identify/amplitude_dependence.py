@@ -54,11 +54,11 @@ def amplitude_dependence(
         values = [value for value, _ in means]
         if min(low, high) > min(values) or max(low, high) < max(values):
             reported.append(
-                f"{name} moves between {min(values):.3g} and {max(values):.3g} {units.get(name, '')}"
+                f"{name} moves between {min(values):.3g} and {max(values):.3g} {_unit_behind(name, units)}"
             )
         else:
             verb = "falls" if high < low else "rises"
-            reported.append(f"{name} {verb} from {low:.3g} to {high:.3g} {units.get(name, '')}")
+            reported.append(f"{name} {verb} from {low:.3g} to {high:.3g} {_unit_behind(name, units)}")
     if not changing:
         text = f"No parameter changes with the amplitude ({span.removeprefix('from ')}) beyond its interval."
         return text + _moving_resonance(compared), ()
@@ -67,6 +67,12 @@ def amplitude_dependence(
         "which indicates a nonlinear effect; 'rigsight diagnose' looks for it."
         + _no_single_inertia(compared, units, changing)
     ), tuple(changing)
+
+
+def _unit_behind(name: str, units: Mapping[str, str]) -> str:
+    """Return the unit as it stands behind a number."""
+    unit = units.get(name, "")
+    return "" if unit == "1" else unit
 
 
 def _no_single_inertia(
