@@ -68,3 +68,13 @@ def test_records_that_do_not_show_the_motion_are_refused() -> None:
     blind = Campaign("axis", AXIS, own.constants, own.given, own.estimation, (effect_named("sensor_delay"),))
     with pytest.raises(InputError, match="do not show the whole motion"):
         power_of(blind)
+
+
+def test_an_effect_that_the_simulation_has_is_listed_with_that_reason() -> None:
+    own, friction = campaign(), effect_named("coulomb_friction")
+    with_friction = Campaign(
+        "axis", AXIS, own.constants, {**own.given, "T_c": 0.1}, own.estimation, (friction,)
+    )
+    (entry,) = power_of(with_friction, [friction]).sizes
+    assert entry.parameters == {}
+    assert "already" in entry.reason

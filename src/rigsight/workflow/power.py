@@ -9,7 +9,7 @@ from typing import Any
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import start_values_of
-from rigsight.effects import CATALOGUE, Effect
+from rigsight.effects import CATALOGUE, Effect, kind_of
 from rigsight.errors import InputError
 from rigsight.inverse import NAMED_IN, NamedSize, along_motion, named_sizes
 from rigsight.json_data import json_data
@@ -87,7 +87,15 @@ def power_of(
             "has already acts at a drive or a sensor: nothing can be added along the motion. Measure every coordinate, or draw "
             "trials with 'rigsight blind'."
         )
-    return Power(campaign.title, tuple(named_sizes(terms, candidates, seed, stage.finished)))
+    asked = {kind_of(effect.name) for effect in effects}
+    known = [
+        NamedSize(
+            kind_of(e.name), e.family, campaign.rig.where(e), {}, "The simulation has this effect already."
+        )
+        for e in campaign.modelled
+        if kind_of(e.name) in asked
+    ]
+    return Power(campaign.title, (*named_sizes(terms, candidates, seed, stage.finished), *known))
 
 
 def _entry(size: NamedSize) -> dict[str, Any]:
