@@ -34,7 +34,6 @@ from rigsight.identify.record_offsets import differing_means as differing_means
 from rigsight.identify.record_offsets import swallowed_by_offsets as swallowed_by_offsets
 from rigsight.identify.record_offsets import without_offsets as without_offsets
 from rigsight.identify.start.declared_starts import off_bounds as off_bounds
-from rigsight.identify.start.equation_error import EffectRegression as EffectRegression
 from rigsight.identify.start.linear_start import linear_start as linear_start
 from rigsight.identify.start.scales import characteristic_scales as characteristic_scales
 from rigsight.identify.transfer.conicity import ConicityEstimate as ConicityEstimate

@@ -8,9 +8,9 @@ S. A. Billings, *Nonlinear System Identification* (Wiley 2013), for greedy forwa
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -77,6 +77,10 @@ class Proposal:
     noise: float | None = None
     # At each joint, of any shape, the one that explains most first.
     forces: tuple[MissingForce, ...] = ()
+    # Parameters of the equations beside those taken.
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    # Parameters of every effect alone, by its name, where it can have the sign that it needs.
+    starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return ``missing_force`` of ``diagnosis.json``."""
@@ -94,7 +98,7 @@ class Selection:
     """Greedy selection of families by the residual of held-out stretches, on sums of products."""
 
     def __init__(self, fit: EquationFit, values: Mapping[str, float], terms: Sequence[Term]) -> None:
-        self.fit, self.terms = fit, terms
+        self.fit, self.values, self.terms = fit, values, terms
         rows, slopes, columns, stretch = [], [], [], []
         self.unit = unit = fit.rms(values)[:, None]
         per_record = max(1, round(2 * _STRETCHES / len(fit.motions)))
@@ -167,18 +171,19 @@ class Selection:
     def best(self, rig: Rig, chosen: Sequence[int], taken: Sequence[Key]) -> dict[Key, tuple[float, int]]:
         """Return the best term of each family at each place beside columns that were chosen, with what it leaves."""
         best: dict[Key, tuple[float, int]] = {}
-        for i, term in enumerate(self.terms):
-            key = (term.effect.family, rig.where(term.effect))
-            if key in taken:
-                continue
-            columns = [*chosen, *self.places[i]]
-            own = self._solved(self.whole, [*self.own, *columns])[-len(self.places[i]) :]
-            if any(sided and number < 0.0 for sided, number in zip(term.one_sided, own, strict=True)):
-                continue
-            remainder = self.remainder(columns)
-            if key not in best or remainder < best[key][0]:
+        for i, remainder in self._remainders(chosen):
+            key = (self.terms[i].effect.family, rig.where(self.terms[i].effect))
+            if key not in taken and (key not in best or remainder < best[key][0]):
                 best[key] = (remainder, i)
         return best
+
+    def _remainders(self, chosen: Sequence[int]) -> Iterator[tuple[int, float]]:
+        """Yield each term that can have the sign that it needs beside chosen columns, and what it leaves."""
+        for i, term in enumerate(self.terms):
+            columns = [*chosen, *self.places[i]]
+            own = self._solved(self.whole, [*self.own, *columns])[-len(self.places[i]) :]
+            if all(number >= 0.0 or not sided for sided, number in zip(term.one_sided, own, strict=True)):
+                yield i, self.remainder(columns)
 
     def selected(self, rig: Rig) -> list[tuple[Key, int, float]]:
         """Take families until none removes enough: each with its term and what it leaves beside those before it."""
@@ -222,16 +227,41 @@ class Selection:
         )
         judged = frozenset(term.effect.name for term in self.terms)
         explained = 1.0 - remainders[-1] / begun if begun > 0.0 else 0.0
-        return Proposal(taken, alone, judged, explained, self.by_chance)
+        numbers = self._numbers(self.columns_of(selected))
+        starts: dict[str, tuple[float, int]] = {}
+        for i, remainder in self._remainders([]):
+            name = self.terms[i].effect.name
+            starts[name] = min(starts.get(name, (remainder, i)), (remainder, i))
+        return Proposal(
+            taken,
+            alone,
+            judged,
+            explained,
+            self.by_chance,
+            numbers=numbers,
+            starts={name: self._values(i, []) for name, (_, i) in starts.items()},
+        )
+
+    def _numbers(self, chosen: Sequence[int]) -> dict[str, float]:
+        """Return the parameters of the equations beside chosen columns, within their bounds."""
+        changes = self._solved(self.whole, [*self.own, *chosen])[: len(self.own)] / self.size[: len(self.own)]
+        return {
+            name: float(np.clip(self.values[name] + change, *bounds))
+            for name, change, bounds in zip(self.fit.free, changes, self.fit.bounds, strict=True)
+        }
 
     def _cause(self, key: Key, i: int, share: float, chosen: Sequence[int]) -> ProposedCause:
+        return ProposedCause(self.terms[i].effect, *key, share, self._values(i, chosen))
+
+    def _values(self, i: int, chosen: Sequence[int]) -> dict[str, float]:
+        """Return the parameters of the effect of a term beside chosen columns."""
         term, columns = self.terms[i], [*self.own, *chosen, *self.places[i]]
         numbers = self._solved(self.whole, columns)[-len(self.places[i]) :] / self.size[self.places[i]]
         linear = {
             name: float(number) * unit
             for name, number, unit in zip(term.names, numbers, term.units, strict=False)
         }
-        return ProposedCause(term.effect, *key, share, {**term.inner, **linear})
+        return {**term.inner, **linear}
 
 
 def _as_columns(rows: Floats) -> Floats:

@@ -17,7 +17,7 @@ def fitted(*alone: ProposedCause, taken: tuple[ProposedCause, ...] = (), by_chan
     effects: list[Effect] = [*CATALOGUE]
     judged = frozenset(e.name for e in effects if not e.states)
     proposal = Proposal(taken or alone[:1], alone, judged, alone[0].share, by_chance)
-    return {effect.name for effect in worth_fitting(AXIS, proposal, effects)}
+    return {effect.name for effect in worth_fitting(AXIS, proposal, effects).alone}
 
 
 def test_families_that_explain_little_beside_the_best_are_not_fitted() -> None:
@@ -40,4 +40,4 @@ def test_a_further_family_that_was_taken_is_fitted() -> None:
 def test_where_no_family_explains_enough_all_are_fitted() -> None:
     assert len(fitted(cause("coulomb_friction", 0.2))) == len(CATALOGUE)
     assert len(fitted(cause("coulomb_friction", 0.8), by_chance=0.9)) == len(CATALOGUE)
-    assert worth_fitting(AXIS, None, CATALOGUE) == CATALOGUE
+    assert worth_fitting(AXIS, None, CATALOGUE).alone == CATALOGUE

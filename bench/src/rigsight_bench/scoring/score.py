@@ -215,7 +215,8 @@ def outcome(
     hides_a_place = bool(truth) and key["where"] is not None
     wanted = _families(needed)
     of_families = {
-        (one["family"], one["where"]): float(one["probability"]) for one in found.get("families", ())
+        (one["family"], one["where"] if by_place else ""): float(one["probability"])
+        for one in found.get("families", ())
     }
     return Outcome(
         design=str(key["design"]),

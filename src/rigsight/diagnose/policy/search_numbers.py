@@ -344,3 +344,25 @@ class SearchNumbers:
         "assumption",
         "Share of that from which on another family may be the cause: grids and first-order terms understate some.",
     )
+    noise_of_force: float = number(
+        0.1,
+        "convention",
+        (
+            "Share of the squared missing force along the motion that noise of the sensors may cause for the motion to rule out "
+            "causes: one of a larger share shows."
+        ),
+    )
+    law_error: float = number(
+        0.05,
+        "assumption",
+        (
+            "Error of a law relative to its own force. Where the motion shows that laws err more than sensors, a residual of "
+            "this part of the gap is that of the law that explains the rest."
+        ),
+        set_by="two to ten percent in the measured rigs of the reviews",
+    )
+    most_unnamed: int = number(
+        2,
+        "budget",
+        "Number of causes that the motion does not name, such as delays, that are added to those that it names.",
+    )

@@ -12,15 +12,15 @@ from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.nested_models import lowered_by_extensions
+from rigsight.diagnose.search.basins import is_lower
+from rigsight.diagnose.search.nested_models import lowered_by_extensions, ordered_by_inclusion
 from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.pairs import refit_singles
 from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
-from rigsight.diagnose.search.several.several_effects import several_effects
+from rigsight.diagnose.search.several.stepwise import refit_singles, several_effects
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
-from rigsight.diagnose.search.worth_fitting import worth_fitting
+from rigsight.diagnose.search.worth_fitting import WorthFitting, worth_fitting
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
@@ -42,7 +42,7 @@ class SingleModels:
     search: Search  # where and for which effects was searched
     # What the motion says of the missing force before any fit; None where the sensors do not show the motion.
     proposal: Proposal | None
-    effects: tuple[Effect, ...]  # all candidates, also those that were not worth a fit alone
+    worth: WorthFitting  # candidates for the main cause and for further ones
 
 
 @dataclass(frozen=True)
@@ -78,20 +78,31 @@ def single_models(
     say("re-identified")
     proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, noise)
     say("missing force")
-    alone = worth_fitting(campaign.rig, proposal, effects)
-    while True:
-        context = _with_known_motion(campaign, context, reidentified)
-        search, singles = _singles(context, reidentified, alone, say, prepare)
-        lowered = lowered_by_extensions(context, reidentified, singles)
-        if lowered.fit.cost > (1.0 - SEARCH.worth_restarting) * reidentified.fit.cost:
-            break
+    if proposal is not None:
+        reidentified = _from_numbers(context, reidentified, proposal.numbers)
+    worth = worth_fitting(campaign.rig, proposal, effects)
+    context = _with_known_motion(campaign, context, reidentified)
+    search, singles = _singles(context, reidentified, worth, say, prepare)
+    lowered = lowered_by_extensions(context, reidentified, singles)
+    if lowered.fit.cost <= (1.0 - SEARCH.worth_restarting) * reidentified.fit.cost:
         # What was compared with a local minimum of the equations was compared with a gap that does not exist.
         reidentified = lowered
         say("re-identified from a candidate")
+        singles = ordered_by_inclusion(context, reidentified, singles)
     before = _before(campaign, context, reidentified)
     if campaign.given:
         say("given simulation")
-    return SingleModels(windowing, context, before, reidentified, singles, search, proposal, tuple(effects))
+    return SingleModels(windowing, context, before, reidentified, singles, search, proposal, worth)
+
+
+def _from_numbers(
+    context: FitContext, reidentified: FittedModel, numbers: Mapping[str, float]
+) -> FittedModel:
+    """Return the equations fitted from the numbers of a regression with the missing effects, if that is better."""
+    fit = reidentified.fit
+    start = {**fit.values, **{name: value for name, value in numbers.items() if name in fit.free}}
+    found = context.problem(fit.structure, context.estimation).fit(start, fit.free)
+    return context.score((), found) if is_lower(found, fit) else reidentified
 
 
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:
@@ -109,25 +120,32 @@ def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: Fi
 def _singles(
     context: FitContext,
     reidentified: FittedModel,
-    effects: Sequence[Effect],
+    worth: WorthFitting,
     say: Callable[[str], None],
     prepare: Prepare | None,
 ) -> tuple[Search, list[FittedModel]]:
     """Return where was searched, and every effect by itself."""
-    search = search_places(context, reidentified, context.offered(effects))
+    search = search_places(context, reidentified, context.offered(worth.alone))
     say("suspects")
+    first = [e for e in context.offered(worth.alone) if e in search.effects or e in worth.named]
+    others = [effect for effect in search.others if effect not in first]
     if prepare is not None:
-        prepare([context.simplest((effect,)) for effect in search.effects])
-    singles = fit_candidates(context, reidentified, search.effects, say)
-    if (
-        search.others
-        and min((model.error_over_noise for model in singles), default=np.inf) > VERDICT.at_floor
-    ):
+        prepare([context.simplest((effect,)) for effect in first])
+    singles = fit_candidates(context, reidentified, first, say, worth=worth)
+    best = min((model.error_over_noise for model in singles), default=np.inf)
+    # What the motion rules out need not be fitted for a remainder that no law reaches.
+    enough = _larger_part_closed(reidentified) if worth.is_shown else VERDICT.at_floor
+    if others and best > enough:
         # A right model must not be lost because places or effects were ranked wrongly.
         if prepare is not None:
-            prepare([context.simplest((effect,)) for effect in search.others])
-        singles = fit_candidates(context, reidentified, search.others, say, singles)
+            prepare([context.simplest((effect,)) for effect in others])
+        singles = fit_candidates(context, reidentified, others, say, singles, worth)
     return search, singles
+
+
+def _larger_part_closed(reidentified: FittedModel) -> float:
+    """Return the error at which the larger part of the squared gap is closed, in units of the noise floor."""
+    return reidentified.error_over_noise * float(np.sqrt(1.0 - VERDICT.larger_part))
 
 
 def with_several_effects(
@@ -153,10 +171,20 @@ def with_several_effects(
             return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms)
     checks = Checks(context, rng, VERDICT.at_floor, most_remainder)
     found = several_effects(
-        context, models.reidentified, models.singles, models.effects, forms, checks, lower_bound, prepare
+        context,
+        models.reidentified,
+        models.singles,
+        models.worth,
+        models.proposal,
+        forms,
+        checks,
+        lower_bound,
+        prepare,
     )
     named = {effect.name for model in found for effect in model.effects}
-    unfitted = [e for e in models.effects if e.name in named - {model.names[0] for model in models.singles}]
+    unfitted = [
+        e for e in models.worth.beside if e.name in named - {model.names[0] for model in models.singles}
+    ]
     if unfitted:
         # The parts of a set compete with it, and tell the share of each.
         parts = fit_candidates(context, models.reidentified, unfitted, say, models.singles)

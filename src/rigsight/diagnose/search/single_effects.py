@@ -25,8 +25,9 @@ from rigsight.diagnose.search.first_look import (
 from rigsight.diagnose.search.nested_models import at_least_as_good, ordered_by_inclusion
 from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.starts import restart_values
+from rigsight.diagnose.search.worth_fitting import WorthFitting
 from rigsight.effects import Effect
-from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult, off_bounds
+from rigsight.identify import DEFAULT_ACCURACY, FitResult, off_bounds
 from rigsight.simulate import Structure
 
 _ROUGH_TOLERANCE = 1e-4
@@ -57,13 +58,11 @@ def fit_candidates(
     effects: Iterable[Effect],
     progress: Callable[[str], None] | None = None,
     known: Sequence[FittedModel] = (),
+    worth: WorthFitting | None = None,
 ) -> list[FittedModel]:
     """Return every effect alone, fitted and scored, with those that were before."""
-    regression = None
-    if context.rig.has_one_motion and context.rig.is_driven and context.driven:
-        regression = EffectRegression(context.rig, context.driven, reidentified.fit.values, context.scales)
     before = {model.effects[0].name: model.fit for model in known if np.isfinite(model.fit.cost)}
-    looks = _looks(context, reidentified, context.offered(effects), regression, before)
+    looks = _looks(context, reidentified, context.offered(effects), worth or WorthFitting(), before)
     wide = {look.newest: look for look in widened(context, looks)}
     costs = [*(look.cost for look in wide.values()), *(fit.cost for fit in before.values())]
     lowest = min(costs, default=float("inf"))
@@ -78,7 +77,8 @@ def fit_candidates(
         return scored
 
     models = list(context.threads.side_by_side(one, looks))
-    refined = in_lowest_basins(context, refine(context, [*known, *models]))
+    is_global = worth is not None and worth.is_shown
+    refined = in_lowest_basins(context, refine(context, [*known, *models]), is_global)
     return without_repeated_equations(context, ordered_by_inclusion(context, reidentified, refined))
 
 
@@ -86,7 +86,7 @@ def _looks(
     context: FitContext,
     reidentified: FittedModel,
     effects: Sequence[Effect],
-    regression: EffectRegression | None,
+    worth: WorthFitting,
     known: Mapping[str, FitResult],
 ) -> list[FirstLook]:
     """Look at every effect; those that start from a simpler one, if it is not known, come after it."""
@@ -95,10 +95,8 @@ def _looks(
     waiting = list(effects)
 
     def one(parents: Mapping[str, FitResult], effect: Effect) -> FirstLook:
-        regressed = regression.start(effect) if regression is not None else None
-        return look_at(
-            context, (effect,), reidentified.fit, parents, [] if regressed is None else [regressed]
-        )
+        own = [worth.starts[effect.name]] if effect.name in worth.starts else []
+        return look_at(context, (effect,), reidentified.fit, parents, own, declared=not worth.is_shown)
 
     while waiting:
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]

@@ -1,8 +1,9 @@
-"""Which effects are worth a fit of their own, after what the motion says of the missing force?"""
+"""Which effects are worth a fit, alone and beside another, after what the motion says of the missing force?"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from rigsight.diagnose.policy import SEARCH
 from rigsight.effects import Effect
@@ -10,17 +11,34 @@ from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
 
 
-def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+@dataclass(frozen=True)
+class WorthFitting:
+    """The effects that are fitted."""
+
+    alone: tuple[Effect, ...] = ()
+    beside: tuple[Effect, ...] = ()  # all candidates: those that are tried as a further cause
+    named: tuple[Effect, ...] = ()  # of those alone the ones of families that the motion names
+    # Whether the motion shows every force that matters: a family that it rules out is not the main cause.
+    is_shown: bool = False
+    # Own parameters of effects by their names, with which they explain most of the missing force along the motion.
+    starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+
+def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]) -> WorthFitting:
     """Return the effects of families that the proposal took or that explain nearly as much, and those that it does not judge.
 
-    These may be the main cause; a weaker one beside it is searched for among all. All of them where no family
-    alone explains enough to exclude others.
+    These may be the main cause; a weaker one beside it is searched for among all. All of them where no family alone explains
+    enough to exclude others.
     """
     if proposal is None or not proposal.alone:
-        return tuple(effects)
+        return WorthFitting(tuple(effects), tuple(effects))
+    everything = WorthFitting(tuple(effects), tuple(effects), starts=proposal.starts)
     most = proposal.alone[0].share
     if most < max(SEARCH.decisive_force, proposal.by_chance):
-        return tuple(effects)
+        return everything
     near = {(c.family, c.where) for c in proposal.alone if c.share >= SEARCH.near_force * most}
     near |= {(cause.family, cause.where) for cause in proposal.taken}
-    return tuple(e for e in effects if e.name not in proposal.judged or (e.family, rig.where(e)) in near)
+    named = tuple(e for e in effects if e.name in proposal.judged and (e.family, rig.where(e)) in near)
+    kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
+    is_shown = proposal.noise is not None and proposal.noise < SEARCH.noise_of_force
+    return WorthFitting(kept, tuple(effects), named, is_shown, proposal.starts)

@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
+from types import MappingProxyType
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
@@ -31,8 +32,13 @@ def with_one_more(
     prepare: Prepare | None = None,
     least_share: float = 0.0,
     enough: float = float("inf"),
+    replaced: tuple[Effect, FitResult] | None = None,
 ) -> list[FittedModel]:
-    """Return a model with each effect added that lowers its cost clearly, fitted and scored."""
+    """Return a model with each effect added that lowers its cost clearly, fitted and scored.
+
+    `replaced` is an effect that was left out of the model, with the fit in which it was: its simpler and more general forms are
+    fitted whatever the screening says, the general ones from there.
+    """
     context = context.looking_at_residual(parent.fit)
     open_ones = [
         effect
@@ -46,7 +52,10 @@ def with_one_more(
         # The screening says nothing about effects that no push represents, such as periodic ones.
         unscreened = [effect for effect in search.effects if effect.name not in search.shares]
         return _fitted_beside(context, parent, unscreened, search.starts, singles, prepare)
-    found = _fitted_beside(context, parent, search.effects, search.starts, singles, prepare)
+    forms = [] if replaced is None else [e for e in search.others if _is_form_of(e, replaced[0])]
+    parents = {} if replaced is None else {replaced[0].name: replaced[1]}
+    chosen = [*search.effects, *forms]
+    found = _fitted_beside(context, parent, chosen, search.starts, singles, prepare, parents)
     movable = [effect for effect in search.others if _has_a_shape(effect)]
     if movable and min((model.error_over_noise for model in found), default=float("inf")) > enough:
         # A push cannot move from its start: a resonance far from it explains little until it is fitted.
@@ -66,6 +75,7 @@ def _fitted_beside(
     starts: Mapping[str, Mapping[str, float]],
     singles: Sequence[FittedModel],
     prepare: Prepare | None,
+    parents: Mapping[str, FitResult] = MappingProxyType({}),
 ) -> list[FittedModel]:
     base = parent.fit
     if prepare is not None:
@@ -84,7 +94,7 @@ def _fitted_beside(
 
     def one(effect: Effect) -> FirstLook:
         pushed = [starts[effect.name]] if effect.name in starts else []
-        return look_at(context, (*parent.effects, effect), base, {}, pushed, substeps=steps(effect))
+        return look_at(context, (*parent.effects, effect), base, parents, pushed, substeps=steps(effect))
 
     looks = list(context.threads.side_by_side(one, effects))
     near = min((look.nearest for look in looks), default=float("inf"))
@@ -114,6 +124,10 @@ def _fitted_beside(
         return followed(context, found, promising=True, finish=False)
 
     return list(context.threads.side_by_side(follow, promising[: SEARCH.most_followed]))
+
+
+def _is_form_of(one: Effect, other: Effect) -> bool:
+    return other.name in one.parents or one.name in other.parents
 
 
 def _above_noise(fit: FitResult) -> float:

@@ -46,11 +46,17 @@ class Together:
         self._effects = effects
         self._prepare = prepare
 
-    def fitted(self, size: int) -> list[FittedModel]:
-        """Return models of so many effects that explain most together in the screening, fitted and scored."""
+    def fitted(self, size: int, least_share: float = 0.0) -> list[FittedModel]:
+        """Return models of so many effects that explain most together in the screening, fitted and scored.
+
+        None where they explain less than this share of what one effect less leaves above the noise.
+        """
         context = self._context
         found: dict[frozenset[str], list[EffectSet]] = {}
-        for effect_set in best_sets(self._responses, self._lineup.remainder, size):
+        smaller, larger = (best_sets(self._responses, self._lineup.remainder, n) for n in (size - 1, size))
+        if not (smaller and larger) or self._left(larger) > (1.0 - least_share) * self._left(smaller):
+            return []
+        for effect_set in larger:
             if len(found) < SEARCH.joint_sets or effect_set.names in found:
                 found.setdefault(effect_set.names, []).append(effect_set)
         starts = list(found.values())
@@ -73,6 +79,11 @@ class Together:
 
         models = context.threads.side_by_side(follow, promising[: SEARCH.most_followed])
         return [model for model in models if np.isfinite(model.error_over_noise)]
+
+    def _left(self, sets: Sequence[EffectSet]) -> float:
+        """Return the squared residual above the noise that the best of sets leaves, to first order."""
+        residual = self._lineup.remainder
+        return max(float((1.0 - sets[0].share) * (residual @ residual)) - residual.size, 0.0)
 
     @cached_property
     def _lineup(self) -> Shortlist:

@@ -1,0 +1,129 @@
+"""Several effects where the motion shows the missing force: the families that it names, fitted together.
+
+The regression along the motion finds several causes at once, each with its numbers. Here they are added to the best single effect
+in that order. The motion does not judge a delay, and does not show what a delay hides: so effects whose push explains the larger
+part of the residual of the simulation are added after them. Each must lower the held-out error; those that the others make
+needless are dropped, and other forms of each family are tried in their place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.search.basins import in_lowest_basins
+from rigsight.diagnose.search.first_look import FirstLook
+from rigsight.diagnose.search.several.one_more_effect import with_one_more
+from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search.single_effects import finished, followed, refine
+from rigsight.diagnose.search.starts import start_values, with_own_values
+from rigsight.effects import Effect, Family
+from rigsight.inverse import Proposal
+from rigsight.simulate import carried_over
+
+Key = tuple[Family, str]
+"""A family and the place at which it acts."""
+
+
+@dataclass(frozen=True)
+class NamedByMotion:
+    """What the search works with."""
+
+    context: FitContext  # records, scales and noise
+    singles: Sequence[FittedModel]  # every effect alone that could be simulated, best first
+    proposal: Proposal  # the families that the motion names
+    effects: Sequence[Effect]  # candidates for a further cause
+    together: Together  # sets of effects that explain the residual of the equations
+    prepare: Prepare | None  # compiles structures that are about to be fitted side by side
+
+    def found(self) -> list[FittedModel]:
+        """Return the models of several effects and their parts."""
+        models = list(self._grown(self.singles[0]))
+        for size in (2, 3):
+            models += self.together.fitted(size, VERDICT.larger_part)
+        if not models:
+            return []
+        model = min(models, key=lambda one: one.error_over_noise)
+        parts = self._parts(model)
+        while needless := [part for part in parts if not self._is_worth(model, part)]:
+            model = min(needless, key=lambda part: part.error_over_noise)
+            if len(model.effects) < 2:
+                return []
+            models.append(model)
+            parts = self._parts(model)
+        pairs = zip(model.effects, parts, strict=True)
+        forms = [form for effect, part in pairs for form in self._other_forms(model, effect, part)]
+        competing = refine(self.context, [finished(self.context, model), *forms, *models, *parts])
+        return [
+            found
+            for found in in_lowest_basins(self.context, competing, is_global=True)
+            if len(found.effects) > 1
+        ]
+
+    def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
+        """Yield a model with each further cause that lowers its error, one after the other."""
+        for cause in self.proposal.taken:
+            if (cause.family, cause.where) not in map(self._key, model.effects):
+                larger = self._with(model, cause.effect, cause.values)
+                if self._is_worth(larger, model):
+                    model = larger
+                    yield model
+        for _ in range(SEARCH.most_unnamed):
+            larger_ones = with_one_more(
+                self.context, model, self.effects, [], self.singles, self.prepare, VERDICT.larger_part
+            )
+            best = min(larger_ones, key=lambda one: one.error_over_noise, default=model)
+            if not self._is_worth(best, model):
+                break
+            model = best
+            yield model
+
+    def _is_worth(self, larger: FittedModel, model: FittedModel) -> bool:
+        """Return True if one more effect lowers the held-out error of a model enough."""
+        return larger.error_over_noise <= model.error_over_noise / VERDICT.worthwhile
+
+    def _key(self, effect: Effect) -> Key:
+        return effect.family, self.context.rig.where(effect)
+
+    def _with(self, model: FittedModel, effect: Effect, own: Mapping[str, float]) -> FittedModel:
+        """Return a model with an effect more, fitted from the values that the motion gives it."""
+        structure = self.context.simplest((*model.effects, effect), model.fit.structure)
+        declared = next(start_values(self.context, structure, effect, model.fit, {}))
+        values = {**declared, **with_own_values(structure, effect, model.fit, own)}
+        return self._fitted(
+            (*model.effects, effect),
+            replace(model, fit=replace(model.fit, structure=structure, values=values)),
+        )
+
+    def _parts(self, model: FittedModel) -> list[FittedModel]:
+        """Return a model without each of its effects, fitted from where the others are in it."""
+
+        def without(left_out: Effect) -> FittedModel:
+            kept = tuple(effect for effect in model.effects if effect is not left_out)
+            structure = self.context.simplest(kept, model.fit.structure)
+            values = {
+                **carried_over(model.fit.values, model.fit.structure, structure),
+                **dict(structure.fixed),
+            }
+            return self._fitted(
+                kept, replace(model, fit=replace(model.fit, structure=structure, values=values))
+            )
+
+        return list(self.context.threads.side_by_side(without, model.effects))
+
+    def _fitted(self, effects: tuple[Effect, ...], start: FittedModel) -> FittedModel:
+        free = tuple(self.context.free_parameters(start.fit.structure))
+        look = FirstLook(effects, start.fit.structure, free, (start.fit,), float("inf"))
+        return followed(self.context, look, promising=True, finish=False)
+
+    def _other_forms(self, model: FittedModel, replaced: Effect, part: FittedModel) -> list[FittedModel]:
+        """Return a model with other effects of the family of one at its place; the part is the model without it."""
+        key = self._key(replaced)
+        forms = [e for e in self.effects if self._key(e) == key and e not in model.effects]
+        if not forms or not part.residuals:
+            return []
+        of_model = (replaced, model.fit)
+        return with_one_more(self.context, part, forms, [], self.singles, self.prepare, replaced=of_model)

@@ -1,0 +1,297 @@
+"""Several effects at once: found, put in order, and not invented where one is enough."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rigsight.campaign import Campaign
+from rigsight.diagnose import diagnose
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.search.several import stepwise
+from rigsight.diagnose.search.several.evidence_for_more import OtherForms
+from rigsight.diagnose.search.several.stepwise import Stepwise, each_once, refit_singles, several_effects
+from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
+from rigsight.diagnose.search.worth_fitting import WorthFitting
+from rigsight.effects import Effect, effect_named
+from rigsight.excitation import linear_sweep, step
+from rigsight.identify import characteristic_scales
+from rigsight.records.record import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+
+VALUES = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+DT = 0.01
+NOISE = 2e-5
+TRIED = ("cubic_stiffness", "coulomb_friction", "actuator_lag", "quadratic_damping")
+
+
+def measured(effects: dict[str, dict[str, float]], seed: int, **values: float) -> Campaign:
+    rng = np.random.default_rng(seed)
+    structure = compose(AXIS, [effect_named(name) for name in effects])
+    own = {name: value for parameters in effects.values() for name, value in parameters.items()}
+    truth = {**VALUES, **values, **own}
+    t = DT * np.arange(2000)
+    runs = [
+        ("low", "estimation", linear_sweep(t, 0.4, 1.0, 30.0)),
+        ("high", "estimation", linear_sweep(t, 1.0, 1.0, 30.0)),
+        ("middle", "validation", linear_sweep(t, 0.7, 1.0, 30.0)),
+        ("step", "validation", step(t, 0.6, 5.0)),
+    ]
+    records = []
+    for name, role, u in runs:
+        clean = simulate(structure, truth, Record(name, DT, {"u": u}, {}, role=role, hold="zoh"))
+        records.append(clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size)))
+    given = {name: VALUES[name] * 1.05 for name in ("m", "d", "k")}
+    return Campaign("two", AXIS, {"gain": 1.0}, given, tuple(records))
+
+
+@pytest.mark.slow
+def test_two_effects_are_found_and_the_stronger_comes_first():
+    campaign = measured({"cubic_stiffness": {"k_3": 4e5}, "actuator_lag": {"T_a": 0.01}}, seed=0)
+    found = diagnose(campaign, [effect_named(name) for name in TRIED])
+    assert found.verdict == "effect"
+    assert found.effects == ("cubic_stiffness", "actuator_lag")
+    assert found.where == ("dynamics", "actuator")
+    assert found.gap["x"].after < 1.1 * found.gap["x"].noise_floor
+    best = found.candidates[0]
+    assert best.parameters["k_3"].value == pytest.approx(4e5, abs=4.5 * best.parameters["k_3"].std)
+    assert best.parameters["T_a"].value == pytest.approx(0.01, abs=4.5 * best.parameters["T_a"].std)
+    # Each of the two alone stays among the candidates and leaves more.
+    alone = {c.effects: c.error_over_noise for c in found.candidates if len(c.effects) == 1}
+    assert alone["cubic_stiffness",] > 2.0
+    assert alone["actuator_lag",] > alone["cubic_stiffness",]
+
+
+@pytest.mark.slow
+def test_three_effects_are_found_where_the_second_closes_less_than_half():
+    campaign = measured(
+        {"cubic_stiffness": {"k_3": 2e5}, "coulomb_friction": {"T_c": 0.05}, "actuator_lag": {"T_a": 0.01}},
+        seed=0,
+    )
+    found = diagnose(campaign, [effect_named(name) for name in TRIED])
+    assert found.verdict == "effect"
+    assert set(found.effects) == {"cubic_stiffness", "coulomb_friction", "actuator_lag"}
+    assert found.effects[0] == "cubic_stiffness"
+    assert found.gap["x"].after < 1.1 * found.gap["x"].noise_floor
+    best = found.candidates[0]
+    for name, true in (("k_3", 2e5), ("T_c", 0.05), ("T_a", 0.01)):
+        assert best.parameters[name].value == pytest.approx(true, abs=4.5 * best.parameters[name].std)
+    left = {frozenset(c.effects): c.error_over_noise for c in found.candidates}
+    pair = min(error_over_noise for effects, error_over_noise in left.items() if len(effects) == 2)
+    single = min(error_over_noise for effects, error_over_noise in left.items() if len(effects) == 1)
+    assert pair - 1.0 > 0.5 * (single - 1.0)
+    assert sum(share["x"] for share in found.effect_shares.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_a_more_general_law_that_led_alone_gives_way_to_its_special_case_in_a_pair() -> None:
+    campaign = measured({"coulomb_friction": {"T_c": 0.05}, "quadratic_damping": {"c_2": 5.0}}, seed=0)
+    tried = ("coulomb_friction", "stribeck_friction", "quadratic_damping")
+    found = diagnose(campaign, [effect_named(name) for name in tried])
+    alone = {c.effects[0]: c.error_over_noise for c in found.candidates if len(c.effects) == 1}
+    assert min(alone, key=lambda name: alone[name]) == "stribeck_friction"
+    assert set(found.effects) == {"coulomb_friction", "quadratic_damping"}
+
+
+@pytest.mark.slow
+def test_one_effect_stays_one():
+    campaign = measured({"coulomb_friction": {"T_c": 0.1}}, seed=1)
+    found = diagnose(campaign, [effect_named(name) for name in TRIED])
+    assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
+    assert all(len(candidate.effects) < 2 for candidate in found.candidates)
+
+
+def context_of(campaign: Campaign, held: frozenset[str] = frozenset()) -> FitContext:
+    records = campaign.records
+    scales = characteristic_scales(AXIS, records, VALUES)
+    fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
+    return FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, held, VALUES)
+
+
+def searching(
+    context: FitContext, without: FittedModel, singles: list[FittedModel], effects: list[Effect]
+) -> Stepwise:
+    forms, together = OtherForms(context, lower_bound=False), Together(context, without, effects)
+    return Stepwise(context, singles, effects, forms, together, None)
+
+
+@pytest.mark.slow
+def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
+    context = context_of(measured({"cubic_stiffness": {"k_3": 4e5}, "actuator_lag": {"T_a": 0.01}}, seed=0))
+    spring, lag = effect_named("cubic_stiffness"), effect_named("actuator_lag")
+    reidentified = reidentify(context, VALUES)
+    singles = fit_candidates(context, reidentified, [spring])
+    pairs = searching(context, reidentified, singles, [spring, lag]).found(VERDICT.at_floor, None)
+    assert [pair.names for pair in pairs] == [("cubic_stiffness", "actuator_lag")]
+
+
+@pytest.mark.slow
+def test_a_relative_gives_way_to_the_right_effect() -> None:
+    hidden = {"input_saturation": {"u_max": 0.5}, "iwan_hysteresis": {"a": 0.3, "x_s": 0.003, "q": 0.0}}
+    context = context_of(measured(hidden, seed=0, d=3.0), frozenset({"force_off"}))
+    saturation, relative = effect_named("input_saturation"), effect_named("presliding_friction")
+    effects = [saturation, relative, effect_named("iwan_hysteresis")]
+    reidentified = reidentify(context, VALUES)
+    singles = fit_candidates(context, reidentified, effects)
+    alone = next(model for model in singles if model.names == ("input_saturation",))
+    pair = fit_candidate(context, (saturation, relative), alone.fit)
+    assert pair.error_over_noise > 1.1
+    search = searching(context, reidentified, singles, effects)
+    best, *_ = search.settled(search.exchanged([pair]))
+    assert set(best.names) == {"input_saturation", "iwan_hysteresis"}
+    assert best.error_over_noise < 1.05
+    assert best.fit.values["u_max"] == pytest.approx(0.5, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_a_part_that_stopped_short_is_found_again_from_a_triple() -> None:
+    two, hidden = ("input_saturation", "asymmetric_stiffness"), {"u_max": 0.5, "k_2": 500.0}
+    campaign = measured({two[0]: {"u_max": 0.5}, two[1]: {"k_2": 500.0}}, seed=0)
+    context = context_of(campaign, frozenset({"force_off"}))
+
+    def model(names: tuple[str, ...], own: dict[str, float]) -> FittedModel:
+        effects = tuple(effect_named(name) for name in names)
+        structure = context.composed(effects)
+        fit = context.problem(structure, context.estimation).fit({**VALUES, **own}, [])
+        return context.score(effects, replace(fit, free=tuple(context.free_parameters(structure))))
+
+    stopped = model(two, {"u_max": 2.0, "k_2": 500.0})
+    triple = model((*two, "cubic_stiffness"), {**hidden, "k_3": 10.0})
+    assert stopped.error_over_noise > 3.0 * triple.error_over_noise
+    parts = searching(context, triple, [], []).with_parts(triple, [stopped])
+    again = next(part for part in parts if set(part.names) == set(two))
+    assert again.error_over_noise == pytest.approx(1.0, abs=0.1)
+    assert again.fit.values["u_max"] == pytest.approx(0.5, rel=0.01)
+    assert len(parts) == 3, "each part of the triple once"
+
+
+def test_of_models_with_the_same_effects_the_best_is_kept(scored) -> None:
+    two = ("coulomb_friction", "cubic_stiffness")
+    worse, better = scored(two, error_over_noise=1.4), scored(two[::-1], error_over_noise=1.1)
+    other = scored(("coulomb_friction", "backlash"), error_over_noise=1.2)
+    assert each_once([worse, other, better]) == [better, other]
+
+
+def test_a_step_that_closes_less_than_half_ends_the_search(monkeypatch: pytest.MonkeyPatch, scored) -> None:
+    two = ("coulomb_friction", "cubic_stiffness")
+    single, pair = scored(two[:1], residuals=np.full(8, 9.0)), scored(two, residuals=np.full(8, 8.0))
+    asked: list[int] = []
+
+    def fitted(size: int) -> list[FittedModel]:
+        asked.append(size)
+        return [pair] if size == 2 else []
+
+    for name, same in (("refine", lambda _, models: models), ("finished", lambda _, model: model)):
+        monkeypatch.setattr(stepwise, name, same)
+    monkeypatch.setattr(stepwise, "with_one_more", lambda *_, **__: [])
+    monkeypatch.setattr(stepwise, "without_repeated_equations", lambda _, models: models)
+    effects = [effect_named(name) for name in two]
+    forms = SimpleNamespace(partners=lambda parent, effects: effects)
+    search = Stepwise(None, [single], effects, forms, SimpleNamespace(fitted=fitted), None)
+    assert search.found(VERDICT.at_floor, None) == []
+    assert asked == [2, 3], "three may explain together what no two do"
+
+
+@pytest.mark.parametrize(
+    ("single", "pair", "adequate", "competes"),
+    [
+        pytest.param(1.9, 1.02, False, True, id="reaches the very bound"),
+        pytest.param(1.9, 1.3, False, False, id="may as well fit noise"),
+        pytest.param(1.9, 1.02, True, False, id="nothing but noise remains already"),
+        pytest.param(20.0, 1.3, False, True, id="more remains than noise could be"),
+        pytest.param(1.9, 1.3, None, True, id="a measured floor"),
+    ],
+)
+def test_above_a_lower_bound_a_pair_must_reach_it(
+    scored, monkeypatch: pytest.MonkeyPatch, single: float, pair: float, adequate: bool | None, competes: bool
+) -> None:
+    found = [scored(("periodic_disturbance", "cubic_stiffness"), error_over_noise=pair)]
+    monkeypatch.setattr(Stepwise, "found", lambda *_: found)
+    alone = scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))
+    kept = several_effects(
+        None,
+        scored((), error_over_noise=40.0),
+        [alone],
+        WorthFitting(),
+        None,
+        None,
+        SimpleNamespace(is_adequate=lambda _: adequate),
+        adequate is not None,
+        None,
+    )
+    assert kept == (found if competes else [])
+
+
+@pytest.mark.parametrize(
+    ("single", "adequate", "lower_bound", "nothing_remains"),
+    [
+        pytest.param(1.06, False, False, VERDICT.exact, id="near the floor, and no noise"),
+        pytest.param(1.06, True, False, VERDICT.at_floor, id="near the floor, noise"),
+        pytest.param(1.02, False, False, VERDICT.at_floor, id="at the floor"),
+        pytest.param(5.0, False, False, VERDICT.at_floor, id="far above it"),
+        pytest.param(1.06, False, True, VERDICT.at_floor, id="a lower bound"),
+    ],
+)
+def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
+    scored,
+    monkeypatch: pytest.MonkeyPatch,
+    single: float,
+    adequate: bool,
+    lower_bound: bool,
+    nothing_remains: float,
+) -> None:
+    asked: list[float] = []
+
+    def found(_search: Stepwise, at_floor: float, _checks: object) -> list[FittedModel]:
+        asked.append(at_floor)
+        return []
+
+    monkeypatch.setattr(Stepwise, "found", found)
+    several_effects(
+        None,
+        scored((), error_over_noise=40.0),
+        [scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))],
+        WorthFitting(),
+        None,
+        None,
+        SimpleNamespace(is_adequate=lambda _: adequate),
+        lower_bound,
+        None,
+    )
+    assert asked == [nothing_remains]
+
+
+def test_a_residual_of_the_size_of_a_law_error_asks_for_no_second_effect(scored) -> None:
+    single = scored(("cubic_stiffness",), error_over_noise=1.9, residuals=np.ones(8))
+    shown = WorthFitting(is_shown=True)
+    kept = several_effects(
+        None, scored((), error_over_noise=40.0), [single], shown, None, None, None, False, None
+    )
+    assert kept == []
+
+
+def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:
+    play, spring = effect_named("backlash"), effect_named("cubic_stiffness")
+    context = context_of(measured({"backlash": {"g": 1e-3}}, seed=2))
+
+    def model(effects: tuple[Effect, ...], own: dict[str, float]) -> FittedModel:
+        structure = context.composed(effects)
+        fit = context.problem(structure, context.estimation).fit({**VALUES, **own}, [])
+        free = tuple(context.free_parameters(structure))
+        return context.score(effects, replace(fit, free=free))
+
+    stopped, other = model((play,), {"g": 4e-4}), model((spring,), {"k_3": 1e4})
+    pair = model((play, spring), {"g": 1.01e-3, "k_3": 1e3})
+    assert stopped.error_over_noise > 3.0 * pair.error_over_noise
+    again, same = refit_singles(context, [stopped, other], [pair])
+    assert again.names == ("backlash",)
+    assert again.error_over_noise == pytest.approx(1.0, abs=0.1)
+    assert again.fit.values["g"] == pytest.approx(1e-3, rel=0.01)
+    assert same.error_over_noise <= other.error_over_noise
+    assert refit_singles(context, [again, other], [])[0] is again
