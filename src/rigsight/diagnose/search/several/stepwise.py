@@ -88,7 +88,7 @@ class Stepwise:
                     break
                 found += self._extended(parent, found, at_floor if parent is parents[0] else np.inf)
         found = each_once(found)
-        if not _lowest(found) <= SEARCH.beam * allowed:
+        if not _lowest(found) <= allowed:
             return found
         return self.settled(self.exchanged(found))
 
