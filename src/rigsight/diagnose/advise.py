@@ -50,11 +50,9 @@ class Advice:
 def advise(
     context: FitContext, chosen: FittedModel, rivals: Sequence[FittedModel], noise: Mapping[str, float]
 ) -> tuple[Advice, ...]:
-    """Return, for each rival, the candidate experiment that would distinguish it best from the chosen model.
-
-    The separation is the RMS difference of the two predictions, in standard deviations of the noise, at the output where it is
-    largest. Both models keep their fitted parameters, so that it is an upper bound: refitting may reduce it.
-    """
+    """Return, for each rival, the candidate experiment that would distinguish it best from the chosen model."""
+    # The separation is the RMS difference of the two predictions, in standard deviations of the noise, at the output where it is
+    # largest. Both models keep their fitted parameters, so that it is an upper bound: refitting may reduce it.
     found = []
     menu = list(_menu(context))
     for rival in rivals:

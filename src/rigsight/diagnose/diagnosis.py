@@ -293,11 +293,9 @@ def _up_to(floor: NoiseFloor, residual: NDArray[np.float64]) -> NoiseFloor:
 
 
 def _evidence(found: Examination) -> tuple[str, ...]:
-    """Return the places to which the evidence points if the cause is unknown.
-
-    The place of the push that explains most, or the joint at which the missing force along the motion must act; on a rig with
-    one motion the place whose signals correlate with the residual, else the place of the best effect.
-    """
+    """Return the places to which the evidence points if the cause is unknown."""
+    # The place of the push that explains most, or the joint at which the missing force along the motion must act; on a rig with
+    # one motion the place whose signals correlate with the residual, else the place of the best effect.
     # A push that explains most of the gap is stronger evidence than a force of any shape.
     pushed = max((place.share for place in found.places), default=0.0) >= VERDICT.larger_part
     traced = () if found.proposal is None else traced_to(found.context.rig, found.proposal.forces)

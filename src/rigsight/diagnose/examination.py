@@ -194,10 +194,8 @@ def _with_offset_rivals(
     criterion: Callable[[FittedModel], float],
     evidence_counts: bool,
 ) -> Ranking:
-    """Let an even effect without a constant force compete where the best model needs a constant force.
-
-    A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
-    """
+    """Let an even effect without a constant force compete where the best model needs a constant force."""
+    # A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
     best = ranking.order[0]
     released = context.releasable_parameters(best.fit.structure)
     needed = [

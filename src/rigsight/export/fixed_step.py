@@ -35,11 +35,9 @@ _NUDGE = 1e-6
 
 
 def internal_step(model: Model) -> float:
-    """Return the longest internal step for a fixed-step integrator [s].
-
-    It follows from the eigenvalues about the rest position, with every kink to either side: what a stop or a play changes
-    is seen, what a smooth nonlinearity does at large motions is not.
-    """
+    """Return the longest internal step for a fixed-step integrator [s]."""
+    # It follows from the eigenvalues about the rest position, with every kink to either side: what a stop or a play changes
+    # is seen, what a smooth nonlinearity does at large motions is not.
     structure, values = without_vanished_effects(model.structure, model.values)
     if not structure.states:
         return LONGEST
@@ -170,10 +168,8 @@ class IntegratorEquations:
 
 
 def equations_of(exported: Exported) -> IntegratorEquations:
-    """Return a model's equations with powers and functions of parameters as symbols.
-
-    Sums and products of parameters stay: they cost little, and a reader looks for them.
-    """
+    """Return a model's equations with powers and functions of parameters as symbols."""
+    # Sums and products of parameters stay: they cost little, and a reader looks for them.
     fixed = set(exported.structure.parameter_symbols)
     found: dict[sp.Expr, sp.Symbol] = {}
 

@@ -248,10 +248,8 @@ def _balance(exported: Exported, rest: Balance) -> str:
 
 
 def local_names(exported: Exported, own: Set[str]) -> dict[str, str]:
-    """Return what each parameter and state is called: as in the export, or one like it where the function needs that name.
-
-    Others see the names of the export, so that a name used inside costs nobody his own.
-    """
+    """Return what each parameter and state is called: as in the export, or one like it where the function needs that name."""
+    # Others see the names of the export, so that a name used inside costs nobody his own.
     names = [quantity.name for quantity in (*exported.parameters, *exported.states)]
     taken, found = {*names, *own}, {}
     for name in names:

@@ -332,11 +332,9 @@ def _solve_ratio(
 ) -> tuple[
     NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]
 ]:
-    """Return the results of `_solve` for the ratio of the responses of Y and U to R, and the power of U's over its variance.
-
-    The noise of a line in both signals is treated as one noise, with the phase that it has in Y: noise that feedback brings
-    into both cancels, as it does in the ratio.
-    """
+    """Return the results of `_solve` for the ratio of the responses of Y and U to R, and the power of U's over its variance."""
+    # The noise of a line in both signals is treated as one noise, with the phase that it has in Y: noise that feedback brings
+    # into both cancels, as it does in the ratio.
     (below, picked), (above, _) = (_fit(R, S, lines, model) for S in (U, Y))
     denominator = below.coefficient(0)
     # A denominator that is zero by chance is no error: its value gets no weight.

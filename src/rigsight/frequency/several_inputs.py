@@ -300,11 +300,9 @@ class _LocalModels:
     def _solved(
         self, omega: NDArray[np.float64]
     ) -> tuple[NDArray[np.complex128], *tuple[NDArray[np.float64], ...]]:
-        """Return values and variances of all inputs, degrees of freedom, and the share of each input that others do not explain.
-
-        Shapes (n_frequencies, n_moving), the third (n_frequencies,). The shares are those that each single other input, and all
-        others together, do not explain, shapes (n_frequencies, n_moving, n_moving) and (n_frequencies, n_moving).
-        """
+        """Return values and variances of all inputs, degrees of freedom, and the share of each input that others do not explain."""
+        # Shapes (n_frequencies, n_moving), the third (n_frequencies,). The shares are those that each single other input, and all
+        # others together, do not explain, shapes (n_frequencies, n_moving, n_moving) and (n_frequencies, n_moving).
         n_terms, n_inputs = self._order + 1, self._moving.size
         reach = max(0.5 * w * s.line for s, w in zip(self._spectra, self._widths, strict=True))
         collected: tuple[list[NDArray[np.complex128]], ...] = ([], [], [])

@@ -47,10 +47,8 @@ def check_alike(records: Sequence[Record], source: str, response: str) -> None:
 
 
 def line_frequencies(n_samples: int, dt: float) -> NDArray[np.float64]:
-    """Return the angular frequencies between zero and Nyquist, both excluded, of `n_samples` samples [rad/s].
-
-    Shape ((n_samples - 1) // 2,); they are lines ``1 : (n_samples + 1) // 2`` of a real Fourier transform.
-    """
+    """Return the angular frequencies between zero and Nyquist, both excluded, of `n_samples` samples [rad/s]."""
+    # Shape ((n_samples - 1) // 2,); they are lines ``1 : (n_samples + 1) // 2`` of a real Fourier transform.
     lines = np.arange(1, (n_samples + 1) // 2, dtype=np.float64)
     return np.asarray(lines * (2.0 * math.pi / (n_samples * dt)), dtype=np.float64)
 

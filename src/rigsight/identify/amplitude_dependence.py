@@ -26,11 +26,9 @@ _MOVED = 1.15
 def amplitude_dependence(
     records: Sequence[RecordIdentification], units: Mapping[str, str]
 ) -> tuple[str, tuple[str, ...]]:
-    """Return a sentence on whether parameters change with the amplitude, and the names of those that do.
-
-    Only records of one kind with different amplitudes are compared, because a step and a sweep also differ in frequency content.
-    Offsets are not compared; they may differ from record to record without any nonlinearity.
-    """
+    """Return a sentence on whether parameters change with the amplitude, and the names of those that do."""
+    # Only records of one kind with different amplitudes are compared, because a step and a sweep also differ in frequency
+    # content. Offsets are not compared; they may differ from record to record without any nonlinearity.
     compared = _comparable(records)
     if len(compared) < 2:
         return _why_not(records), ()
@@ -190,11 +188,9 @@ def _chance(means: Sequence[tuple[float, float]]) -> float:
 
 
 def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
-    """Return the amplitude of a record in the unit of a signal, and that signal.
-
-    This is the height of a step, or half the range of another input (the first that moves of several); for a free motion, half
-    the range of the first recorded output.
-    """
+    """Return the amplitude of a record in the unit of a signal, and that signal."""
+    # This is the height of a step, or half the range of another input (the first that moves of several); for a free motion, half
+    # the range of the first recorded output.
     inputs = [signal.name for signal in rig.inputs]
     outputs = [signal.name for signal in rig.outputs if signal.name in record]
     moving = [name for name in inputs if not is_constant(record[name])]

@@ -288,10 +288,8 @@ class _Search:
         return f"{listed([q.text for q in members])} only as {listed([q.text for q in made])}."
 
     def _change(self, quantities: Sequence[_Quantity], along: Sequence[float], as_powers: bool) -> float:
-        """Return the change of the outputs along a direction, divided by that due to its first member alone.
-
-        Infinite if the step would exceed a bound on either side.
-        """
+        """Return the change of the outputs along a direction, divided by that due to its first member alone."""
+        # Infinite if the step would exceed a bound on either side.
         for side in (1.0, -1.0):
             places = self._moved(quantities, [side * entry for entry in along], as_powers)
             if all(np.all((self._found.lower <= p) & (p <= self._found.upper)) for p in places):

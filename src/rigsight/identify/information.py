@@ -172,10 +172,8 @@ class ReachedBound:
 
 
 def reached_bounds(found: Information, standard_errors: Mapping[str, float]) -> tuple[ReachedBound, ...]:
-    """Return the parameters that stand at a bound and would pass it significantly.
-
-    A parameter whose interval contains the bound, such as a damping that is zero within its error, is not among them.
-    """
+    """Return the parameters that stand at a bound and would pass it significantly."""
+    # A parameter whose interval contains the bound, such as a damping that is zero within its error, is not among them.
     width = float(norm.ppf(0.5 + 0.5 * LEVEL))
     reached = []
     for index, name in enumerate(found.names):

@@ -245,10 +245,8 @@ def _shift(alone: FitResult, joint: FitResult) -> dict[str, float]:
 
 
 def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
-    """Test whether all kinds have one set, by deviations from the weighted mean; records of different kinds are independent.
-
-    Parameters that are undetermined for one of the kinds (alone or in combination with others) are not included.
-    """
+    """Test whether all kinds have one set, by deviations from the weighted mean; records of different kinds are independent."""
+    # Parameters that are undetermined for one of the kinds (alone or in combination with others) are not included.
     free = kinds[0].fit.free
     usable = [
         i

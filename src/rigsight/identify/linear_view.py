@@ -59,10 +59,8 @@ class LinearView:
     images: Mapping[tuple[str, str], NDArray[np.complex128]]
 
     def misfit(self, source: str, response: str) -> float:
-        """Return the difference between model and measured response relative to the noise; 1 if noise explains it.
-
-        This is the median over frequencies, because values at the ends of a band may be far off.
-        """
+        """Return the difference between model and measured response relative to the noise; 1 if noise explains it."""
+        # This is the median over frequencies, because values at the ends of a band may be far off.
         assert self.measured is not None
         curve, (values, std) = self.measured.found[source, response], self.model[source, response]
         assert curve.variance is not None
@@ -104,10 +102,8 @@ def by_constants(records: Sequence[Record]) -> list[list[Record]]:
 
 
 def near_rest(structure: Structure, values: Mapping[str, float], records: Sequence[Record]) -> Linearization:
-    """Return the linearization about the equilibrium under the mean inputs that is closest to the mean sensor readings.
-
-    If the records are close to different equilibria, the most stable one is used, because a rig stays only at a stable one.
-    """
+    """Return the linearization about the equilibrium under the mean inputs that is closest to the mean sensor readings."""
+    # If the records are close to different equilibria, the most stable one is used, because a rig stays only at a stable one.
     inputs = {
         signal.name: _mean([record[signal.name] for record in records]) for signal in structure.rig.inputs
     }
@@ -170,12 +166,10 @@ def _smooth(rig: Rig) -> set[str]:
 def images_of_held_input(
     linear: Linearization, omega: Floats, records: Sequence[Record]
 ) -> NDArray[np.complex128]:
-    """Return the contribution of a held input to measured responses from around the multiples of the sampling frequency.
-
-    The steps or lines of a hold have a spectrum there. In samples of a response that falls off slowly, such as that of a pressure
-    or a speed, it appears at low frequencies (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, Prentice Hall 1997).
-    Zero if the records differ in sample time or hold, or the input has no content there.
-    """
+    """Return the contribution of a held input to measured responses from around the multiples of the sampling frequency."""
+    # The steps or lines of a hold have a spectrum there. In samples of a response that falls off slowly, such as that of a
+    # pressure or a speed, it appears at low frequencies (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, Prentice
+    # Hall 1997). Zero if the records differ in sample time or hold, or the input has no content there.
     none = np.zeros((omega.size, len(linear.outputs), len(linear.inputs)), dtype=np.complex128)
     holds, times = {record.hold for record in records}, [record.dt for record in records]
     power = {"zoh": 1, "foh": 2}.get(holds.pop() if len(holds) == 1 else "band_limited")

@@ -89,10 +89,8 @@ def identify_record(
 def with_own_fit(
     found: RecordIdentification, rig: Rig, own: PhysicalEstimates, constants: Mapping[str, float]
 ) -> RecordIdentification:
-    """Return the results of a record with the parameters that were fitted to it over time.
-
-    A step, and an element, have the parameters of their paths from this fit, and so has every record its rest positions.
-    """
+    """Return the results of a record with the parameters that were fitted to it over time."""
+    # A step, and an element, have the parameters of their paths from this fit, and so has every record its rest positions.
     paths = tuple(_with_parameters(path, found.record, rig, own, constants) for path in found.paths)
     offsets = None
     if any(path.physical is not None for path in paths):
@@ -237,10 +235,8 @@ def _fit(seen: RecordResponse, order: Order, options: EstimationOptions) -> Tran
 
 
 def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> TransferFit:
-    """Fit a form whose order is too low.
-
-    A PT2 is fitted to the magnitude, as in the thesis (section 4.4), because other phase shifts would distort the peak.
-    """
+    """Fit a form whose order is too low."""
+    # A PT2 is fitted to the magnitude, as in the thesis (section 4.4), because other phase shifts would distort the peak.
     fit, share = fit_with_relative_error(response, order, magnitude_only=order == "pt2")
     read = " The fit uses magnitudes only." if order == "pt2" else ""
     note = (

@@ -135,19 +135,15 @@ class RigEquations:
         )
 
     def at_places(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
-        """Return motion and forces of joints and drives, shape (n_samples,) each.
-
-        ``motion@J`` (from rest), ``rate@J``, ``spring@J``, ``damper@J``, ``own@J`` (other resisting forces) of a joint,
-        ``signal@D`` and ``force@D`` of a drive.
-        """
+        """Return motion and forces of joints and drives, shape (n_samples,) each."""
+        # ``motion@J`` (from rest), ``rate@J``, ``spring@J``, ``damper@J``, ``own@J`` (other resisting forces) of a joint,
+        # ``signal@D`` and ``force@D`` of a drive.
         rows = self._evaluated(self._of_places[1], z, u, p)
         return dict(zip(self._of_places[0], rows, strict=True))
 
     def slopes_along(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
-        """Return the derivatives of the motion of each joint and of each drive by the degrees of freedom.
-
-        Shape (n_coordinates, n_samples) each.
-        """
+        """Return the derivatives of the motion of each joint and of each drive by the degrees of freedom."""
+        # Shape (n_coordinates, n_samples) each.
         mechanism = self.rig.mechanism
         places = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
         shape = (len(places), self.n_coordinates, z.shape[1])
@@ -157,10 +153,8 @@ class RigEquations:
     def changes_of_equations(
         self, z: Floats, u: Floats, p: Floats, accelerations: Floats
     ) -> tuple[Floats, Floats]:
-        """Return the size of the largest part of each equation, and the derivatives of the equations by the parameters.
-
-        The equations are those of motion (as forces), of the own states (as rates) and of the sensors.
-        """
+        """Return the size of the largest part of each equation, and the derivatives of the equations by the parameters."""
+        # The equations are those of motion (as forces), of the own states (as rates) and of the sensors.
         parts, slopes, ends = self._of_parameters
         arguments = [*z, *u, 0.0, *p, *accelerations]
         rows = rows_of(parts(*arguments), z.shape[1])

@@ -49,10 +49,8 @@ def undetermined(root: Floats) -> Floats:
 
 
 def sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the direction with the fewest members among those of a reduced row echelon form, and the members' indices.
-
-    A member has a large relative change itself, or a large influence on the outputs.
-    """
+    """Return the direction with the fewest members among those of a reduced row echelon form, and the members' indices."""
+    # A member has a large relative change itself, or a large influence on the outputs.
     rows = (free * influence[:, None]).T
     for place in range(rows.shape[0]):
         pivot = np.unravel_index(np.argmax(np.abs(rows[place:])), rows[place:].shape)

@@ -161,10 +161,8 @@ def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]
 
 
 def _run(command: Sequence[str], place: str) -> tuple[int, str]:
-    """Run a compiler in a folder that holds its own temporary files too; return its exit code and output.
-
-    It runs programs of its own, which end with it when we are interrupted.
-    """
+    """Run a compiler in a folder that holds its own temporary files too; return its exit code and output."""
+    # It runs programs of its own, which end with it when we are interrupted.
     with subprocess.Popen(
         command,
         cwd=place,

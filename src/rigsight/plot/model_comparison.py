@@ -126,10 +126,8 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
 
 
 def _responses_grid(rows: int, panels: int, n_models: int, height: float) -> tuple[Figure, NDArray[Any]]:
-    """Return a figure, this high [inch] for each line of panels, and below a legend of these models its axes.
-
-    Each panel has its rows below each other, the upper one taller; panels that find no room begin a line of their own.
-    """
+    """Return a figure, this high [inch] for each line of panels, and below a legend of these models its axes."""
+    # Each panel has its rows below each other, the upper one taller; panels that find no room begin a line of their own.
     legend_rows = -(-(n_models + 1) // _LEGEND_COLUMNS)
     lines = -(-panels // _MOST_COLUMNS)
     columns = -(-panels // lines)

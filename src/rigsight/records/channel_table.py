@@ -40,11 +40,9 @@ def read_columns(
     dt: float | None = None,
     dialect: Mapping[str, object] | None = None,
 ) -> Columns:
-    """Read the columns or channels that `columns` asks for, and their time, as they stand there; others may hold anything.
-
-    Time is, in this order: `dt`; the channel that a signal's mapping names as its time; the time that the file shows to be the
-    signal's own; the channel that was mapped to time, or has its name; the axis of the channel.
-    """
+    """Read the columns or channels that `columns` asks for, and their time, as they stand there; others may hold anything."""
+    # Time is, in this order: `dt`; the channel that a signal's mapping names as its time; the time that the file shows to be the
+    # signal's own; the channel that was mapped to time, or has its name; the axis of the channel.
     with _opened(path, columns, dialect or {}) as file:
         selection = _Selection(path, file, columns, optional)
         possible = selection.possible_times(time_is_mapped) if dt is None else selection.shown_times(dt)

@@ -26,12 +26,10 @@ def is_time(name: str) -> bool:
 
 
 def own_clocks(names: Sequence[str]) -> Mapping[int, int]:
-    """Return the number of each channel -> the number of the time that is its own, where a file shows that; else without it.
-
-    A file shows it by names (``Time Force`` beside ``Force``), by groups (a time in the group of a channel, or in the nearest one
-    around it), or by order (columns of time of one name, each in front of its signals). One time alone belongs to no one in
-    particular.
-    """
+    """Return the number of each channel -> the number of the time that is its own, where a file shows that; else without it."""
+    # A file shows it by names (``Time Force`` beside ``Force``), by groups (a time in the group of a channel, or in the nearest
+    # one around it), or by order (columns of time of one name, each in front of its signals). One time alone belongs to no one in
+    # particular.
     times = [number for number, name in enumerate(names) if is_time(name)]
     named = _by_name(names)
     if len(set(times) | set(named.values())) < 2:

@@ -137,12 +137,10 @@ def stamp_text(stamps: Floats, sample: int) -> str:
 
 
 def pauses(stamps: Floats) -> NDArray[np.intp]:
-    """Return the samples after which others are missing; none where steps vary (jitter).
-
-    A step is a gap if it is longer than the others vary by at least half a sample, if it is longer by whole samples (or by more
-    than `LARGEST_JITTER`), and if the clock does not catch up behind it. Where too little would be left between gaps
-    short enough to be interpolated, there are none.
-    """
+    """Return the samples after which others are missing; none where steps vary (jitter)."""
+    # A step is a gap if it is longer than the others vary by at least half a sample, if it is longer by whole samples (or by more
+    # than `LARGEST_JITTER`), and if the clock does not catch up behind it. Where too little would be left between gaps
+    # short enough to be interpolated, there are none.
     none, steps = np.zeros(0, dtype=np.intp), np.diff(stamps)
     if steps.size == 0 or np.any(steps <= 0.0):
         return none
@@ -179,10 +177,8 @@ def missing_behind(stamps: Floats, sample: int) -> int:
 
 
 def resolution(stamps: Floats) -> Floats:
-    """Return the spacing of the numbers that the file's digits can express at each stamp, shape (n_samples,).
-
-    Files print either a fixed number of decimals or of significant digits; the coarser of both explains a stamp's rounding.
-    """
+    """Return the spacing of the numbers that the file's digits can express at each stamp, shape (n_samples,)."""
+    # Files print either a fixed number of decimals or of significant digits; the coarser of both explains a stamp's rounding.
     chosen = np.unique(np.linspace(0, stamps.size - 1, STAMPS_LOOKED_AT).astype(np.int64))
     digits = [_digits(float(stamp)) for stamp in stamps[chosen]]
     decimals = max(after_point for _, after_point in digits)

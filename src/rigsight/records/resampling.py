@@ -51,12 +51,10 @@ def joined(
     step: float | None,
     holds: Mapping[str, Hold],
 ) -> Resampled:
-    """Return the signals on the even clock that all of them cover.
-
-    A held input (``"zoh"``) becomes its mean over each sample, which keeps its impulse; outputs and other inputs are interpolated
-    by cubic splines, inputs of ``"foh"`` linearly where that predicts left out samples better. For a clock coarser than that of a
-    signal, the signal is low-pass filtered first, without delay.
-    """
+    """Return the signals on the even clock that all of them cover."""
+    # A held input (``"zoh"``) becomes its mean over each sample, which keeps its impulse; outputs and other inputs are
+    # interpolated by cubic splines, inputs of ``"foh"`` linearly where that predicts left out samples better. For a clock coarser
+    # than that of a signal, the signal is low-pass filtered first, without delay.
     distinct = list({id(base): base for base in bases.values()}.values())
     dt = min(base.dt for base in distinct) if step is None else step
     start, n_samples = _common(file, bases, dt, _reference(bases, dt, holds), step)
@@ -124,11 +122,9 @@ def _common(
 def _interpolated(
     samples: Floats, base: TimeBase, grid: Floats, dt: float, hold: Hold | None
 ) -> tuple[Floats, str, float]:
-    """Return samples of shape (n_samples,) on the new clock, in which manner they were found, and the cost as a share of the RMS.
-
-    Of a held input the cost is what differs from it between the samples; of others the error with which every second sample is
-    found from its neighbors: the noise included, and at twice the distance that is interpolated here.
-    """
+    """Return samples of shape (n_samples,) on the new clock, the manner in which they were found, and the cost over the RMS."""
+    # Of a held input the cost is what differs from it between the samples; of others the error with which every second sample is
+    # found from its neighbors: the noise included, and at twice the distance that is interpolated here.
     stamps, rms = base.times(), float(np.std(samples)) or 1.0
     if hold == "zoh":
         means, spread = _means_of_held(samples, stamps, grid, dt)
@@ -146,11 +142,9 @@ def _interpolated(
 
 
 def _means_of_held(samples: Floats, stamps: Floats, grid: Floats, dt: float) -> tuple[Floats, float]:
-    """Return a signal that is held over each sample of the grid, and the RMS of what it differs from the one held at the stamps.
-
-    It is the mean over the sample, which alone would be late or early by the moment of what lies within; that moment is made up
-    for by the samples beside it.
-    """
+    """Return a signal held over each sample of the grid, and the RMS of what it differs from the one held at the stamps."""
+    # It is the mean over the sample, which alone would be late or early by the moment of what lies within; that moment is made up
+    # for by the samples beside it.
     edges = np.append(grid, grid[-1] + dt)
     first = np.clip(np.searchsorted(stamps, grid + _ON_GRID * dt, "right") - 1, 0, None)
     last = np.clip(np.searchsorted(stamps, edges[1:] - _ON_GRID * dt, "left") - 1, 0, None)

@@ -61,11 +61,9 @@ class Code:
 
 
 def codes(samples: Floats) -> tuple[Code, ...]:
-    """Return the codes for no reading in a signal of shape (n_samples,), all finite.
-
-    A code is a usual number for it, rare, and further from all readings than any two of them that follow each other: a signal
-    that reaches such a number by itself passes through what lies between.
-    """
+    """Return the codes for no reading in a signal of shape (n_samples,), all finite."""
+    # A code is a usual number for it, rare, and further from all readings than any two of them that follow each other: a signal
+    # that reaches such a number by itself passes through what lies between.
     huge = np.abs(samples) >= _CODE_SIZE
     usual = np.isin(samples, _CODES)
     if not huge.any() and not usual.any():
@@ -89,10 +87,8 @@ def codes(samples: Floats) -> tuple[Code, ...]:
 
 
 def is_wrapped(samples: Floats, period: float) -> bool:
-    """Return True if a signal of shape (n_samples,) begins again at the end of a period, as an angle does after a full turn.
-
-    It stays within one period, and at each jump it moves on as it does elsewhere if a period is added or taken off.
-    """
+    """Return True if a signal of shape (n_samples,) begins again at the end of a period, as an angle does after a full turn."""
+    # It stays within one period, and at each jump it moves on as it does elsewhere if a period is added or taken off.
     if not np.ptp(samples) <= (1.0 + _OVER_THE_END) * period:
         return False
     steps = np.diff(samples)
@@ -130,11 +126,9 @@ class Held:
 
 
 def held(samples: Floats) -> Held | None:
-    """Return how a signal of shape (n_samples,) is held over several rows; None if it is not.
-
-    It then changes after the same number of rows again and again, and never in two rows that follow each other. Rounding and rest
-    hold a signal as well, but for as long as the motion takes.
-    """
+    """Return how a signal of shape (n_samples,) is held over several rows; None if it is not."""
+    # It then changes after the same number of rows again and again, and never in two rows that follow each other. Rounding and
+    # rest hold a signal as well, but for as long as the motion takes.
     changes = np.flatnonzero(np.diff(samples)) + 1
     # What steps between a few levels is a switch or a command.
     if changes.size < FEWEST_FRESH or np.unique(samples).size < FEWEST_FRESH:
@@ -232,11 +226,9 @@ def _period(
 def between_readings(
     path: Path, time: str, table: Columns, sensors: Collection[str]
 ) -> tuple[Columns, tuple[str, ...]]:
-    """Return a table in which a reading that is held over several rows is interpolated between its own rows, with notes.
-
-    What the rig did meanwhile is smooth; what stands in the file is the last reading, too late by up to the
-    time between two of them. Rows before the first and behind the last reading are left out.
-    """
+    """Return a table in which a reading that is held over several rows is interpolated between its own rows, with notes."""
+    # What the rig did meanwhile is smooth; what stands in the file is the last reading, too late by up to the
+    # time between two of them. Rows before the first and behind the last reading are left out.
     found = {s: slow for s in sensors if s in table.values and (slow := held(table.values[s])) is not None}
     if not found:
         return table, ()

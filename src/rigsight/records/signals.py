@@ -51,12 +51,10 @@ def moves_beyond_noise(samples: Floats) -> bool:
 
 
 def clipping(samples: Floats) -> tuple[tuple[float, int], ...]:
-    """Return level and number of samples for each extreme at which a signal of shape (n_samples,) is clipped.
-
-    A clipped signal reaches its extreme at speed and is exactly constant there, repeatedly, while it changes from sample to
-    sample elsewhere. Steps, held inputs and coarsely quantized signals are constant elsewhere too; a signal at rest reaches its
-    level once, or slowly.
-    """
+    """Return level and number of samples for each extreme at which a signal of shape (n_samples,) is clipped."""
+    # A clipped signal reaches its extreme at speed and is exactly constant there, repeatedly, while it changes from sample to
+    # sample elsewhere. Steps, held inputs and coarsely quantized signals are constant elsewhere too; a signal at rest reaches its
+    # level once, or slowly.
     steps = np.diff(samples)
     typical_step = float(np.sqrt(np.mean(steps**2)))
     moving = np.abs(steps[steps != 0.0])

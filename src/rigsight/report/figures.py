@@ -116,10 +116,8 @@ def rig_figure(diagnosis: Diagnosis) -> PageFigure | None:
 
 
 def suspected_places(diagnosis: Diagnosis, rig: Rig) -> dict[str, plot.PlaceMark]:
-    """Return how strongly each joint, drive, sensor or state of a rig is suspected.
-
-    What the verdict names has strength 1; a rival has the probability of the candidates that act there.
-    """
+    """Return how strongly each joint, drive, sensor or state of a rig is suspected."""
+    # What the verdict names has strength 1; a rival has the probability of the candidates that act there.
     strengths: dict[tuple[str, bool], float] = {}
     labels: dict[tuple[str, bool], list[str]] = {}
     for candidate in diagnosis.candidates:
@@ -169,11 +167,9 @@ def _rig_caption(marks: Mapping[str, plot.PlaceMark], rig: Rig) -> str:
 
 
 def loop_figures(diagnosis: Diagnosis) -> list[PageFigure]:
-    """Return the force over displacement and over velocity: a figure per amplitude, none of a rig that is driven.
-
-    Of several records with the same amplitude the one that was scored is shown, else the first. Records without an amplitude
-    are shown one by one.
-    """
+    """Return the force over displacement and over velocity: a figure per amplitude, none of a rig that is driven."""
+    # Of several records with the same amplitude the one that was scored is shown, else the first. Records without an amplitude
+    # are shown one by one.
     rig = rig_of(diagnosis)
     if rig is None or rig.is_driven or not rig.has_one_motion or diagnosis.windows is not None:
         return []

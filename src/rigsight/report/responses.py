@@ -55,13 +55,10 @@ class PathResponse:
 
 
 def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, ...]:
-    """Return the responses of one record, path by path; none of a step, of an element, or where nothing stands out.
-
-    Of a rig with several inputs and sensors they are those to each input beside the others; of very many those of the sensors
-    with the largest gaps.
-
-    There are none of a rig that drifts: what follows the measured motion has the measured response.
-    """
+    """Return the responses of one record, path by path; none of a step, of an element, or where nothing stands out."""
+    # Of a rig with several inputs and sensors they are those to each input beside the others; of very many those of the sensors
+    # with the largest gaps.
+    # There are none of a rig that drifts: what follows the measured motion has the measured response.
     rig = rig_of(diagnosis)
     signals = {*trace.inputs, *trace.measured}
     if rig is None or not rig.is_driven or diagnosis.bandwidth is not None:

@@ -214,10 +214,8 @@ def _parameters(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Iterator[P
 
 
 def trust_view(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Return figure and rows of the section; None where the question was not asked.
-
-    There is no figure where no number was estimated in two groups.
-    """
+    """Return figure and rows of the section; None where the question was not asked."""
+    # There is no figure where no number was estimated in two groups.
     if diagnosis.trust is None:
         return None
     figure = None

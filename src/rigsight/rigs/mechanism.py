@@ -69,11 +69,9 @@ class Mechanism:
 
     @cached_property
     def has_one_motion(self) -> bool:
-        """True for one joint along the one coordinate, moved by one input or following it, without feedback.
-
-        Then ``inertia * x'' = gain * u + bias - stiffness * (x - rest) - damping * x'`` says it all, or, of a
-        prescribed motion, what its joint resists with.
-        """
+        """True for one joint along the one coordinate, moved by one input or following it, without feedback."""
+        # Then ``inertia * x'' = gain * u + bias - stiffness * (x - rest) - damping * x'`` says it all, or, of a
+        # prescribed motion, what its joint resists with.
         if not len(self.coordinates) == len(self.joints) == len(self.inputs) == 1 or self.potential != 0:
             return False
         (coordinate,), (joint,) = self.coordinates, self.joints
@@ -131,10 +129,8 @@ class Mechanism:
 
     @cached_property
     def bodies_are_nonlinear(self) -> bool:
-        """True where bodies that another program simulates read parameters of the rig, or the forces on them.
-
-        Its equations are no sums of terms then, each of one parameter.
-        """
+        """True where bodies that another program simulates read parameters of the rig, or the forces on them."""
+        # Its equations are no sums of terms then, each of one parameter.
         return self.bodies is not None and (bool(self.asked) or self.bodies.program.reads_forces)
 
     @cached_property
@@ -156,11 +152,9 @@ class Mechanism:
 
     @cached_property
     def generalized_forces(self) -> tuple[sp.Expr, ...]:
-        """What the energies contribute to ``mass_matrix @ q'' = ...``, one for each degree of freedom.
-
-        By Lagrange's equations ``d/dt dT/dq' - dT/dq + dV/dq = Q``, the part with the accelerations on the other side. The
-        acceleration of a prescribed coordinate is the symbol ``dd(NAME)``.
-        """
+        """What the energies contribute to ``mass_matrix @ q'' = ...``, one for each degree of freedom."""
+        # By Lagrange's equations ``d/dt dT/dq' - dT/dq + dV/dq = Q``, the part with the accelerations on the other side. The
+        # acceleration of a prescribed coordinate is the symbol ``dd(NAME)``.
         forces = []
         for coordinate, momentum in zip(self.free, self._momenta, strict=True):
             lagrangian = derivative(self.kinetic - self.potential, coordinate.symbol)
@@ -168,10 +162,8 @@ class Mechanism:
         return tuple(forces)
 
     def _along_motion(self, expression: sp.Expr) -> sp.Expr:
-        """Return the time derivative of an expression while the rates of the degrees of freedom stay as they are.
-
-        One derivative along the motion: one for each coordinate takes many times as long on an arm of six joints.
-        """
+        """Return the time derivative of an expression while the rates of the degrees of freedom stay as they are."""
+        # One derivative along the motion: one for each coordinate takes many times as long on an arm of six joints.
         ahead = sp.Symbol("time ahead", real=True)
         moved = {c.symbol: c.symbol + ahead * c.rate for c in self.coordinates}
         moved |= {c.rate: c.rate + ahead * acceleration(c) for c in self.prescribed}
@@ -189,11 +181,10 @@ class Mechanism:
         return self.rate(expression) + along
 
     def carried_by(self, joint: Joint) -> sp.Expr:
-        """Return what drives, weight and other joints' springs put on a joint: what drives push along it less what the others do.
-
-        Of a joint along one coordinate that is all that acts along this coordinate while nothing moves. A joint between several
-        coordinates carries the drives that push along its own motion; how weight is shared between such joints no equation says.
-        """
+        """Return what drives, weight and other joints' springs put on a joint: the push of drives less what the others do."""
+        # Of a joint along one coordinate that is all that acts along this coordinate while nothing moves. A joint between several
+        # coordinates carries the drives that push along its own motion; how weight is shared between such joints no equation
+        # says.
         along = [c for c in self.coordinates if derivative(joint.motion, c.symbol) != 0]
         at_rest = {c.rate: sp.Integer(0) for c in self.coordinates}
         if len(along) == 1:
@@ -225,10 +216,8 @@ class Mechanism:
         return has_short_inverse(self.mass_matrix)
 
     def inertia_along(self, expression: sp.Expr) -> sp.Expr | None:
-        """Return the inertia that a force along an expression of the coordinates moves; None where it moves nothing.
-
-        ``1 / (J M^-1 J^T)`` with the slopes J of the expression: O. Khatib, IEEE J. Robot. Autom. 3 (1987) 43.
-        """
+        """Return the inertia that a force along an expression of the coordinates moves; None where it moves nothing."""
+        # ``1 / (J M^-1 J^T)`` with the slopes J of the expression: O. Khatib, IEEE J. Robot. Autom. 3 (1987) 43.
         slopes = sp.Matrix([[derivative(expression, c.symbol) for c in self.free]])
         if not self.moves_inertia(expression):
             return None
@@ -247,10 +236,8 @@ class Mechanism:
 
 
 def _shortened(expression: sp.Expr) -> sp.Expr:
-    """Return an expression with products of sines and cosines as sums, if that is shorter: then what cancels is gone.
-
-    R. G. Fu et al., Math. Comput. Model. 44 (2006) 748, rule TR8.
-    """
+    """Return an expression with products of sines and cosines as sums, if that is shorter: then what cancels is gone."""
+    # R. G. Fu et al., Math. Comput. Model. 44 (2006) 748, rule TR8.
     if sp.count_ops(expression) > _LONGEST_SHORTENED:
         return expression
     other = sp.expand(TR8(sp.expand(expression)))

@@ -71,11 +71,9 @@ class _Joint:
 def joint_table(
     model: mujoco.MjModel, joint: TreeJoint, name: str, numbers: DeclaredNumbers
 ) -> dict[str, Any]:
-    """Return ``[joints.NAME]``, with its numbers declared as parameters.
-
-    The inertia that moves with it is that of the model as it is drawn. Effects that read one, a flexible mode, take it for
-    constant.
-    """
+    """Return ``[joints.NAME]``, with its numbers declared as parameters."""
+    # The inertia that moves with it is that of the model as it is drawn. Effects that read one, a flexible mode, take it for
+    # constant.
     own, moved = _Joint(joint, name, numbers), 1.0 / float(model.dof_invweight0[joint.dof])
     about = f"inertia moved by {name} in the reference pose of the model"
     inertia = numbers.constant(f"{name}_inertia", moved, own.unit("{inertia}"), about)
@@ -234,11 +232,9 @@ def plain_drive(joint: TreeJoint, coordinate: str, names: Names) -> DriveTables:
 def drive_of(
     actuator: TreeActuator, joint: TreeJoint, coordinate: str, names: Names, numbers: DeclaredNumbers
 ) -> DriveTables:
-    """Return the drive of an actuator.
-
-    Its signal is the control, as MuJoCo delays and limits that: effects of the actuator act in front of the position or velocity
-    controller.
-    """
+    """Return the drive of an actuator."""
+    # Its signal is the control, as MuJoCo delays and limits that: effects of the actuator act in front of the position or
+    # velocity controller.
     # Actuators are mostly called as their joints are.
     wished = f"{coordinate}_motor" if actuator.name in ("", coordinate) else actuator.name
     name = names.free(wished, "actuator")

@@ -291,11 +291,9 @@ def with_gears(spec: mujoco.MjSpec, draft: RigDraft) -> mujoco.MjModel:
 
 
 def add_second_joint(spec: mujoco.MjSpec, first: Any, stiffness: float, damping: float, play: float) -> str:
-    """Add what lies between a rotor and its body to a MuJoCo model, and return the name of the joint.
-
-    Without play it is a spring. With play the spring acts beyond a range, as the limit of the joint, whose stiffness MuJoCo
-    counts by the inertia that it moves.
-    """
+    """Add what lies between a rotor and its body to a MuJoCo model, and return the name of the joint."""
+    # Without play it is a spring. With play the spring acts beyond a range, as the limit of the joint, whose stiffness MuJoCo
+    # counts by the inertia that it moves.
     import mujoco
 
     name = f"{first.name}_play"

@@ -107,10 +107,8 @@ def _value(structure: Structure, p: Floats, expression: sp.Expr) -> float:
 
 
 def _quiet_parameters(structure: Structure, p: Floats, critical_damping: float) -> Floats:
-    """Return parameters with the same equilibria, but with critical damping and without delays and disturbances.
-
-    An overshoot of the equilibrium would leave a memory in hysteresis and friction that a rig at rest does not have.
-    """
+    """Return parameters with the same equilibria, but with critical damping and without delays and disturbances."""
+    # An overshoot of the equilibrium would leave a memory in hysteresis and friction that a rig at rest does not have.
     quiet = p.copy()
     damping = structure.names.index(structure.rig.motion.damping.name)
     quiet[damping] = max(p[damping], critical_damping)
@@ -287,11 +285,9 @@ def residuals_at_rest(
     within: Callable[[sp.Expr, sp.Expr], sp.Expr],
     signs: Mapping[sp.Expr, sp.Expr] | None = None,
 ) -> tuple[dict[int, sp.Expr], set[int]]:
-    """Return what is zero at rest for each state but the velocities, by index, and the indices of memories.
-
-    It is what a coordinate lacks of balance, the rate of a state, or what a memory, which nothing moves at rest, has of the way
-    from the states before; `within` limits that to its range.
-    """
+    """Return what is zero at rest for each state but the velocities, by index, and the indices of memories."""
+    # It is what a coordinate lacks of balance, the rate of a state, or what a memory, which nothing moves at rest, has of the way
+    # from the states before; `within` limits that to its range.
     motion = structure.tree.motion
     n, still = len(motion.coordinates), {**_steady(structure), **dict.fromkeys(motion.velocities, sp.S.Zero)}
     lacking = (missing.xreplace(signs or {}).xreplace(still) for missing in structure.out_of_balance)

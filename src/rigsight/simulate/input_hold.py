@@ -73,10 +73,8 @@ class HeldInput:
         return replace(ours, coefficients=ours.coefficients + theirs.coefficients, continuous=continuous)
 
     def read_ahead(self, column: int, by: float) -> HeldInput:
-        """Return the same with one input advanced in time, with cubic Hermite interpolation between nodes.
-
-        Beyond either end it is continued with its slope and curvature there.
-        """
+        """Return the same with one input advanced in time, with cubic Hermite interpolation between nodes."""
+        # Beyond either end it is continued with its slope and curvature there.
         n, rows = self.n_pieces, self.coefficients.reshape(self.n_pieces + 1, -1, 4)
         if n == 0 or by == 0.0:
             return self
@@ -97,10 +95,8 @@ class HeldInput:
         return replace(self, coefficients=found.reshape(self.coefficients.shape))
 
     def at_samples(self, n_samples: int) -> Floats:
-        """Return each input with its first and second time derivative at the samples, shape (3 n_inputs, n_samples).
-
-        The values are those of the piece that begins there; at the last sample, those of the piece that ends there.
-        """
+        """Return each input with its first and second time derivative at the samples, shape (3 n_inputs, n_samples)."""
+        # The values are those of the piece that begins there; at the last sample, those of the piece that ends there.
         rows = self.coefficients.reshape(self.n_pieces + 1, -1, 4)
         starts = rows[1 :: self.per_sample][: n_samples - 1]
         tau, (c0, c1, c2, c3) = (self.interval if self.n_pieces else 0.0), rows[-1].T
@@ -154,11 +150,9 @@ def hold_motion(values: Floats, rates: Floats, dt: float) -> HeldInput:
 
 
 def hold_accelerated_motion(values: Floats, rates: Floats, accelerations: Floats, dt: float) -> HeldInput:
-    """Return a prescribed motion between samples from displacement, velocity and acceleration, each of shape (n_samples,).
-
-    One cubic piece per sample, given by displacements and velocities, has an acceleration that is wrong by 1 % at 17 samples a
-    cycle. Two pieces can have the given acceleration at both ends; displacement and velocity are continuous in the middle.
-    """
+    """Return a prescribed motion between samples from displacement, velocity and acceleration, each of shape (n_samples,)."""
+    # One cubic piece per sample, given by displacements and velocities, has an acceleration that is wrong by 1 % at 17 samples a
+    # cycle. Two pieces can have the given acceleration at both ends; displacement and velocity are continuous in the middle.
     h = 0.5 * dt
     v0, v1, s0, s1 = values[:-1], values[1:], rates[:-1], rates[1:]
     a0, a1 = accelerations[:-1], accelerations[1:]
@@ -226,10 +220,8 @@ def _band_limited_nodes(samples: Floats, dt: float) -> tuple[Floats, Floats]:
 
 
 def _is_followed_by_one_piece(nodes: Floats, slopes: Floats, dt: float) -> bool:
-    """Return True if one cubic piece per sample, through values and slopes at the samples, follows the input between them.
-
-    Twice as many pieces take a fit twice as many integration steps.
-    """
+    """Return True if one cubic piece per sample, through values and slopes at the samples, follows the input between them."""
+    # Twice as many pieces take a fit twice as many integration steps.
     at_samples, rising = nodes[::BAND_LIMITED_INTERVALS], slopes[::BAND_LIMITED_INTERVALS]
     in_the_middle = nodes[BAND_LIMITED_INTERVALS // 2 :: BAND_LIMITED_INTERVALS]
     cubic = 0.5 * (at_samples[:-1] + at_samples[1:]) - dt / 8.0 * np.diff(rising)
@@ -239,11 +231,9 @@ def _is_followed_by_one_piece(nodes: Floats, slopes: Floats, dt: float) -> bool:
 
 @cache
 def _interpolation_taps() -> tuple[Floats, Floats]:
-    """Return the filters that give values and slopes [per interval] at the interval boundaries.
-
-    The slope is the fourth-order difference quotient of a finer interpolation, of which only the values at the boundaries are
-    computed.
-    """
+    """Return the filters that give values and slopes [per interval] at the interval boundaries."""
+    # The slope is the fourth-order difference quotient of a finer interpolation, of which only the values at the boundaries are
+    # computed.
     from scipy.signal import firwin
 
     fine = _OVERSAMPLING * BAND_LIMITED_INTERVALS

@@ -94,10 +94,8 @@ class Linearization:
 
     @property
     def stability(self) -> Stability:
-        """Stability from the poles.
-
-        ``"drifts"`` if a pole is zero, so that the rig does not return; ``"undamped"`` if others are on the imaginary axis.
-        """
+        """Stability from the poles."""
+        # ``"drifts"`` if a pole is zero, so that the rig does not return; ``"undamped"`` if others are on the imaginary axis.
         if np.any(self.poles.real > self._rounding):
             return "unstable"
         on_axis = self.poles[self.poles.real >= -self._rounding]
@@ -140,11 +138,9 @@ class Linearization:
 
     @property
     def is_unstable(self) -> bool:
-        """Whether motion grows, delays inside loops included.
-
-        By the argument principle: without delays stable, with delays unstable if ``det(1 - L)`` with the loop L of their changes
-        turns about zero along the imaginary axis.
-        """
+        """Whether motion grows, delays inside loops included."""
+        # By the argument principle: without delays stable, with delays unstable if ``det(1 - L)`` with the loop L of their
+        # changes turns about zero along the imaginary axis.
         if self.stability == "unstable":
             return True
         late = self.late
@@ -284,10 +280,8 @@ def is_linear(structure: Structure, values: Mapping[str, float]) -> bool:
 
 @lru_cache(maxsize=128)
 def _opened(structure: Structure) -> tuple[Structure, tuple[sp.Expr, ...]]:
-    """Return a structure with the change of each delayed signal by its delay as a further state, and the delays.
-
-    The changes are zero in equilibrium. The signals before their delays are further outputs.
-    """
+    """Return a structure with the change of each delayed signal by its delay as a further state, and the delays."""
+    # The changes are zero in equilibrium. The signals before their delays are further outputs.
     tree = structure.tree
     changes = {
         d.symbol: sp.Symbol(f"change of {d.symbol.name}", real=True)
@@ -310,12 +304,10 @@ def _opened(structure: Structure) -> tuple[Structure, tuple[sp.Expr, ...]]:
 
 
 def _zeros(A: Floats, b: Floats, c: Floats, d: float) -> tuple[NDArray[np.complex128], float]:
-    """Return the zeros of ``c (s - A)^-1 b + d`` and the factor of its highest power.
-
-    They are the finite eigenvalues of the system pencil. Their number follows from the first of d, cb, cAb, ... that is not zero:
-    A. Emami-Naeini and P. Van Dooren, Automatica 18 (1982) 415. With rounding errors, infinite eigenvalues become large finite
-    ones.
-    """
+    """Return the zeros of ``c (s - A)^-1 b + d`` and the factor of its highest power."""
+    # They are the finite eigenvalues of the system pencil. Their number follows from the first of d, cb, cAb, ... that is not
+    # zero: A. Emami-Naeini and P. Van Dooren, Automatica 18 (1982) 415. With rounding errors, infinite eigenvalues become large
+    # finite ones.
     n = A.shape[0]
     size = float(np.max(np.abs(A), initial=0.0)) or 1.0
     leading, largest, count = d, 0.0, n

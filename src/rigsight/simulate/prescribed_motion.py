@@ -68,11 +68,9 @@ def _kept(displacement: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def smoothed_noise(displacement: Floats, noise: Floats, dt: float) -> tuple[Floats, Floats]:
-    """Return the change of the smoothing spline of a displacement due to additional noise, with unchanged smoothing.
-
-    Each cosine of the noise is smoothed by itself: a hundred times as fast as another spline, with the same result except at the
-    ends.
-    """
+    """Return the change of the smoothing spline of a displacement due to additional noise, with unchanged smoothing."""
+    # Each cosine of the noise is smoothed by itself: a hundred times as fast as another spline, with the same result except at
+    # the ends.
     n = noise.size
     weight = _penalty_kept(np.ascontiguousarray(displacement, dtype=np.float64).tobytes())
     lines = dct(noise, norm="ortho") / (1.0 + weight * _stiffness(n))
@@ -104,11 +102,9 @@ def _spline(samples: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _penalty(samples: Floats) -> float:
-    """Return the weight of the squared curvature that generalized cross validation chooses.
-
-    For equally spaced samples a cosine transform makes the smoothing spline diagonal (except at its ends), so that each trial
-    costs one sum; scipy's own choice takes seconds per record. The eigenvalues are those of the cubic spline.
-    """
+    """Return the weight of the squared curvature that generalized cross validation chooses."""
+    # For equally spaced samples a cosine transform makes the smoothing spline diagonal (except at its ends), so that each trial
+    # costs one sum; scipy's own choice takes seconds per record. The eigenvalues are those of the cubic spline.
     stiffness = _stiffness(samples.size)
     power = dct(samples - _end_slopes(samples), norm="ortho") ** 2
 

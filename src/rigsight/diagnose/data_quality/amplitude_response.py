@@ -22,10 +22,9 @@ from rigsight.rigs import Rig
 def amplitude_dependences(
     rig: Rig, records: Sequence[Record], faulty: Collection[tuple[str, str]] = ()
 ) -> tuple[AmplitudeDependence, ...]:
-    """Compare the frequency responses at the lowest and the highest amplitude of one kind of record, path by path.
-
-    On a rig with one motion the path from its input to its motion is compared, on any other those from each input to each sensor.
-    """
+    """Compare the frequency responses at the lowest and the highest amplitude of one kind of record, path by path."""
+    # On a rig with one motion the path from its input to its motion is compared, on any other those from each input to each
+    # sensor.
     if not rig.is_driven:
         return (
             AmplitudeDependence(

@@ -55,10 +55,8 @@ def with_offsets_told(quality: DataQuality, context: FitContext, model: FittedMo
 
 
 def with_best_model(quality: DataQuality, context: FitContext, model: FittedModel) -> DataQuality:
-    """Test the hold of the input again with the effects in the model that may have hidden its part of the gap.
-
-    A delay that is shorter than a sample is left out for it: a wrong hold looks like half a sample of delay.
-    """
+    """Test the hold of the input again with the effects in the model that may have hidden its part of the gap."""
+    # A delay that is shorter than a sample is left out for it: a wrong hold looks like half a sample of delay.
     if not model.effects or any(finding.kind == "time_shift" for finding in quality.findings):
         return quality
     effects, base = without_short_delays(context, model)

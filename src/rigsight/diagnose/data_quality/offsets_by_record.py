@@ -28,11 +28,9 @@ _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in 
 def asked_offsets(
     context: FitContext, reidentified: FittedModel, singles: Sequence[FittedModel], allowed: float
 ) -> Finding | None:
-    """Return the evidence for an offset in each record, None where there is none.
-
-    The model must explain the records once offsets are free: an asymmetric effect, whose mean grows with the motion, also shifts
-    records but leaves more than offsets do.
-    """
+    """Return the evidence for an offset in each record, None where there is none."""
+    # The model must explain the records once offsets are free: an asymmetric effect, whose mean grows with the motion, also
+    # shifts records but leaves more than offsets do.
     models = [reidentified, *(m for m in singles if m.fit.residuals and np.isfinite(m.error_over_noise))]
     forgetful = [m for m in models if not _remembers(m.effects)]
     # With the means gone they come nearest.
@@ -60,11 +58,9 @@ def asked_offsets(
 
 
 def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding]:
-    """Return the sensors whose mean differs between records by more than they move in any: fits start badly from there.
-
-    Springs return a rig to the same place if its inputs and constants are the same; nothing is reported otherwise, or for a rig
-    that can rest anywhere.
-    """
+    """Return the sensors whose mean differs between records by more than they move in any: fits start badly from there."""
+    # Springs return a rig to the same place if its inputs and constants are the same; nothing is reported otherwise, or for a rig
+    # that can rest anywhere.
     rig = context.rig
     if not _comes_back(context, records) or any(
         _apart(records, signal.name)[0] > 1.0 for signal in rig.inputs

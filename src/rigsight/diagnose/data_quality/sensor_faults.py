@@ -65,10 +65,8 @@ def _clipped(record: Record, name: str, unit: str) -> list[Finding]:
 
 
 def _quantized(record: Record, name: str, unit: str, n_given: int) -> list[Finding]:
-    """Find a channel whose values lie on so few levels that rounding is a good part of its noise.
-
-    An output that has no more levels than the input, `n_given`, may follow a staircase without noise.
-    """
+    """Find a channel whose values lie on so few levels that rounding is a good part of its noise."""
+    # An output that has no more levels than the input, `n_given`, may follow a staircase without noise.
     levels = np.unique(record[name])
     span = float(levels[-1] - levels[0])
     if not n_given < levels.size <= NOTES.fewest_levels:

@@ -107,10 +107,8 @@ class FitContext:
         return cut(records, max(periods * self.period, duration * len(self.look) / len(records) / most))
 
     def looking_at_residual(self, fit: FitResult) -> FitContext:
-        """Return the same, with the stretch of each estimation record that has the largest residual of a fit as `look`.
-
-        What one more effect would explain may lie far from the strongest motion, such as a second resonance.
-        """
+        """Return the same, with the stretch of each estimation record that has the largest residual of a fit as `look`."""
+        # What one more effect would explain may lie far from the strongest motion, such as a second resonance.
         if len(fit.residuals) != len(self.estimation):
             return self
         weights = np.array([1.0 / self.noise[signal.name] for signal in self.rig.outputs])
@@ -128,10 +126,8 @@ class FitContext:
         return compose(self.rig, (*self.modelled, *effects), fixed)
 
     def simplest(self, effects: Sequence[Effect], like: Structure | None = None) -> Structure:
-        """Return the same with parameters of these effects at the values that make the equations shorter.
-
-        A parameter that another structure with its effect left free stays free.
-        """
+        """Return the same with parameters of these effects at the values that make the equations shorter."""
+        # A parameter that another structure with its effect left free stays free.
         return self.composed(effects, special_values(self.rig, effects, self.modelled, like))
 
     def free_parameters(self, structure: Structure) -> list[str]:
@@ -166,10 +162,8 @@ class FitContext:
         )
 
     def releasable_parameters(self, structure: Structure) -> list[str]:
-        """Return the parameters freed after a first fit: a constant force, if an asymmetric spring determines it.
-
-        A symmetric spring does not distinguish them: a shift changes its slope, which is already free.
-        """
+        """Return the parameters freed after a first fit: a constant force, if an asymmetric spring determines it."""
+        # A symmetric spring does not distinguish them: a shift changes its slope, which is already free.
         bent = any(_sees_position(e) and not e.signature.even_harmonics for e in structure.effects)
         even = any(_sees_position(e) and e.signature.even_harmonics for e in structure.effects)
         if not (self.rig.has_one_motion and self.rig.is_driven and self.has_stiffness and bent and not even):
@@ -186,11 +180,9 @@ class FitContext:
         return not {symbol.name for symbol in self.rig.motion.stiffness.free_symbols} <= self.held
 
     def offered(self, effects: Iterable[Effect]) -> list[Effect]:
-        """Return the effects that apply to this rig and these records, each at each place.
-
-        Excluded are effects of the spring if there is none, effects of a drive whose input is constant, and effects with a mean
-        force if the constant force is unknown.
-        """
+        """Return the effects that apply to this rig and these records, each at each place."""
+        # Excluded are effects of the spring if there is none, effects of a drive whose input is constant, and effects with a mean
+        # force if the constant force is unknown.
         offered = [
             effect
             for effect in candidates_on(self.rig, effects, self.modelled)
@@ -224,11 +216,9 @@ class FitContext:
         roughly: bool = False,
         tolerance: float = _FINE_TOLERANCE,
     ) -> FittedModel:
-        """Simulate the scoring records with a fitted model; only their initial states are estimated.
-
-        `roughly` is sufficient to rank a model that is far from the best. The tolerance is that of the initial states: those of a
-        fit that was stopped early need not be exact.
-        """
+        """Simulate the scoring records with a fitted model; only their initial states are estimated."""
+        # `roughly` is sufficient to rank a model that is far from the best. The tolerance is that of the initial states: those of
+        # a fit that was stopped early need not be exact.
         if roughly:
             rough = self.problem(fit.structure, self.scoring, _ROUGH_ACCURACY)
             result = rough.fit(

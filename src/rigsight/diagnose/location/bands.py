@@ -17,11 +17,9 @@ from rigsight.diagnose.policy import MAPS
 
 
 def spectrum(samples: NDArray[np.float64], dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return frequencies [rad/s] and the mean square at each of them, shape (n_lines,); they add up to that of the samples.
-
-    The record is reflected at its ends: else the first and last half segment, where many sweeps have their slowest and fastest
-    waves, would weigh less than the rest.
-    """
+    """Return frequencies [rad/s] and the mean square at each of them, shape (n_lines,); they add up to that of the samples."""
+    # The record is reflected at its ends: else the first and last half segment, where many sweeps have their slowest and fastest
+    # waves, would weigh less than the rest.
     length = int(min(samples.size, max(MAPS.fewest_band_samples, samples.size // MAPS.segments)))
     padded = np.pad(samples, min(length // 2, samples.size - 1), mode="reflect")
     # scipy's stubs do not know detrend=False.

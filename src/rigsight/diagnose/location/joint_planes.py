@@ -28,14 +28,11 @@ Signals = Mapping[str, NDArray[np.float64]]
 def joint_parts(
     context: FitContext, reidentified: FittedModel, scored: Sequence[Trace]
 ) -> tuple[StatePart, ...]:
-    """Return the gap of each output over the plane of each joint's motion.
-
-    First the joint at which a force agrees best with the sensors. If a large effect is missing, the re-identified parameters are
-    inaccurate and so is this agreement: it only sorts and excludes nothing.
-
-    None beside effects that are modelled already, as the motion is followed with the rig's own equations, of a rig that nothing
-    but prescribed motions move, and where a sensor's level is not known.
-    """
+    """Return the gap of each output over the plane of each joint's motion."""
+    # First the joint at which a force agrees best with the sensors. If a large effect is missing, the re-identified parameters
+    # are inaccurate and so is this agreement: it only sorts and excludes nothing.
+    # None beside effects that are modelled already, as the motion is followed with the rig's own equations, of a rig that nothing
+    # but prescribed motions move, and where a sensor's level is not known.
     if not scored or context.modelled or not context.rig.mechanism.free:
         return ()
     if any(record.free_offsets for record in context.scoring):

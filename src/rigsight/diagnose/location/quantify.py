@@ -35,10 +35,8 @@ def gap_intervals(
     noise_floor: float,
     rng: np.random.Generator,
 ) -> dict[str, Interval]:
-    """Return 95 % intervals of the NRMSE of each stage, and of the share of the gap that is closed.
-
-    All stages are resampled together, so that a stretch with large motion affects all of them equally.
-    """
+    """Return 95 % intervals of the NRMSE of each stage, and of the share of the gap that is closed."""
+    # All stages are resampled together, so that a stretch with large motion affects all of them equally.
     stages = list(residuals)
     center = float(np.mean(np.concatenate(measured)))
     squares = [

@@ -87,11 +87,9 @@ def mean(several: Sequence[Estimates]) -> Estimates:
 
 
 def told_by_most(of: Pieces, groups: Sequence[Sequence[Piece]]) -> NDArray[np.bool_]:
-    """Return which parameters most groups determine alone when the others are held at the common fit, shape (n_free,).
-
-    A parameter that is equivalent to another in most groups, such as the two terms of a friction under a single load, is left
-    out; the other then represents both.
-    """
+    """Return which parameters most groups determine alone when the others are held at the common fit, shape (n_free,)."""
+    # A parameter that is equivalent to another in most groups, such as the two terms of a friction under a single load, is left
+    # out; the other then represents both.
     kept = np.ones(len(of.free), dtype=bool)
     while np.any(kept):
         worst = [own for group in groups if (own := _loosest(of, group, kept)) is not None]

@@ -88,10 +88,8 @@ def trust(
 
 
 def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) -> tuple[ParameterTrust, ...]:
-    """Return the parameters with a single cause if mass, stiffness and damping all rise or all fall with amplitude.
-
-    They share one equation with the drive: if the drive gives less force, all of them appear larger.
-    """
+    """Return the parameters with a single cause if mass, stiffness and damping all rise or all fall with amplitude."""
+    # They share one equation with the drive: if the drive gives less force, all of them appear larger.
     moved = [n for n in numbers if own.get(n.name) in (Role.MASS, Role.STIFFNESS, Role.DAMPING)]
     directions = {n.direction if n.pattern is Pattern.AMPLITUDE else 0 for n in moved}
     if (

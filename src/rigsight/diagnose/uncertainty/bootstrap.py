@@ -152,10 +152,8 @@ def _sources(
 def _size_at(
     joint: int, context: FitContext, shown: Callable[[int, float, int], _Shown], whole: float
 ) -> float:
-    """Return the white force at a joint that would cause about the whole residual; 0 where it shows in no sensor.
-
-    The size is increased in small steps, because sticking friction hides a small force.
-    """
+    """Return the white force at a joint that would cause about the whole residual; 0 where it shows in no sensor."""
+    # The size is increased in small steps, because sticking friction hides a small force.
     name = context.rig.mechanism.joints[joint].name
     size = _FIRST * context.scales[f"force@{name}"]
     for _ in range(_SIZING_ROUNDS):

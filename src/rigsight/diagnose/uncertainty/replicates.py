@@ -142,10 +142,8 @@ class Replicates:
 
 
 def with_forces(rig: Rig) -> Rig:
-    """Return a rig with a force at every joint; each is an input, see `push`.
-
-    It stands in the joint's own force, so that a sensor which reads that force shows it.
-    """
+    """Return a rig with a force at every joint; each is an input, see `push`."""
+    # It stands in the joint's own force, so that a sensor which reads that force shows it.
     mechanism = rig.mechanism
     names = tuple(push(joint.name) for joint in mechanism.joints)
     joints = tuple(

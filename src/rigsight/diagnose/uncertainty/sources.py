@@ -115,10 +115,8 @@ def likeliest_sources(
 
 
 def _likeliest(power: Floats, gains: Floats, weights: Floats) -> Floats:
-    """Return the maximum likelihood powers of sources, shape (n_sources,), from averaged spectral lines, shape (n,).
-
-    Each update lowers the weighted sum of ``log(expected) + power / expected`` and keeps powers positive.
-    """
+    """Return the maximum likelihood powers of sources, shape (n_sources,), from averaged spectral lines, shape (n,)."""
+    # Each update lowers the weighted sum of ``log(expected) + power / expected`` and keeps powers positive.
     size = float(np.mean(power))
     mean = np.asarray(np.mean(gains, axis=0), dtype=np.float64)
     shows = mean > 0.0

@@ -217,10 +217,8 @@ class Coordinates:
 
 
 def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
-    """Return the indices of a spring's stiffness and post-yield ratio, if both are fitted; for the first of several effects.
-
-    The spring is that of the joint at which the effect acts; its stiffness must be a single parameter.
-    """
+    """Return the indices of a spring's stiffness and post-yield ratio, if both are fitted; for the first of several effects."""
+    # The spring is that of the joint at which the effect acts; its stiffness must be a single parameter.
     rig = structure.rig
     stiffness_at = {joint.name: joint.stiffness for joint in rig.mechanism.joints}
     for effect in structure.effects:

@@ -74,10 +74,8 @@ def colored_covariance(
 
 
 def _interval_factors(reads: Sequence[tuple[Floats, Floats, int]]) -> Floats:
-    """Return the factors on variances for the few degrees of freedom of the noise, shape (n,).
-
-    Each of the records has its residuals, the weights with which the estimates read them, and the number of its outputs.
-    """
+    """Return the factors on variances for the few degrees of freedom of the noise, shape (n,)."""
+    # Each of the records has its residuals, the weights with which the estimates read them, and the number of its outputs.
     size, spread = 0.0, 0.0
     for residual, weights, count in reads:
         by_output = residual.reshape(count, -1)
@@ -166,11 +164,9 @@ def smoothed_spectrum(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128
 
 
 def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
-    """Return eigenvalues in ascending order, shape (n,), and eigenvectors as columns, shape (n, n).
-
-    Divide and conquer is faster but has failed on a well-conditioned matrix of 90 rows; relatively robust representations are
-    used then.
-    """
+    """Return eigenvalues in ascending order, shape (n,), and eigenvectors as columns, shape (n, n)."""
+    # Divide and conquer is faster but has failed on a well-conditioned matrix of 90 rows; relatively robust representations are
+    # used then.
     try:
         values, vectors = np.linalg.eigh(matrix)
     except np.linalg.LinAlgError:

@@ -229,10 +229,8 @@ def place_of_fit(
 
 
 def central_sensitivities(problem: Problem, theta: Floats) -> list[tuple[Floats, Floats]]:
-    """Return residuals and derivatives per record; if the derivatives are differences, central ones.
-
-    The error of one-sided differences is their step times the curvature, which looks like information where there is none.
-    """
+    """Return residuals and derivatives per record; if the derivatives are differences, central ones."""
+    # The error of one-sided differences is their step times the curvature, which looks like information where there is none.
     forward = problem.sensitivities(theta)
     if carries_tangents(problem.data.structure):
         return forward

@@ -66,10 +66,8 @@ def moves_freely(rig: Rig, record: Record) -> bool:
 def rig_state(
     equations: RigEquations, record: Record, values: Mapping[str, float], resting: int | None = None
 ) -> Floats:
-    """Return the state of a rig without effects that agrees best with the first samples of its sensors.
-
-    States that they do not determine are those of the static equilibrium under the first input.
-    """
+    """Return the state of a rig without effects that agrees best with the first samples of its sensors."""
+    # States that they do not determine are those of the static equilibrium under the first input.
     if not equations.shows_all_states(set(record.signals)):
         return _rig_state(equations, record, values, resting, equations.sensor_names)
     # The state then does not depend on the values, so it is cached for all candidates.
@@ -146,10 +144,8 @@ def _of_one_motion(structure: Structure, record: Record, values: Mapping[str, fl
 
 
 def _guessed_offsets(structure: Structure, record: Record, values: Mapping[str, float]) -> dict[str, float]:
-    """Return, for each sensor with a free offset, its mean reading minus that of the equilibrium under the mean input.
-
-    The zero of a sensor may be far off, too far for a descent from an offset of zero.
-    """
+    """Return, for each sensor with a free offset, its mean reading minus that of the equilibrium under the mean input."""
+    # The zero of a sensor may be far off, too far for a descent from an offset of zero.
     if not structure.offsets:
         return {}
     rig = structure.rig

@@ -80,10 +80,8 @@ def record_digest(record: Record) -> str:
 
 
 def fit_key(problem: Sequence[Any], theta: Floats, settings: Sequence[Any]) -> str:
-    """Return a hash of a fit: of its problem (plain data), its start and its settings.
-
-    Start values are hashed bit by bit: a fit from a slightly different value is a different fit.
-    """
+    """Return a hash of a fit: of its problem (plain data), its start and its settings."""
+    # Start values are hashed bit by bit: a fit from a slightly different value is a different fit.
     digest = hashlib.blake2b(digest_size=16)
     digest.update(json.dumps([problem, settings]).encode())
     digest.update(theta.tobytes())
@@ -139,11 +137,9 @@ class FitData:
         return self.threads.results(one, [record.record.n_samples for record in self.records])
 
     def state_sizes(self, p: Floats) -> Floats:
-        """Return the unit of each initial state in the fit, shape (n_states, n_sets).
-
-        A state with a limited range is fitted in units of that range, which may depend on the parameters: beyond its ends the
-        outputs do not depend on the state, and a fit that got there would not return.
-        """
+        """Return the unit of each initial state in the fit, shape (n_states, n_sets)."""
+        # A state with a limited range is fitted in units of that range, which may depend on the parameters: beyond its ends the
+        # outputs do not depend on the state, and a fit that got there would not return.
         sizes = np.repeat(self.unlimited_sizes, p.shape[1], axis=1)
         if np.any(self.limited):
             limits = state_limits(self.structure, p)

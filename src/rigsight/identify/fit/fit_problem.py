@@ -56,10 +56,8 @@ class Evaluation:
 
     @cached_property
     def compressed(self) -> tuple[Floats, Floats]:
-        """R and c with R^T R = J^T J and R^T c = J^T r, also for linearly dependent derivatives.
-
-        For a column of zeros, J^T J has a one on its diagonal.
-        """
+        """R and c with R^T R = J^T J and R^T c = J^T r, also for linearly dependent derivatives."""
+        # For a column of zeros, J^T J has a one on its diagonal.
         size = np.sqrt(np.diag(self.normal))
         size[size == 0.0] = 1.0
         correlation = self.normal / np.outer(size, size)
@@ -233,11 +231,9 @@ class Problem:
         return data.of_each_record(differences)
 
     def _place(self, theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return parameters, initial states and their derivatives by the coordinates on which a record depends.
-
-        Shapes (n_parameters,), (n_parameters, n), (n_records, n_states) and (n_states, n) with n = n_free + n_states. Structures
-        for which this is called have no limited states, so that the units of states do not depend on the parameters.
-        """
+        """Return parameters, initial states and their derivatives by the coordinates on which a record depends."""
+        # Shapes (n_parameters,), (n_parameters, n), (n_records, n_states) and (n_states, n) with n = n_free + n_states.
+        # Structures for which this is called have no limited states, so that the units of states do not depend on the parameters.
         own = theta[: self.n_free]
         p = self.coordinates.to_parameters(own)
         sizes = self.data.state_sizes(p[:, None])[: self.n_states, 0]
@@ -246,10 +242,8 @@ class Problem:
         return p, dp, theta[self.n_free :].reshape(len(self.data.records), self.n_states) * sizes, dx0
 
     def _sets(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the shift of each coordinate, and the sets of which differences are taken: the point and each shifted point.
-
-        The sets are parameters, shape (n_parameters, n_sets), and initial states, shape (n_records, n_states, n_sets).
-        """
+        """Return the shift of each coordinate, and the sets of which differences are taken: the point and each shifted point."""
+        # The sets are parameters, shape (n_parameters, n_sets), and initial states, shape (n_records, n_states, n_sets).
         shifts = np.where(theta + self.steps > self.upper, -self.steps, self.steps)
         base = self.coordinates.to_parameters(theta[: self.n_free])
         shifted = []

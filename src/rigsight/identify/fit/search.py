@@ -285,10 +285,8 @@ def _evaluated(problem: Problem, place: Floats) -> Evaluation:
 
 
 def _step(evaluation: Evaluation, bounds: tuple[Floats, Floats]) -> tuple[Floats, float]:
-    """Return a Gauss-Newton step within the bounds, and the change of the residuals, which bounds its size in standard errors.
-
-    Coordinates that the step would move beyond a bound are held.
-    """
+    """Return a Gauss-Newton step within the bounds, and the change of the residuals, which bounds its size in standard errors."""
+    # Coordinates that the step would move beyond a bound are held.
     place = evaluation.theta
     root, projection = evaluation.compressed
     free = np.ones(place.size, dtype=bool)

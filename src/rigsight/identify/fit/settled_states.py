@@ -52,11 +52,9 @@ _STEADY = 0.5
 
 
 def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
-    """Return an estimate of each record's initial state.
-
-    With limited states it is the best of several, moving and at rest. For a rig with more than one motion, and for a free
-    motion, it is fitted to the beginning of the record.
-    """
+    """Return an estimate of each record's initial state."""
+    # With limited states it is the best of several, moving and at rest. For a rig with more than one motion, and for a free
+    # motion, it is fitted to the beginning of the record.
     guesses = [first_state(data.structure, d.record, values) for d in data.records]
     p = parameter_vector(data.structure, values)
     if np.any(data.limited):
@@ -77,10 +75,8 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
 
 
 def moving_or_at_rest(data: FitData, values: Mapping[str, float], states: Sequence[Floats]) -> list[Floats]:
-    """Return each record's initial state, fitted to the whole record from the given one and from rest, whichever fits better.
-
-    While a joint sticks, its initial velocity has no effect: a descent neither leaves the state of rest nor finds it.
-    """
+    """Return each record's initial state, fitted to the whole record from the given one and from rest, whichever fits better."""
+    # While a joint sticks, its initial velocity has no effect: a descent neither leaves the state of rest nor finds it.
     p = parameter_vector(data.structure, values)
 
     def likelier(index: int) -> Floats:

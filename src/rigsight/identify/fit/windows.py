@@ -124,10 +124,8 @@ class Windowing:
 
 
 def readings(records: Sequence[Record], sensor: str) -> dict[str, Floats]:
-    """Return what a sensor shows in each record that holds it, windows joined, by the name of the record.
-
-    If the sensor has its own offset in each record, its mean is removed.
-    """
+    """Return what a sensor shows in each record that holds it, windows joined, by the name of the record."""
+    # If the sensor has its own offset in each record, its mean is removed.
     parts: dict[str, list[Floats]] = {}
     for record in records:
         if sensor in record:
@@ -152,10 +150,8 @@ def shown_by(rig: Rig, records: Sequence[Record]) -> list[str]:
 
 
 def window_length(rig: Rig, records: Sequence[Record]) -> float:
-    """Return a window length [s] that holds several of the typical periods of the velocity.
-
-    An axis without a spring integrates every force error twice; a window keeps that drift small compared with the motion.
-    """
+    """Return a window length [s] that holds several of the typical periods of the velocity."""
+    # An axis without a spring integrates every force error twice; a window keeps that drift small compared with the motion.
     dt = max(record.dt for record in records)
     longest = max(record.n_samples * record.dt for record in records)
     wished = max(_PERIODS * typical_period(rig, records), _SAMPLES * dt, longest / _MOST_WINDOWS)
@@ -176,10 +172,8 @@ def typical_period(rig: Rig, records: Sequence[Record]) -> float:
 
 
 def cut(records: Sequence[Record], length: float | None) -> tuple[Record, ...]:
-    """Return the records cut into windows of `length` [s], whole where it is None; a short rest joins the last window.
-
-    A window holds one sample at least.
-    """
+    """Return the records cut into windows of `length` [s], whole where it is None; a short rest joins the last window."""
+    # A window holds one sample at least.
     if length is None:
         return tuple(records)
     windows: list[Record] = []
@@ -204,11 +198,9 @@ def _at(record: Record, edges: Sequence[int]) -> list[Record]:
 
 
 def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
-    """Return the records, those of a free motion only until it has decayed.
-
-    The position at which friction stops a mass changes in jumps with the parameters: a fit that includes the following rest,
-    which may be long, would not leave its start.
-    """
+    """Return the records, those of a free motion only until it has decayed."""
+    # The position at which friction stops a mass changes in jumps with the parameters: a fit that includes the following rest,
+    # which may be long, would not leave its start.
     cut_off = []
     for record, output in zip(records, shown_by(rig, records), strict=True):
         stop = record.n_samples

@@ -258,10 +258,8 @@ def special_structure(structure: Structure, free: Sequence[str]) -> tuple[Struct
 
 
 def start_values(structure: Structure, start: Mapping[str, float]) -> dict[str, float]:
-    """Return a value for every parameter: the given one, else the first start value of its effect, else the default.
-
-    Values of effects are placeholders if a search over the whole range follows.
-    """
+    """Return a value for every parameter: the given one, else the first start value of its effect, else the default."""
+    # Values of effects are placeholders if a search over the whole range follows.
     of_rig = {p.name for p in (*structure.rig.constants, *structure.rig.parameters)}
     values = {p.name: p.default for p in structure.parameters if p.default is not None}
     values |= {p.name: p.starts[0] for p in structure.parameters if p.name not in of_rig and p.starts}

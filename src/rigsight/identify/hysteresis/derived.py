@@ -119,13 +119,11 @@ def derived_quantities(
 def parameter_draws(
     fit: FitResult, scales: Mapping[str, float], rng: np.random.Generator, n_draws: int
 ) -> Floats:
-    """Return the fitted parameters and draws of their covariance, shape (n_parameters, 1 + n_draws).
-
-    The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear. Draws outside the
-    admissible range (an exponent below 1) are moved to its nearest point in the metric of the fit, as the fit itself is:
-    otherwise the interval of a parameter at its bound would not contain the fitted value. Undetermined parameters keep their
-    values.
-    """
+    """Return the fitted parameters and draws of their covariance, shape (n_parameters, 1 + n_draws)."""
+    # The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear. Draws outside
+    # the admissible range (an exponent below 1) are moved to its nearest point in the metric of the fit, as the fit itself is:
+    # otherwise the interval of a parameter at its bound would not contain the fitted value. Undetermined parameters keep their
+    # values.
     structure = fit.structure
     center = np.array([fit.values[name] for name in structure.names])
     draws = np.repeat(center[:, None], 1 + n_draws, axis=1)
@@ -223,10 +221,8 @@ def _pairs(structure: Structure) -> list[tuple[Effect, SumAndDifference]]:
 
 
 def saturation_level(effect: Effect) -> sp.Expr | None:
-    """Return the limit of the state of a spring with memory under increasing deflection, in terms of its parameters.
-
-    None for an effect without such a spring, with several states, or whose state has no such limit (or several).
-    """
+    """Return the limit of the state of a spring with memory under increasing deflection, in terms of its parameters."""
+    # None for an effect without such a spring, with several states, or whose state has no such limit (or several).
     if effect.spring is None or len(effect.states) != 1 or effect.states[0].limit is not None:
         return None
     (state,) = effect.states

@@ -94,11 +94,9 @@ def any_rig_start(
 def _minima(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float], sought: Sequence[Parameter]
 ) -> Iterator[tuple[bool, bool, dict[str, float]]]:
-    """Yield local minima as start values, each with two flags: from the error of the equations, and to be examined further.
-
-    The flag for further examination is set for the lowest minimum of the searches with few starts. They come first; searches with
-    many starts follow if none of their minima explains the records.
-    """
+    """Yield local minima as start values, each with two flags: from the error of the equations, and to be examined further."""
+    # The flag for further examination is set for the lowest minimum of the searches with few starts. They come first; searches
+    # with many starts follow if none of their minima explains the records.
     equations, names = equations_of(rig), [p.name for p in sought]
     rng = np.random.default_rng(_SEED)
     weak = WeakEquations(equations, records, values, names)
@@ -169,10 +167,8 @@ class _Rough:
         return whole.cost / whole.n_samples <= _GROWN**2 * pieces.cost / max(1, pieces.n_samples)
 
     def lengthening(self, start: Mapping[str, float]) -> tuple[FitResult | None, FitResult]:
-        """Fit pieces of the records, of double length each time, then the whole records.
-
-        Over a short piece, even an unstable or chaotic motion stays close to the measured one.
-        """
+        """Fit pieces of the records, of double length each time, then the whole records."""
+        # Over a short piece, even an unstable or chaotic motion stays close to the measured one.
         explained: FitResult | None = None
         values, scales = start, scales_at_places(self._rig, self._records, start)
         for count in (count for count in _PIECES if count <= self._most_cuts):
@@ -206,10 +202,8 @@ def _reported(information: Floats, free: Sequence[str]) -> list[str]:
 
 
 def _noise(name: str, records: Sequence[Record]) -> float:
-    """Return an estimate of a sensor's noise: from the residual of a spline, or from the end of its spectrum.
-
-    The larger of the two is used, because the spline smooths little if the motion is fast.
-    """
+    """Return an estimate of a sensor's noise: from the residual of a spline, or from the end of its spectrum."""
+    # The larger of the two is used, because the spline smooths little if the motion is fast.
     held = [record for record in records if name in record]
     if not held:
         return 1.0

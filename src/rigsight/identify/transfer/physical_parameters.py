@@ -57,11 +57,9 @@ class PhysicalEstimates:
 
 
 def expressions_of_form(rig: Rig, order: Order) -> dict[str, sp.Expr]:
-    """Return gain, break frequency and, of a PT2, damping ratio that the equations of a rig of one motion give.
-
-    A PT2 leads from its input to its motion (thesis, 2.21), a PT1 from there to the state that follows (2.24). The place of the
-    velocity v is that of the lateral equation; in (2.25) it is on the wrong side, which has no effect for v = 1 m/s.
-    """
+    """Return gain, break frequency and, of a PT2, damping ratio that the equations of a rig of one motion give."""
+    # A PT2 leads from its input to its motion (thesis, 2.21), a PT1 from there to the state that follows (2.24). The place of the
+    # velocity v is that of the lateral equation; in (2.25) it is on the wrong side, which has no effect for v = 1 m/s.
     if order == "pt1":
         assert rig.follower is not None
         return {"gain": rig.follower.static_gain, "omega_b": rig.follower.gain * rig.follower.feedback}

@@ -195,10 +195,8 @@ class _Local:
 def fit_with_relative_error(
     response: FrequencyResponse, order: Order, magnitude_only: bool
 ) -> tuple[TransferFit, float]:
-    """Return a fit and the relative error, the same for every line, with which the form explains the response.
-
-    With the variances of the noise alone, the few most certain lines would dominate, wherever they are.
-    """
+    """Return a fit and the relative error, the same for every line, with which the form explains the response."""
+    # With the variances of the noise alone, the few most certain lines would dominate, wherever they are.
     assert response.variance is not None
     for share in _SHARES:
         variance = response.variance + (share * response.magnitude) ** 2
@@ -260,10 +258,8 @@ def _smaller_variance(
 
 
 def _clear(found: _Response, lines: int, least: float, least_share: float) -> _Response:
-    """Keep the lines between the outermost local bands in which most lines clearly exceed their uncertainty.
-
-    Single lines may do so by chance, above all where the beginning of a sweep cannot be distinguished from a transient.
-    """
+    """Keep the lines between the outermost local bands in which most lines clearly exceed their uncertainty."""
+    # Single lines may do so by chance, above all where the beginning of a sweep cannot be distinguished from a transient.
     assert found.variance is not None
     clear = np.abs(found.values) ** 2 > least * found.variance
     if clear.size <= lines or least == 0.0:

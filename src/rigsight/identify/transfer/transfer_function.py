@@ -401,12 +401,10 @@ def _projected(values: NDArray[np.complex128], basis: NDArray[np.float64]) -> ND
 
 
 def _scattered_weights(freedom: float) -> float:
-    """Return the factor on covariances for weights that are estimates themselves.
-
-    A line whose variance was estimated too small gets too much weight, and its error is underestimated as well. For a chi-squared
-    variance x with n = 2 freedom degrees of freedom, the variance of the sum is E[1/x^2], the stated one E[1/x], and the misfit
-    contains E[1/x]: ``E[1/x^2] / E[1/x]^2 = (n - 2) / (n - 4)``.
-    """
+    """Return the factor on covariances for weights that are estimates themselves."""
+    # A line whose variance was estimated too small gets too much weight, and its error is underestimated as well. For a
+    # chi-squared variance x with n = 2 freedom degrees of freedom, the variance of the sum is E[1/x^2], the stated one E[1/x],
+    # and the misfit contains E[1/x]: ``E[1/x^2] / E[1/x]^2 = (n - 2) / (n - 4)``.
     if not np.isfinite(freedom):
         return 1.0
     n = max(2.0 * freedom, 5.0)

@@ -261,10 +261,8 @@ def as_floats(samples: object) -> NDArray[np.float64]:
 
 
 def as_stamps(samples: object) -> NDArray[np.float64]:
-    """Return stored time as floats, shape (n_samples,).
-
-    Stamps in single precision are read as the decimal numbers that they print as: 0.1 was meant, not 0.10000000149.
-    """
+    """Return stored time as floats, shape (n_samples,)."""
+    # Stamps in single precision are read as the decimal numbers that they print as: 0.1 was meant, not 0.10000000149.
     array = np.asarray(samples).reshape(-1)
     if array.dtype == np.float32:
         return np.array([float(str(stamp)) for stamp in array], dtype=np.float64)

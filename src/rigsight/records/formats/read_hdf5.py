@@ -23,11 +23,9 @@ from rigsight.records.formats.channel import (
 
 
 def open_hdf5(path: Path) -> Iterator[ChannelFile]:
-    """Yield the channels of an HDF5 file: every real dataset, named by its path, converted by its attributes.
-
-    Time is a dataset like any other. Links into other files are not followed and references not resolved: a file that was
-    sent to someone must not read what is none of its business.
-    """
+    """Yield the channels of an HDF5 file: every real dataset, named by its path, converted by its attributes."""
+    # Time is a dataset like any other. Links into other files are not followed and references not resolved: a file that was
+    # sent to someone must not read what is none of its business.
     import h5py
 
     with h5py.File(path, "r") as file:

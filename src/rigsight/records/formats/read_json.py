@@ -13,10 +13,8 @@ from rigsight.records.formats.channel import MOST_COLUMNS, Channel, ChannelFile,
 
 
 def open_json(path: Path) -> Iterator[ChannelFile]:
-    """Yield the lists of numbers of a JSON file, named by their keys; a row is an object or a list, and may hold others.
-
-    JSON states no units.
-    """
+    """Yield the lists of numbers of a JSON file, named by their keys; a row is an object or a list, and may hold others."""
+    # JSON states no units.
     text = path.read_text(encoding="utf-8-sig")
     try:
         data = json.loads(text)

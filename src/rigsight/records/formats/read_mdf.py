@@ -29,10 +29,8 @@ _FORMULA = "is converted by a text formula, which is not executed; export it wit
 
 
 def open_mdf(path: Path) -> Iterator[ChannelFile]:
-    """Yield the channels of an MDF file of version 4, each with the time of its group.
-
-    Channels whose conversion is a formula in text are refused: evaluating it would execute what the file says.
-    """
+    """Yield the channels of an MDF file of version 4, each with the time of its group."""
+    # Channels whose conversion is a formula in text are refused: evaluating it would execute what the file says.
     from asammdf import MDF
 
     with path.open("rb") as stream:

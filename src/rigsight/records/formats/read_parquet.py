@@ -24,10 +24,8 @@ from rigsight.records.stamps import earliest, seconds_since
 
 
 def open_parquet(path: Path) -> Iterator[ChannelFile]:
-    """Yield the columns of numbers of a Parquet file; units from the metadata ``unit`` of a column.
-
-    Time is a column like any other; dates and durations count in seconds from the first.
-    """
+    """Yield the columns of numbers of a Parquet file; units from the metadata ``unit`` of a column."""
+    # Time is a column like any other; dates and durations count in seconds from the first.
     from pyarrow.parquet import ParquetFile
 
     with ParquetFile(path) as file:

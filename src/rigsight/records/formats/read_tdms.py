@@ -33,11 +33,9 @@ UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription", "unit", "Unit")
 
 
 def open_tdms(path: Path) -> Iterator[ChannelFile]:
-    """Yield the channels of a TDMS file, named ``group/channel``.
-
-    A waveform's own axis comes from ``wf_increment``, ``wf_start_time`` and ``wf_start_offset``, its unit from ``unit_string``.
-    Start times and channels of dates count in seconds from the earliest of the file.
-    """
+    """Yield the channels of a TDMS file, named ``group/channel``."""
+    # A waveform's own axis comes from ``wf_increment``, ``wf_start_time`` and ``wf_start_offset``, its unit from ``unit_string``.
+    # Start times and channels of dates count in seconds from the earliest of the file.
     from nptdms import TdmsFile
 
     with TdmsFile.open(path) as file:
@@ -69,10 +67,8 @@ def _parts(file: Any) -> Iterator[Channel | Refused]:
 
 
 def _unknown_scales(*owners: Mapping[str, Any]) -> list[str]:
-    """Return the types of scales in force that the library leaves out, so that it would give the numbers unscaled.
-
-    The scales of the first that has any are in force: of the channel, its group, or the file.
-    """
+    """Return the types of scales in force that the library leaves out, so that it would give the numbers unscaled."""
+    # The scales of the first that has any are in force: of the channel, its group, or the file.
     for properties in owners:
         if not properties.get("NI_Number_Of_Scales") or properties.get("NI_Scaling_Status") == "scaled":
             continue

@@ -39,10 +39,8 @@ _REAL = (2, 4)
 
 
 def open_uff(path: Path) -> Iterator[ChannelFile]:
-    """Yield the time responses of a universal file, named by their ID line, or by node and direction where it says nothing.
-
-    Frequency response functions and spectra are listed as refused: a record needs time.
-    """
+    """Yield the time responses of a universal file, named by their ID line, or by node and direction where it says nothing."""
+    # Frequency response functions and spectra are listed as refused: a record needs time.
     import pyuff
 
     with path.open("rb") as stream:

@@ -106,10 +106,8 @@ def _whole_up_to(lines: Sequence[str]) -> Sequence[str]:
 def _plausibility(
     dialect: Dialect, first: Sequence[str], last: Sequence[str], alone: bool
 ) -> tuple[bool, float, bool]:
-    """Return what makes a dialect plausible, most telling first; tuples compare in that order.
-
-    A line above the numbers as wide as the rows, then the share of cells that are numbers, then that there are columns at all.
-    """
+    """Return what makes a dialect plausible, most telling first; tuples compare in that order."""
+    # A line above the numbers as wide as the rows, then the share of cells that are numbers, then that there are columns at all.
     rows = [dialect.cells(line) for line in last]
     width = Counter(len(row) for row in rows).most_common(1)[0][0]
     if width < 2 and not alone:

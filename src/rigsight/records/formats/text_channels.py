@@ -277,10 +277,8 @@ class TextColumns:
             self._read[i] = np.ascontiguousarray(column)
 
     def _refuse_thousands(self, position: int, numbers: Floats) -> None:
-        """Refuse a column of numbers, shape (n_rows,), whose decimal sign separates thousands: ``39,998`` beside ``998``.
-
-        Decimals are written with as many places in all cells, or without zeros at their end, so that some have less than three.
-        """
+        """Refuse a column of numbers, shape (n_rows,), whose decimal sign separates thousands: ``39,998`` beside ``998``."""
+        # Decimals are written with as many places in all cells, or without zeros at their end, so that some have less than three.
         finite = numbers[np.isfinite(numbers)]
         whole = finite == np.round(finite)
         # Cheap questions first: of three decimals at most, and numbers with and without.

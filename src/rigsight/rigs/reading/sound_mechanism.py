@@ -127,11 +127,9 @@ def _reached(expression: sp.Expr, mechanism: Mechanism) -> set[sp.Symbol]:
 
 
 def is_quadratic(mechanism: Mechanism) -> bool:
-    """Return True if the kinetic energy is a sum of squares and products of rates.
-
-    Such functions, and no other continuous ones, have ``T(a + b) + T(a - b) = 2 T(a) + 2 T(b)``: P. Jordan, J. von Neumann, Ann.
-    Math. 36 (1935) 719. An energy that has no number at any place drawn is none.
-    """
+    """Return True if the kinetic energy is a sum of squares and products of rates."""
+    # Such functions, and no other continuous ones, have ``T(a + b) + T(a - b) = 2 T(a) + 2 T(b)``: P. Jordan, J. von Neumann,
+    # Ann. Math. 36 (1935) 719. An energy that has no number at any place drawn is none.
     rates = [c.rate for c in mechanism.coordinates]
     others = sorted(mechanism.kinetic.free_symbols - set(rates), key=str)
     energy = array_function([*others, *rates], mechanism.kinetic)

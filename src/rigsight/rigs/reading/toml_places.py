@@ -22,10 +22,8 @@ _QUOTED = re.compile(r'"(?:[^"\\]|\\.)*"|' r"'[^']*'")
 
 
 def value_places(text: str) -> dict[Path, Place]:
-    """Return the line and column, from 1, of every value by its path of keys, and of every table's header by its own.
-
-    Values within arrays have no place of their own.
-    """
+    """Return the line and column, from 1, of every value by its path of keys, and of every table's header by its own."""
+    # Values within arrays have no place of their own.
     places: dict[Path, Place] = {}
     table: Path = ()
     lists: dict[Path, int] = {}

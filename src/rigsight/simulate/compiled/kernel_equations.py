@@ -270,12 +270,10 @@ class KernelEquations:
         return [self._live(equation.rate) for equation in self.structure.remembering_equations]
 
     def _live(self, expression: sp.Expr) -> sp.Expr:
-        """Return a part of the equations with the current signs.
-
-        A state with a limited range enters the equations with its limited value. The state itself is integrated without the limit
-        within a substep and limited at its end, which is exact as long as its rate keeps its sign. The sign of a velocity that
-        dry friction can hold is an argument.
-        """
+        """Return a part of the equations with the current signs."""
+        # A state with a limited range enters the equations with its limited value. The state itself is integrated without the
+        # limit within a substep and limited at its end, which is exact as long as its rate keeps its sign. The sign of a velocity
+        # that dry friction can hold is an argument.
         held = {
             e.symbol: limited(e.symbol, e.limit)
             for e in self.structure.remembering_equations

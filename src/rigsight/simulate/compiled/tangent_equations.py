@@ -19,16 +19,14 @@ _EARLIER = sp.Symbol("earlier input", real=True)
 
 
 def carries_tangents(equations: KernelEquations) -> bool:
-    """Return True if derivatives are integrated with the motion, False if they are differences of sets side by side.
-
-    Integrated derivatives cost two thirds more if the equations are sums and products, because differences need no derivatives
-    by the constants, and half as much if functions are costly, because these are computed once. With dry friction both cost the
-    same, but differences would need a long step, because reversals are located to a tolerance. Differences are used in these
-    cases: for states with a limited range, because an exact derivative is valid only in a small neighborhood; for several joints
-    that stick and slip, because the release of one changes the instant at which the next is released; for a force that jumps at a
-    position, such as that of a damper behind a play, because integrated derivatives do not account for a changed motion reaching
-    the position sooner; for delayed sensors, whose readings are computed after the simulation.
-    """
+    """Return True if derivatives are integrated with the motion, False if they are differences of sets side by side."""
+    # Integrated derivatives cost two thirds more if the equations are sums and products, because differences need no derivatives
+    # by the constants, and half as much if functions are costly, because these are computed once. With dry friction both cost the
+    # same, but differences would need a long step, because reversals are located to a tolerance. Differences are used in these
+    # cases: for states with a limited range, because an exact derivative is valid only in a small neighborhood; for several
+    # joints that stick and slip, because the release of one changes the instant at which the next is released; for a force that
+    # jumps at a position, such as that of a damper behind a play, because integrated derivatives do not account for a changed
+    # motion reaching the position sooner; for delayed sensors, whose readings are computed after the simulation.
     structure = equations.structure
     if (
         structure.jumps_at_a_place
@@ -44,10 +42,8 @@ def carries_tangents(equations: KernelEquations) -> bool:
 
 
 def tangent_fragments(equations: KernelEquations) -> dict[str, str]:
-    """Return the changes of the equations with states and constants, by key in the template.
-
-    Each group of equations has factors, which are the same for all directions, and changes: sums of products with them.
-    """
+    """Return the changes of the equations with states and constants, by key in the template."""
+    # Each group of equations has factors, which are the same for all directions, and changes: sums of products with them.
     structure, n = equations.structure, len(equations.structure.states)
     of_states = dict(zip(structure.states, symbols("z", n), strict=True))
     of_constants = dict(zip(equations.constants, symbols("dq", len(equations.constants)), strict=True))

@@ -156,10 +156,8 @@ def structure_named(
 def without_vanished_effects(
     structure: Structure, values: Mapping[str, float]
 ) -> tuple[Structure, dict[str, float]]:
-    """Leave out the effects whose parameters are at the values at which they vanish.
-
-    A vanished lag would divide by its time constant, and every vanished kink would still cost events.
-    """
+    """Leave out the effects whose parameters are at the values at which they vanish."""
+    # A vanished lag would divide by its time constant, and every vanished kink would still cost events.
     known = {**dict(structure.fixed), **values}
 
     def vanished(effect: Effect) -> bool:

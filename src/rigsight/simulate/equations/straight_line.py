@@ -113,10 +113,8 @@ def hoist_constants(
 
 
 def gathered(expression: sp.Expr, constants: set[sp.Symbol], modes: set[sp.Symbol] | None = None) -> sp.Expr:
-    """Return an expression as a sum of products with one constant coefficient each, if that takes fewer operations.
-
-    Arguments of functions are not changed.
-    """
+    """Return an expression as a sum of products with one constant coefficient each, if that takes fewer operations."""
+    # Arguments of functions are not changed.
     inner = {
         atom: sp.Dummy(f"inner{i}", real=True)
         for i, atom in enumerate(_whole(expression, modes or set()))

@@ -141,11 +141,9 @@ class EquationTree:
 
     @cached_property
     def remembered(self) -> tuple[sp.Symbol, ...]:
-        """Delayed definitions whose history must be stored during the simulation, in the order of definition.
-
-        These are all but two kinds: the delayed only input of a rig, where the whole record is shifted; and a reading that is
-        only recorded, which is shifted after the simulation if its rate has no jumps between samples.
-        """
+        """Delayed definitions whose history must be stored during the simulation, in the order of definition."""
+        # These are all but two kinds: the delayed only input of a rig, where the whole record is shifted; and a reading that is
+        # only recorded, which is shifted after the simulation if its rate has no jumps between samples.
         delayed = [d.symbol for d in self.definitions if isinstance(d.expression, late)]
         return tuple(s for s in delayed if not self._is_arrival(s) and not self._is_shown_late(s))
 
@@ -176,10 +174,8 @@ class EquationTree:
         return self.lateness(symbol)[0] in self.inputs
 
     def _is_shown_late(self, symbol: sp.Symbol) -> bool:
-        """Return True for a reading that is only recorded, and whose rate depends on states alone and has no kinks.
-
-        If the record is shifted as a whole, rate and kinks do not matter.
-        """
+        """Return True for a reading that is only recorded, and whose rate depends on states alone and has no kinks."""
+        # If the record is shifted as a whole, rate and kinks do not matter.
         if isinstance(self._expressions[symbol], shifted):
             return True
         last, (reading, _) = symbol, self.lateness(symbol)

@@ -84,11 +84,9 @@ def rate_symbol(symbol: sp.Symbol) -> sp.Symbol:
 
 
 def shown_names(structure: Structure, label: Callable[[str], str] = in_words) -> dict[sp.Symbol, ShownName]:
-    """Return the name of every symbol in a structure's tree, of the rates of its states and of its outputs.
-
-    If two effects, or an effect and the rig, use the same name, that of an effect gets the effect's name as a subscript. A
-    prescribed motion has the name of the input that it follows.
-    """
+    """Return the name of every symbol in a structure's tree, of the rates of its states and of its outputs."""
+    # If two effects, or an effect and the rig, use the same name, that of an effect gets the effect's name as a subscript. A
+    # prescribed motion has the name of the input that it follows.
     rig, tree = structure.rig, structure.tree
     coordinates, owned = tree.motion.coordinates, _owned(structure)
     forms = declared_names(

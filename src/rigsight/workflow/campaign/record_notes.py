@@ -112,10 +112,8 @@ def _other_amplitude(record: Record, rig: Rig) -> Iterator[str]:
 def unit_mismatch(
     records: Sequence[Record], source: str, response: str
 ) -> tuple[Record, Record, float] | None:
-    """Return the two records whose gains differ most, and by what factor; None where no unit explains it.
-
-    Gains are compared at frequencies that drive both, so that it does not matter which band a record sweeps.
-    """
+    """Return the two records whose gains differ most, and by what factor; None where no unit explains it."""
+    # Gains are compared at frequencies that drive both, so that it does not matter which band a record sweeps.
     gains = [
         (record, gain)
         for record in records
@@ -177,10 +175,8 @@ def rig_in_units_of(rig: Rig, records: Sequence[Record]) -> Rig:
 
 
 def in_units_of(rig: Rig, record: Record) -> Record:
-    """Return a record with its signals in the units of a rig, with a note for each that was converted.
-
-    A signal without a unit is taken to be in that of the rig.
-    """
+    """Return a record with its signals in the units of a rig, with a note for each that was converted."""
+    # A signal without a unit is taken to be in that of the rig.
     units, signals, notes = dict(record.units), dict(record.signals), list(record.notes)
     amplitude = record.amplitude
     for signal in (*rig.inputs, *rig.outputs):

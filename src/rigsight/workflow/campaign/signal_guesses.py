@@ -132,10 +132,8 @@ def _unlikely(guess: FileGuess) -> tuple[int, bool, bool, float, int]:
 
 
 def _is_spoken_of(guess: FileGuess) -> bool:
-    """Return False if the only evidence for a rig with a downstream motion are the common names u and y.
-
-    The running gear is one, and most files whose output is called y are of something else.
-    """
+    """Return False if the only evidence for a rig with a downstream motion are the common names u and y."""
+    # The running gear is one, and most files whose output is called y are of something else.
     if guess.rig.follower is None:
         return True
     needed = guess.rig.required_outputs
@@ -149,10 +147,8 @@ def _is_spoken_of(guess: FileGuess) -> bool:
 def _completed_by_unit(
     found: FileGuess, channels: Sequence[Channel], times: Sequence[Channel]
 ) -> tuple[Guess, ...]:
-    """Return the guesses; a signal without a match takes the only remaining channel with its unit, whatever its name.
-
-    The only output without a channel also takes the only remaining channel without a unit; an input may have no channel.
-    """
+    """Return the guesses; a signal without a match takes the only remaining channel with its unit, whatever its name."""
+    # The only output without a channel also takes the only remaining channel without a unit; an input may have no channel.
     guesses = list(found.signals)
     for i, guess in enumerate(guesses):
         taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]

@@ -83,10 +83,8 @@ def bode_figure(record: RecordIdentification, identification: Identification) ->
 
 
 def responses_figure(identification: Identification) -> Figure | None:
-    """Return the magnitudes of all records over each other; None where there are none.
-
-    Of a rig of several inputs or sensors it is the grid of their responses, all records together.
-    """
+    """Return the magnitudes of all records over each other; None where there are none."""
+    # Of a rig of several inputs or sensors it is the grid of their responses, all records together.
     if not _is_by_record(identification):
         views = [view for view in identification.views if view.measured is not None]
         return view_figure(views[0], identification.units)

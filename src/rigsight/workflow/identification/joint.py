@@ -69,10 +69,8 @@ def identify_jointly(
 
 
 def _pooled(found: Sequence[RecordIdentification], known: Mapping[str, float]) -> PhysicalEstimates | None:
-    """Return the mean of the records' own parameters of what follows the motion, weighted by inverse variances.
-
-    None if no record shows them, or if they are held.
-    """
+    """Return the mean of the records' own parameters of what follows the motion, weighted by inverse variances."""
+    # None if no record shows them, or if they are held.
     own = [path.physical for r in found for path in r.paths[1:] if path.physical is not None]
     if not own or known.keys() & set(own[0].names):
         return None

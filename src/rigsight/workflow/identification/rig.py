@@ -61,10 +61,8 @@ _STEPS_AFTER_RECORDS = 3
 
 
 def _has_forms(campaign: Campaign) -> bool:
-    """Return True if each number of the transfer function of one driven mass on a spring gives one parameter.
-
-    Not where effects of the simulation bend it, or where the mass is known or the gain of the drive is not.
-    """
+    """Return True if each number of the transfer function of one driven mass on a spring gives one parameter."""
+    # Not where effects of the simulation bend it, or where the mass is known or the gain of the drive is not.
     rig = campaign.rig
     if campaign.modelled or not (rig.has_one_motion and rig.is_driven) or campaign.given_without_spring:
         return False
@@ -154,10 +152,8 @@ def identify_rig(
 
 
 def _without_spring(campaign: Campaign, options: EstimationOptions, n_jobs: int) -> Identification | None:
-    """Return the identification of a rig that may have no spring; None if that does not follow the records.
-
-    Such a rig has no break frequency in a record. Its stiffness is estimated only if it shows, as one that is given as zero.
-    """
+    """Return the identification of a rig that may have no spring; None if that does not follow the records."""
+    # Such a rig has no break frequency in a record. Its stiffness is estimated only if it shows, as one that is given as zero.
     rig = campaign.rig
     absent = {p.name: 0.0 for p in rig.parameters if p.name == str(rig.motion.stiffness) and p.lower <= 0.0}
     if not absent or options.method not in METHODS_OF_ANY_RIG:

@@ -59,10 +59,8 @@ def _check_place(rig: Rig, effect: Effect, place: str, where: str) -> None:
 
 
 def candidates_of(campaign: Campaign, effects: Sequence[Effect]) -> list[Effect]:
-    """Return the candidates at every place of a campaign's rig.
-
-    An effect without a place is skipped if it does not apply; a place that was named must exist.
-    """
+    """Return the candidates at every place of a campaign's rig."""
+    # An effect without a place is skipped if it does not apply; a place that was named must exist.
     named = [effect for effect in effects if effect.at is None] + [
         *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
     ]

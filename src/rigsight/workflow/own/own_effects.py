@@ -86,10 +86,8 @@ def own_effects(
 
 
 def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return the effects of the catalogue and `own` with these names; all of them if no name is given.
-
-    A name may say where the effect acts, ``coulomb_friction@shaft``; whether the rig has this place is checked later.
-    """
+    """Return the effects of the catalogue and `own` with these names; all of them if no name is given."""
+    # A name may say where the effect acts, ``coulomb_friction@shaft``; whether the rig has this place is checked later.
     known = (*CATALOGUE, *own)
     return tuple(effect_named(name, known) for name in dict.fromkeys(names)) or known
 

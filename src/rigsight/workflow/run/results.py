@@ -94,11 +94,9 @@ def check_target(file: Path) -> None:
 def write_together(
     folder: Path, contents: Mapping[str, str | bytes], remedy: str = ELSEWHERE
 ) -> tuple[Path, ...]:
-    """Write files into a folder, all of them or none; files of these names are replaced.
-
-    They are written under temporary names, which a later run replaces if this one is killed; a signal that comes while they get
-    their own names waits for that.
-    """
+    """Write files into a folder, all of them or none; files of these names are replaced."""
+    # They are written under temporary names, which a later run replaces if this one is killed; a signal that comes while they get
+    # their own names waits for that.
     made: list[Path] = []
     parts: dict[Path, Path] = {}
     try:

@@ -133,10 +133,8 @@ def _poles(model: Model) -> np.ndarray[tuple[int], np.dtype[np.complex128]] | No
 
 
 def _natural_frequency(model: Model, amplitude: float) -> float:
-    """Return the natural frequency [rad/s] with the stiffness that holds a constant input of this amplitude.
-
-    A hysteretic spring is much stiffer for small motion than at the resonance of a sweep.
-    """
+    """Return the natural frequency [rad/s] with the stiffness that holds a constant input of this amplitude."""
+    # A hysteretic spring is much stiffer for small motion than at the resonance of a sweep.
     motion = model.structure.rig.motion
     drive, stiffness, inertia, rest = (
         evaluated(part, model.values)
