@@ -102,18 +102,11 @@ def probability_not_tried(candidates: Sequence[Candidate]) -> float:
 
 @dataclass(frozen=True)
 class LikelyCauses:
-    """The smallest set of causes that contains the true one in nine trials of ten.
+    """The smallest set of causes that contains the true one in nine trials of ten."""
 
-    Attributes
-    ----------
-    sets
-        Names of the effects of each; empty names are the equations without an effect.
-    outside
-        True if a cause outside the candidates belongs to the set.
-    """
-
+    # Names of the effects of each; empty names are the equations without an effect.
     sets: tuple[tuple[str, ...], ...] = ()
-    outside: bool = False
+    outside: bool = False  # True if a cause outside the candidates belongs to the set
 
 
 @dataclass(frozen=True)

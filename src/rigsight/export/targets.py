@@ -45,41 +45,26 @@ _SHORTEST = 1e-9
 
 @dataclass(frozen=True)
 class Target:
-    """A language or format.
+    """A language or format."""
 
-    Attributes
-    ----------
-    name, suffix, summary
-        What ``--to`` takes, how its files end, and one plain sentence.
-    write
-        Text or bytes for the model, the name of its source and its own name.
-    lacks
-        What it is written without.
-    words
-        Words of its language, which no name in any export is; those of C are in `rigsight.export.equations`.
-    own_words
-        From its own name: words that its text uses itself, which no name in this export is.
-    input_words
-        Words that its text uses itself where inputs stand as arguments, which no input's name in this export is.
-    steps
-        True if it goes from sample to sample itself, so that the hold of the input is its business.
-    fixed_step
-        True if it does so in steps of its own of a fixed length.
-    named
-        True if the text holds a name of its own, taken from the file's.
-    """
-
+    # What ``--to`` takes, how its files end, and one plain sentence.
     name: str
     suffix: str
     summary: str
+    # Text or bytes for the model, the name of its source and its own name.
     write: Callable[[Exported, str, str], str | bytes]
-    lacks: frozenset[str] = frozenset()
+    lacks: frozenset[str] = frozenset()  # what it is written without
+    # Words of its language, which no name in any export is; those of C are in `rigsight.export.equations`.
     words: frozenset[str] = frozenset()
+    # From its own name: words that its text uses itself, which no name in this export is.
     own_words: Callable[[str], frozenset[str]] = lambda _: frozenset()
+    # Words that its text uses itself where inputs stand as arguments, which no input's name in this export
+    # is.
     input_words: frozenset[str] = frozenset()
+    # True if it goes from sample to sample itself, so that the hold of the input is its business.
     steps: bool = True
-    fixed_step: bool = False
-    named: bool = True
+    fixed_step: bool = False  # True if it does so in steps of its own of a fixed length
+    named: bool = True  # True if the text holds a name of its own, taken from the file's
 
 
 TARGETS: dict[str, Target] = {

@@ -31,16 +31,10 @@ class PlainRatio(FrequencyResponse):
     It is ``G + T / drive`` with the free motion T that the difference between the first and the last state of the record excites.
     A local model confuses T with the response at lines that a smooth sweep visits near the ends of a record: both are smooth
     there. T has the poles of G, so a form of G distinguishes them.
-
-    Attributes
-    ----------
-    drive
-        Spectrum of the source with its hold, shape (n_frequencies,).
-    dt, n_samples, hold
-        Sample time [s] and length of the record, and the hold of the source.
     """
 
-    drive: NDArray[np.complex128]
+    drive: NDArray[np.complex128]  # spectrum of the source with its hold, shape (n_frequencies,)
+    # Sample time [s] and length of the record, and the hold of the source.
     dt: float
     n_samples: int
     hold: Hold

@@ -48,20 +48,13 @@ _CHUNK = 128
 
 @dataclass(frozen=True, eq=False)
 class ResponsesOfInputs:
-    """Responses of some signals to some inputs.
+    """Responses of some signals to some inputs."""
 
-    Attributes
-    ----------
-    found
-        Responses by (source, response), without those that these records do not determine.
-    problems
-        The reason for each missing one, a sentence by (source, response).
-    together
-        Inputs that change together in these records, so that their responses cannot be separated.
-    """
-
+    # Responses by (source, response), without those that these records do not determine.
     found: Mapping[tuple[str, str], FrequencyResponse]
+    # The reason for each missing one, a sentence by (source, response).
     problems: Mapping[tuple[str, str], str]
+    # Inputs that change together in these records, so that their responses cannot be separated.
     together: tuple[tuple[str, ...], ...]
 
 
@@ -300,7 +293,7 @@ class _LocalModels:
     def _solved(
         self, omega: NDArray[np.float64]
     ) -> tuple[NDArray[np.complex128], *tuple[NDArray[np.float64], ...]]:
-        """Return values and variances of all inputs, degrees of freedom, and the share of each input that others do not explain."""
+        """Return values and variances of all inputs, degrees of freedom, and the share of each that others do not explain."""
         # Shapes (n_frequencies, n_moving), the third (n_frequencies,). The shares are those that each single other input, and all
         # others together, do not explain, shapes (n_frequencies, n_moving, n_moving) and (n_frequencies, n_moving).
         n_terms, n_inputs = self._order + 1, self._moving.size

@@ -94,13 +94,9 @@ def excited(
     band: tuple[float, float] | None,
     what: str,
 ) -> NDArray[np.bool_]:
-    """Return which frequencies can be estimated, shape (n_frequencies,).
-
-    Notes
-    -----
-    A frequency is silent if its power is 40 dB below the strongest both per rad/s and per octave: neither the falling
-    density of a logarithmic sweep nor the few low octaves of a linear one are a lack of excitation.
-    """
+    """Return which frequencies can be estimated, shape (n_frequencies,)."""
+    # A frequency is silent if its power is 40 dB below the strongest both per rad/s and per octave: neither the falling
+    # density of a logarithmic sweep nor the few low octaves of a linear one are a lack of excitation.
     strongest, per_octave = power.max(initial=0.0), omega * power
     if strongest <= 0.0:
         raise InputError(f"{what} is constant: without excitation there is no frequency response.")

@@ -25,72 +25,39 @@ _DIFFERENT = 0.01
 
 @dataclass(frozen=True)
 class RecordResidual:
-    """Error of a parameter set on one record.
+    """Error of a parameter set on one record."""
 
-    Attributes
-    ----------
-    record, kind
-        Name and kind of the record.
-    rms
-        RMS of measured minus simulated by output, in its unit.
-    relative
-        The same over the RMS of the measured output about its mean.
-    """
-
+    # Name and kind of the record.
     record: str
     kind: str
-    rms: dict[str, float]
-    relative: dict[str, float]
+    rms: dict[str, float]  # RMS of measured minus simulated by output, in its unit
+    relative: dict[str, float]  # the same over the RMS of the measured output about its mean
 
 
 @dataclass(frozen=True)
 class KindFit:
-    """The fit of one kind of records, and its errors on all records.
+    """The fit of one kind of records, and its errors on all records."""
 
-    Attributes
-    ----------
-    kind
-        ``"sweep"``, ``"step"``, ..., or the name of its group.
-    fit
-        Fit of the records of this kind alone.
-    residuals
-        Errors on every record; for the records of other kinds only the initial states are fitted.
-    shift
-        By parameter: this kind's value minus the joint one, in standard errors of this kind's; NaN if it is undetermined.
-    """
-
-    kind: str
-    fit: FitResult
+    kind: str  # ``"sweep"``, ``"step"``, ..., or the name of its group
+    fit: FitResult  # fit of the records of this kind alone
+    # Errors on every record; for the records of other kinds only the initial states are fitted.
     residuals: tuple[RecordResidual, ...]
+    # By parameter: this kind's value minus the joint one, in standard errors of this kind's; NaN if it is
+    # undetermined.
     shift: dict[str, float]
 
 
 @dataclass(frozen=True)
 class JointFit:
-    """One parameter set for records of several kinds.
+    """One parameter set for records of several kinds."""
 
-    Attributes
-    ----------
-    fit
-        The fit of all records.
-    noise
-        Standard deviation by which residuals of each output were divided.
-    residuals
-        Its error on every record.
-    kinds
-        The fits of each kind alone.
-    probability
-        Probability of such differences between the kinds by chance, if one set fits all (chi-squared).
-    statement
-        The answer in words.
-    """
-
-    fit: FitResult
-    noise: dict[str, float]
-    residuals: tuple[RecordResidual, ...]
-    kinds: tuple[KindFit, ...]
+    fit: FitResult  # the fit of all records
+    noise: dict[str, float]  # standard deviation by which residuals of each output were divided
+    residuals: tuple[RecordResidual, ...]  # its error on every record
+    kinds: tuple[KindFit, ...]  # the fits of each kind alone
+    # Probability of such differences between the kinds by chance, if one set fits all (chi-squared).
     probability: float
-    statement: str
+    statement: str  # the answer in words
 
     def interval(self, name: str, level: float = LEVEL) -> tuple[float, float]:
         """Return the confidence interval of a fitted parameter of the joint set."""

@@ -198,13 +198,7 @@ class ComparisonFigure:
 
 
 def comparison_figures(comparison: Comparison) -> list[ComparisonFigure]:
-    """Return the figures: errors over all records first, then responses or steps, record by record.
-
-    Parameters
-    ----------
-    comparison
-        The result.
-    """
+    """Return the figures: errors over all records first, then responses or steps, record by record."""
     found = [overall_figure(comparison)]
     for number in range(len(comparison.records)):
         found += record_figures(comparison, number)

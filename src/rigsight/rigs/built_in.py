@@ -62,13 +62,7 @@ def declared_rig(name: str, declaration: Mapping[str, Any], source: str = "decla
 
 
 def rig_file_text(name: str) -> str:
-    """Return the file of a rig that comes with the package.
-
-    Raises
-    ------
-    KeyError
-        If there is no such rig.
-    """
+    """Return the file of a rig that comes with the package."""
     return _files()[name].read_text("utf-8")
 
 
@@ -99,13 +93,7 @@ _TURNING = {"m": "rad", "N": "N m", "kg": "kg m^2"}
 
 
 def rotational(rig: Rig) -> Rig | None:
-    """Return `AXIS` or `ELEMENT` with an angle for its displacement and a torque for its force; None for any other rig.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    """
+    """Return `AXIS` or `ELEMENT` with an angle for its displacement and a torque for its force; None for any other rig."""
     return _rotational(rig.name) if rig is AXIS or rig is ELEMENT else None
 
 
@@ -123,11 +111,5 @@ def _of_one_motion() -> tuple[Rig, ...]:
 
 
 def is_built_in_motion(rig: Rig) -> bool:
-    """Return True if a rig has the equations of a built-in one of one motion, in the same words, whatever it is called itself.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    """
+    """Return True if a rig has the equations of a built-in one of one motion, in the same words, whatever it is called itself."""
     return any(rig.mechanism == own.mechanism for own in _of_one_motion())

@@ -17,15 +17,7 @@ take a compiler minutes, those of three a second."""
 
 
 def has_short_inverse(mass: sp.ImmutableMatrix) -> bool:
-    """Return True if at most `MOST_COUPLED` coordinates move one another's inertia, by short formulas.
-
-    They may do so directly, or through others.
-
-    Parameters
-    ----------
-    mass
-        Mass matrix, shape (n, n).
-    """
+    """Return True if at most `MOST_COUPLED` coordinates move one another's inertia, directly or not, by short formulas."""
     return all(
         len(group) <= MOST_COUPLED and (len(group) == 1 or _products(mass, group) <= _MOST_PRODUCTS)
         for group in _coupled(mass)

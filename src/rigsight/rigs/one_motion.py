@@ -16,50 +16,29 @@ class Motion:
 
     ``inertia * x'' = drive_gain * u + bias - spring(x - rest) - damping * x' - effects``; without an inertia the motion is
     prescribed and the right-hand side's torques are the output.
-
-    Attributes
-    ----------
-    displacement, velocity
-        Symbols of the state (or of the prescribed motion).
-    stiffness, damping, drive_gain, rest, bias
-        Expressions of the rig's parameters and constants.
-    inertia
-        Expression, or None where the motion is prescribed.
     """
 
+    # Symbols of the state (or of the prescribed motion).
     displacement: sp.Symbol
     velocity: sp.Symbol
+    # Expressions of the rig's parameters and constants.
     stiffness: sp.Expr
     damping: sp.Expr
     drive_gain: sp.Expr
     rest: sp.Expr
     bias: sp.Expr
-    inertia: sp.Expr | None
+    inertia: sp.Expr | None  # expression, or None where the motion is prescribed
 
 
 @dataclass(frozen=True)
 class Follower:
-    """A first-order state that follows the motion: ``y' = gain * creepage``.
+    """A first-order state that follows the motion: ``y' = gain * creepage``."""
 
-    Attributes
-    ----------
-    symbol
-        Symbol of the state.
-    displacement
-        The state from its rest.
-    creepage
-        What drives it: the motion less what the displacement itself turns back.
-    gain
-        Rate per creepage.
-    feedback
-        Creepage that a unit of displacement takes away.
-    """
-
-    symbol: sp.Symbol
-    displacement: sp.Expr
-    creepage: sp.Expr
-    gain: sp.Expr
-    feedback: sp.Expr
+    symbol: sp.Symbol  # symbol of the state
+    displacement: sp.Expr  # the state from its rest
+    creepage: sp.Expr  # what drives it: the motion less what the displacement itself turns back
+    gain: sp.Expr  # rate per creepage
+    feedback: sp.Expr  # creepage that a unit of displacement takes away
 
     @property
     def static_gain(self) -> sp.Expr:

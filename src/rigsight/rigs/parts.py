@@ -10,25 +10,14 @@ import sympy as sp
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A degree of freedom, or a motion that an input prescribes.
+    """A degree of freedom, or a motion that an input prescribes."""
 
-    Attributes
-    ----------
-    symbol, rate
-        The coordinate and its time derivative.
-    unit
-        Its SI unit.
-    prescribed_by
-        Name of the input that it follows; None for a degree of freedom.
-    about
-        What it is.
-    """
-
+    # The coordinate and its time derivative.
     symbol: sp.Symbol
     rate: sp.Symbol
-    unit: str
-    prescribed_by: str | None = None
-    about: str = ""
+    unit: str  # its SI unit
+    prescribed_by: str | None = None  # name of the input that it follows; None for a degree of freedom
+    about: str = ""  # what it is
 
     @property
     def name(self) -> str:
@@ -41,59 +30,31 @@ class Joint:
     """A place where effects of the dynamics act: a motion, and what resists it.
 
     ``resisting force = stiffness * (motion - rest) + damping * d(motion) + force``
-
-    Attributes
-    ----------
-    name
-        Its name.
-    motion
-        Expression of the coordinates.
-    stiffness, damping, rest
-        Expressions of parameters and constants.
-    force
-        What else resists: constant, or a known law.
-    inertia
-        Inertia that moves with it; None for what the kinetic energy gives.
-    damps_spring
-        Whether its damper is squeezed with the spring and not by the motion: behind a play, both act in contact alone.
-    about
-        What it is.
     """
 
-    name: str
-    motion: sp.Expr
+    name: str  # its name
+    motion: sp.Expr  # expression of the coordinates
+    # Expressions of parameters and constants.
     stiffness: sp.Expr = sp.S.Zero
     damping: sp.Expr = sp.S.Zero
     rest: sp.Expr = sp.S.Zero
-    force: sp.Expr = sp.S.Zero
-    inertia: sp.Expr | None = None
+    force: sp.Expr = sp.S.Zero  # what else resists: constant, or a known law
+    inertia: sp.Expr | None = None  # inertia that moves with it; None for what the kinetic energy gives
+    # Whether its damper is squeezed with the spring and not by the motion: behind a play, both act in contact
+    # alone.
     damps_spring: bool = False
-    about: str = ""
+    about: str = ""  # what it is
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A place where effects of the actuator act: on the value of a signal, from which a generalized force follows.
+    """A place where effects of the actuator act: on the value of a signal, from which a generalized force follows."""
 
-    Attributes
-    ----------
-    name
-        Its name, and that of its signal behind the effects.
-    signal
-        What it is told: an input, or a control law.
-    force
-        Expression of its own name and others.
-    along
-        Expression of the coordinates along which the force acts.
-    about
-        What it is.
-    """
-
-    name: str
-    signal: sp.Expr
-    force: sp.Expr
-    along: sp.Expr
-    about: str = ""
+    name: str  # its name, and that of its signal behind the effects
+    signal: sp.Expr  # what it is told: an input, or a control law
+    force: sp.Expr  # expression of its own name and others
+    along: sp.Expr  # expression of the coordinates along which the force acts
+    about: str = ""  # what it is
 
 
 @dataclass(frozen=True)

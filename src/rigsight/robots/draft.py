@@ -42,38 +42,21 @@ class Gear:
 
 @dataclass(frozen=True)
 class RigDraft:
-    """A rig file equivalent to a MuJoCo model.
+    """A rig file equivalent to a MuJoCo model."""
 
-    Attributes
-    ----------
-    tables
-        The rig file.
-    joints, drives, sensors
-        Place of the rig -> number of the joint, actuator or sensor in the model; -1 for what was added.
-    gears
-        Place between a rotor and what it moves -> its joint.
-    controls
-        Input of a drive -> index of the control in the model; -1 for what was added.
-    fields
-        Parameter or constant of the rig -> the fields of the model that it represents.
-    values
-        Parameters as the model has them.
-    left_out
-        Descriptions of the parts of the model that are not in the rig file.
-    notes
-        Descriptions of what was added.
-    """
-
-    tables: Mapping[str, Any]
+    tables: Mapping[str, Any]  # the rig file
+    # Place of the rig -> number of the joint, actuator or sensor in the model; -1 for what was added.
     joints: Mapping[str, int]
-    gears: Mapping[str, Gear]
+    gears: Mapping[str, Gear]  # place between a rotor and what it moves -> its joint
     drives: Mapping[str, int]
+    # Input of a drive -> index of the control in the model; -1 for what was added.
     controls: Mapping[str, int]
     sensors: Mapping[str, int]
+    # Parameter or constant of the rig -> the fields of the model that it represents.
     fields: Mapping[str, tuple[Field, ...]]
-    values: Mapping[str, float]
-    left_out: tuple[str, ...]
-    notes: tuple[str, ...]
+    values: Mapping[str, float]  # parameters as the model has them
+    left_out: tuple[str, ...]  # descriptions of the parts of the model that are not in the rig file
+    notes: tuple[str, ...]  # descriptions of what was added
 
     def index_with_gears(self, joint: int) -> int:
         """Return the number of a joint once each with a gear has its second joint behind it."""

@@ -152,15 +152,10 @@ def _settled(
 def equilibrium(
     structure: Structure, p: Floats, inputs: Floats, given: Mapping[int, float] | None = None
 ) -> Floats:
-    """Return the static equilibrium reached from rest under slowly rising inputs, with dry friction and hysteresis.
-
-    Without inputs the rig rests where its springs and weights are in balance without friction. From there, friction holds a joint
-    until it is overcome. States on which no force acts stay at zero, and so do all states if there is no equilibrium.
-
-    References
-    ----------
-    M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for steps with multipliers instead of friction signs.
-    """
+    """Return the static equilibrium reached from rest under slowly rising inputs, with dry friction and hysteresis."""
+    # Without inputs the rig rests where its springs and weights are in balance without friction. From there, friction holds a
+    # joint until it is overcome. States on which no force acts stay at zero, and so do all states if there is no equilibrium.
+    # M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for steps with multipliers instead of friction signs.
     balance = _balance_of(structure)
     given = dict(given or {})
     state = np.zeros(len(structure.states))

@@ -244,15 +244,10 @@ def _interpolation_taps() -> tuple[Floats, Floats]:
 
 
 def continued(samples: Floats, count: int) -> Floats:
-    """Return a signal with additional samples before its beginning and after its end, by linear prediction.
-
-    A reflection about the last sample would reverse the curvature there: the slope at the end of an interpolation would be off by
-    as much as a tenth of its size.
-
-    References
-    ----------
-    S. M. Kay, *Modern Spectral Estimation* (Prentice Hall 1988), chapter 7, for the modified covariance method.
-    """
+    """Return a signal with additional samples before its beginning and after its end, by linear prediction."""
+    # A reflection about the last sample would reverse the curvature there: the slope at the end of an interpolation would be off
+    # by as much as a tenth of its size.
+    # S. M. Kay, *Modern Spectral Estimation* (Prentice Hall 1988), chapter 7, for the modified covariance method.
     return np.concatenate([_following(samples[::-1], count)[::-1], samples, _following(samples, count)])
 
 

@@ -31,16 +31,11 @@ _END = 21
 
 
 def smooth_motion(displacement: Floats, dt: float) -> tuple[Floats, Floats]:
-    """Return the smoothing spline through a measured displacement, and its velocity: that of a quintic spline through it.
-
-    The amount of smoothing is chosen by generalized cross validation, so that noise and quantization of the sensor do not
-    become velocity.
-
-    References
-    ----------
-    G. Wahba, *Spline Models for Observational Data* (SIAM 1990), chapter 4. D. Garcia, Comput. Stat. Data Anal. 54 (2010) 1167,
-    for the cosine transform.
-    """
+    """Return the smoothing spline through a measured displacement, and its velocity: that of a quintic spline through it."""
+    # The amount of smoothing is chosen by generalized cross validation, so that noise and quantization of the sensor do not
+    # become velocity.
+    # G. Wahba, *Spline Models for Observational Data* (SIAM 1990), chapter 4. D. Garcia, Comput. Stat. Data Anal. 54 (2010) 1167,
+    # for the cosine transform.
     values, slopes, _ = _kept(displacement)
     return values, slopes / dt
 

@@ -192,14 +192,10 @@ def choose_substeps(
 
 
 class Substeps(int):
-    """Largest number of Runge-Kutta steps in a piece of an input, and the number in each piece.
+    """Largest number of Runge-Kutta steps in a piece of an input, and the number in each piece."""
 
-    Attributes
-    ----------
-    needs
-        Steps that each piece needs as a share of the largest number, see `relative_needs`; None if all pieces take that number.
-    """
-
+    # Steps that each piece needs as a share of the largest number, see `relative_needs`; None if all pieces
+    # take that number.
     needs: Floats | None
     _schedule: NDArray[np.intc] | None
 

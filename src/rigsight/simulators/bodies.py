@@ -57,34 +57,19 @@ class Program:
 
 @dataclass(frozen=True)
 class Bodies:
-    """The bodies of a rig that another program simulates.
+    """The bodies of a rig that another program simulates."""
 
-    Attributes
-    ----------
-    kind
-        One of `KINDS`.
-    file
-        Absolute path of its model; for Python, the name of the function in messages.
-    digest
-        Hash of the file: another file is another rig.
-    coordinates
-        Names of the rig's degrees of freedom in the program, in their order.
-    parameters
-        Names of parameters and constants of the rig in the program, in the order of the rig.
-    rates, forces
-        Of an FMU, the names of the states that are rates of the coordinates, and of the inputs that are forces along them.
-    without_armature
-        Of MuJoCo, whether the inertia of rotors at joints is left to the rig.
-    """
-
-    kind: str
-    file: str
-    digest: str
-    coordinates: tuple[str, ...]
+    kind: str  # one of `KINDS`
+    file: str  # absolute path of its model; for Python, the name of the function in messages
+    digest: str  # hash of the file: another file is another rig
+    coordinates: tuple[str, ...]  # names of the rig's degrees of freedom in the program, in their order
+    # Names of parameters and constants of the rig in the program, in the order of the rig.
     parameters: tuple[str, ...] = ()
+    # Of an FMU, the names of the states that are rates of the coordinates, and of the inputs that are forces
+    # along them.
     rates: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
-    without_armature: bool = False
+    without_armature: bool = False  # of MuJoCo, whether the inertia of rotors at joints is left to the rig
 
     @cached_property
     def key(self) -> int:

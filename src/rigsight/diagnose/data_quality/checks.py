@@ -16,12 +16,8 @@ from rigsight.records.record import Record
 
 
 def data_quality(context: FitContext, records: Sequence[Record], reidentified: FittedModel) -> DataQuality:
-    """Check the records before an effect is tried.
-
-    Notes
-    -----
-    A wrong hold that a strong effect hides shows only with that effect in the model, see `with_best_model`.
-    """
+    """Check the records before an effect is tried."""
+    # A wrong hold that a strong effect hides shows only with that effect in the model, see `with_best_model`.
     timing = input_timing(context, (), reidentified.fit)
     faults = [finding for record in records for finding in sensor_faults(context.rig, record)]
     return DataQuality(

@@ -62,15 +62,10 @@ def _limits(values: NDArray[np.float64]) -> Interval:
 def effect_shares(
     effects: Sequence[str], remainder: Mapping[frozenset[str], Mapping[str, float]]
 ) -> dict[str, dict[str, float]]:
-    """Return the share of the closed gap that each of several effects explains, by effect and output.
-
-    The share of an effect is its reduction of the error, averaged over the orders in which the effects can be added: the shares
-    add up to one, and two interchangeable effects share what both explain.
-
-    References
-    ----------
-    L. S. Shapley, "A value for n-person games", Contributions to the Theory of Games II (Princeton 1953).
-    """
+    """Return the share of the closed gap that each of several effects explains, by effect and output."""
+    # The share of an effect is its reduction of the error, averaged over the orders in which the effects can be added: the shares
+    # add up to one, and two interchangeable effects share what both explain.
+    # L. S. Shapley, "A value for n-person games", Contributions to the Theory of Games II (Princeton 1953).
     subsets = [frozenset(c) for n in range(len(effects) + 1) for c in itertools.combinations(effects, n)]
     if len(effects) < 2 or any(subset not in remainder for subset in subsets):
         return {}

@@ -50,12 +50,8 @@ def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: ND
 
 
 def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
-    """Return the difference between pooled windows and the whole records that they cover (Hausman).
-
-    References
-    ----------
-    J. A. Hausman, Econometrica 46 (1978) 1251, for the difference of two estimates from the same data.
-    """
+    """Return the difference between pooled windows and the whole records that they cover (Hausman)."""
+    # J. A. Hausman, Econometrica 46 (1978) 1251, for the difference of two estimates from the same data.
     plain, infinite = _inverse(of, windows, kept)
     chain = of.coordinates.jacobian(of.place)
     inverse, unknown = chain @ plain, np.any(chain[:, infinite] != 0.0, axis=1)

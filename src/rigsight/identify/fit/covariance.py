@@ -37,17 +37,12 @@ def colored_covariance(
     derivative_error: float = 0.0,
     for_intervals: bool = False,
 ) -> Floats:
-    """Return the covariance of the common coordinates, allowing for colored residuals.
-
-    ``(J^T J)^-1 (sum_f J(f)^* S(f) J(f)^T) (J^T J)^-1`` with the smoothed residual spectrum S of each record, a matrix over its
-    outputs: a disturbance that acts before two sensors moves both. Coordinates that the records do not determine get an infinite
-    variance.
-
-    References
-    ----------
-    L. Ljung, *System Identification* (Prentice Hall 1999), chapter 9; W. K. Newey and K. D. West, Econometrica 55
-    (1987) 703; F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110, for the degrees of freedom of a sum.
-    """
+    """Return the covariance of the common coordinates, allowing for colored residuals."""
+    # ``(J^T J)^-1 (sum_f J(f)^* S(f) J(f)^T) (J^T J)^-1`` with the smoothed residual spectrum S of each record, a matrix over its
+    # outputs: a disturbance that acts before two sensors moves both. Coordinates that the records do not determine get an
+    # infinite variance.
+    # L. Ljung, *System Identification* (Prentice Hall 1999), chapter 9; W. K. Newey and K. D. West, Econometrica 55
+    # (1987) 703; F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110, for the degrees of freedom of a sum.
     own_sizes = [derivative.shape[1] - n_common for _, derivative in sensitivities]
     firsts = n_common + np.cumsum([0, *own_sizes])
     bread = np.zeros((int(firsts[-1]), int(firsts[-1])))

@@ -33,33 +33,19 @@ above the thesis's 0.05."""
 
 @dataclass(frozen=True)
 class ConicityEstimate:
-    """Equivalent conicity with its interval and a statement in words.
+    """Equivalent conicity with its interval and a statement in words."""
 
-    Attributes
-    ----------
-    value
-        Estimate limited to the range of (2.12), from 0 to the conicity at which c_y is zero [rad].
-    unbounded
-        Root of (2.12) without this limit [rad], such as the thesis's -0.15; None if (2.12) has none.
-    standard_error
-        Of the unbounded value [rad], by the delta method.
-    interval
-        Confidence interval inside the limits [rad]; None if no admissible conicity is compatible with c_y.
-    level
-        Its confidence level.
-    determined
-        True if the interval excludes zero and is narrower than the range of plausible conicities.
-    statement
-        The result in one or two sentences.
-    """
-
+    # Estimate limited to the range of (2.12), from 0 to the conicity at which c_y is zero [rad].
     value: float
+    # Root of (2.12) without this limit [rad], such as the thesis's -0.15; None if (2.12) has none.
     unbounded: float | None
-    standard_error: float
+    standard_error: float  # of the unbounded value [rad], by the delta method
+    # Confidence interval inside the limits [rad]; None if no admissible conicity is compatible with c_y.
     interval: tuple[float, float] | None
-    level: float
+    level: float  # its confidence level
+    # True if the interval excludes zero and is narrower than the range of plausible conicities.
     determined: bool
-    statement: str
+    statement: str  # the result in one or two sentences
 
 
 def estimate_conicity(

@@ -139,19 +139,7 @@ def form_of(
     constants: Mapping[str, float],
     path: tuple[str, str, str],
 ) -> TransferFit:
-    """Return the form that parameters of a rig of one motion give.
-
-    Parameters
-    ----------
-    rig, order
-        See `expressions_of_form`.
-    own
-        Estimates of all `parameters_of_form`.
-    constants
-        The rig's constants by name.
-    path
-        Source, response, and the unit of the gain.
-    """
+    """Return the form that estimates of all `parameters_of_form` give; the path is source, response, and unit of the gain."""
     forms, numbers = expressions_of_form(rig, order), {**constants, **own.values}
     values = {name: evaluated(expression, numbers) for name, expression in forms.items()}
     chain = [
