@@ -22,8 +22,8 @@ from scipy.optimize import Bounds, least_squares, minimize
 from rigsight.errors import InputError, check_option
 from rigsight.frequency.signal_pair import pair_unit
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance, sandwich_covariance
+from rigsight.identify.information import POORLY_KNOWN
 from rigsight.identify.transfer.transfer_form import Order, TransferFit, TransferForm
-from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
 from rigsight.records.signals import is_constant
 

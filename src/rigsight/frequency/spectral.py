@@ -1,4 +1,7 @@
-"""Frequency response from averaged spectra: H1, H2 and Hv over overlapping segments.
+"""Frequency response from spectra: averaged over overlapping segments (H1, H2, Hv), or the plain ratio line by line.
+
+The plain ratio has the free motion of the record in it; or it is made as in the thesis, sections 4.2 and 4.3: FFT of the response
+over FFT of the source, cut, ``unwrap``, phase "adjusted".
 
 References
 ----------
@@ -12,6 +15,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -157,3 +161,156 @@ def _independent(window: NDArray[np.float64], step: int, n_segments: float) -> f
         correlation = float(window[shift:] @ window[:-shift]) / power
         shared += 2.0 * (1.0 - shift / step / n_segments) * correlation**2
     return n_segments / (1.0 + max(shared, 0.0))
+
+
+_SMOOTHED = 15
+"""Lines over which the noise of local bands is averaged: one more band to each side, far less than a resonance is wide."""
+
+_ENDS = 15
+"""Points at either end whose mean phase the thesis takes as the phase reached there."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlainRatio(FrequencyResponse):
+    """Response over source at each line of a record, with independent errors.
+
+    It is ``G + T / drive`` with the free motion T that the difference between the first and the last state of the record excites.
+    A local model confuses T with the response at lines that a smooth sweep visits near the ends of a record: both are smooth
+    there. T has the poles of G, so a form of G distinguishes them.
+    """
+
+    drive: NDArray[np.complex128]  # spectrum of the source with its hold, shape (n_frequencies,)
+    # Sample time [s] and length of the record, and the hold of the source.
+    dt: float
+    n_samples: int
+    hold: Hold
+
+    def free_motions(self, poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Return a basis of the free motions over the drive, shape (n_frequencies, n_poles).
+
+        Parameters
+        ----------
+        poles
+            Poles of the form [1/s], shape (n_poles,).
+        """
+        return np.asarray(_free_motions(self.omega, self.dt, poles) / self.drive[:, None])
+
+    def free_motion(self, weights: NDArray[np.float64], poles: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Return the free motion with these weights of the basis over time, without its mean, shape (n_samples,)."""
+        omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(self.n_samples, self.dt)[1:], dtype=np.float64)
+        lines = _free_motions(omega, self.dt, poles) @ weights
+        return np.asarray(np.fft.irfft(np.append(0.0, lines), self.n_samples))
+
+
+def _free_motions(
+    omega: NDArray[np.float64], dt: float, poles: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Return ``z^-i / A(z)`` with the sampled poles: exact for all end states, since z^-n is 1 at the lines of n samples."""
+    delayed = np.exp(-1j * omega * dt)
+    below = np.prod(1.0 - np.exp(poles * dt) * delayed[:, None], axis=1)
+    return np.asarray(delayed[:, None] ** np.arange(poles.size) / below[:, None])
+
+
+def plain_ratio(record: Record, local: FrequencyResponse, hold: Hold) -> PlainRatio:
+    """Return the plain ratio at the lines of a local model of the same record, with the noise that this found.
+
+    Parameters
+    ----------
+    record
+        The record.
+    local
+        Response of its source and response by a local model, whose `line_noise` is known.
+    hold
+        Hold of the source between its samples.
+    """
+    assert local.line_noise is not None
+    every = line_frequencies(record.n_samples, record.dt)
+    lines = np.searchsorted(every, local.omega * (1.0 - 1e-9)) + 1
+    source, response = (np.fft.rfft(record[name])[lines] for name in (local.source, local.response))
+    drive = source * hold_response(local.omega, record.dt, hold)
+    width = min(_SMOOTHED, lines.size)
+    weights = np.ones(width)
+    count = np.convolve(np.ones(lines.size), weights, mode="same")
+    noise = np.convolve(local.line_noise, weights, mode="same") / count
+    return PlainRatio(
+        omega=local.omega,
+        values=response / drive,
+        source=local.source,
+        response=local.response,
+        unit=local.unit,
+        variance=noise / np.abs(drive) ** 2,
+        records=local.records,
+        method=f"spectra with the noise of {local.method}",
+        noise_freedom=2.0 * local.noise_freedom,
+        drive=drive,
+        dt=record.dt,
+        n_samples=record.n_samples,
+        hold=hold,
+    )
+
+
+def thesis_response(
+    record: Record,
+    source: str,
+    response: str,
+    phase_drop: float,
+    upper_cut: float,
+    lower_cut: float = 0.0,
+) -> FrequencyResponse:
+    """Return the frequency response as the thesis computes it; kept to reproduce its figures, not for identification.
+
+    Parameters
+    ----------
+    record
+        A sweep.
+    source, response
+        Names of the signals.
+    phase_drop
+        Assumed phase loss of the response over the band [rad]: pi for a PT2, pi / 2 for a PT1.
+    upper_cut, lower_cut
+        Frequencies beyond which the spectra are cut [rad/s]; the thesis keeps ``u -> psi`` up to 80 and ``psi -> y`` up to
+        30 rad/s.
+
+    Raises
+    ------
+    InputError
+        If fewer than 30 points are left, a line of the source is zero, or the phase does not fall.
+
+    Notes
+    -----
+    The unwrapped phase is multiplied by ``phase_drop`` over the difference of the means of its first and last 15 points and
+    shifted to begin at zero. This hides any other phase change (a delay, a lag, a wrap due to noise). The magnitude is the
+    plain ratio. There is no variance.
+    """
+    omega = line_frequencies(record.n_samples, record.dt)
+    spectra = {name: np.fft.rfft(record[name])[1 : omega.size + 1] for name in (source, response)}
+    kept = (omega >= lower_cut) & (omega <= upper_cut)
+    if np.count_nonzero(kept) < 2 * _ENDS:
+        raise InputError(
+            f"Record '{record.name}': {np.count_nonzero(kept)} frequencies lie between the cuts {lower_cut:g} and "
+            f"{upper_cut:g} rad/s, and the thesis's phase needs {2 * _ENDS}: widen the cuts or record longer."
+        )
+    below = spectra[source][kept]
+    if (np.abs(below) == 0.0).any():
+        raise InputError(
+            f"Record '{record.name}': the source '{source}' has no content at some frequency between the cuts."
+        )
+    ratio = spectra[response][kept] / below
+    phase = np.unwrap(np.angle(ratio))
+    fallen = float(np.mean(phase[:_ENDS]) - np.mean(phase[-_ENDS:]))
+    if fallen <= 0.0:
+        raise InputError(
+            f"Record '{record.name}': the unwrapped phase of '{source}' -> '{response}' rises by {-fallen:.3g} rad between "
+            "the cuts, so the rescaling of the thesis would invert it: reduce the upper cut, or use another estimator."
+        )
+    phase = phase * (phase_drop / fallen)
+    phase -= phase[0]
+    return FrequencyResponse(
+        omega=omega[kept],
+        values=np.abs(ratio) * np.exp(1j * phase),
+        source=source,
+        response=response,
+        unit=pair_unit(record, source, response),
+        records=(record.name,),
+        method="thesis: FFT ratio, phase rescaled",
+    )

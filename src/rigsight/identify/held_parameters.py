@@ -16,11 +16,11 @@ from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.fit.windows import cut, window_length
+from rigsight.identify.information import listed
 from rigsight.identify.linear_view import longest_free_run
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.start.linear_start import linear_start
 from rigsight.identify.start.scales import characteristic_scales
-from rigsight.identify.undetermined import listed
 from rigsight.parameters import Parameter
 from rigsight.records.record import Record
 from rigsight.records.signals import is_constant

@@ -21,10 +21,11 @@ import numpy as np
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.fit_data import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
-from rigsight.identify.information import Information, information
-from rigsight.identify.undetermined import (
+from rigsight.identify.information import (
     POORLY_KNOWN,
+    Information,
     conditional_errors,
+    information,
     listed,
     marginal_errors,
     percent,

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from rigsight.frequency import ResponsesOfInputs, responses_of_inputs
 from rigsight.identify.fit.first_states import rig_state
-from rigsight.identify.information import Information
+from rigsight.identify.information import POORLY_KNOWN, Information
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.transfer.record_response import Method
-from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig

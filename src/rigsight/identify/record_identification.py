@@ -14,6 +14,7 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.frequency.signal_pair import TooShortError, pair_unit
 from rigsight.identify.amplitude_dependence import measured_amplitude
 from rigsight.identify.identification import PathIdentification, RecordIdentification
+from rigsight.identify.information import POORLY_KNOWN
 from rigsight.identify.linear_view import measured_responses
 from rigsight.identify.transfer.conicity import estimate_conicity
 from rigsight.identify.transfer.physical_parameters import (
@@ -31,7 +32,6 @@ from rigsight.identify.transfer.record_response import (
 )
 from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
-from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
 from rigsight.records.signals import instrument_of, is_constant
 from rigsight.rigs import Rig

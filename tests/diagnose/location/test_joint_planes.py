@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.location import joint_planes
+from rigsight.diagnose.location import state_plane
 from rigsight.diagnose.location.gap_parts import StatePart
-from rigsight.diagnose.location.joint_planes import joint_parts
+from rigsight.diagnose.location.state_plane import joint_parts
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.policy import MAPS
 from rigsight.effects import effect_named, placed
@@ -78,7 +78,7 @@ def test_the_cells_of_each_plane_add_up_to_the_gap(hidden: tuple[tuple[StatePart
 def test_of_long_records_the_stretch_with_the_largest_gap_is_mapped(
     train: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(joint_planes, "MAPS", replace(MAPS, mapped_samples=300))
+    monkeypatch.setattr(state_plane, "MAPS", replace(MAPS, mapped_samples=300))
     context, reidentified, (trace,) = reported(train, train.records())
     late = {name: np.where(trace.t > 4.0, samples + 1.0, samples) for name, samples in trace.before.items()}
     parts = joint_parts(context, reidentified, [replace(trace, before=late, reidentified=late)])

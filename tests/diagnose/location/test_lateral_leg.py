@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.location.lateral_leg import fit_lateral_leg
+from rigsight.diagnose.location.paths import fit_lateral_leg
 from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RUNNING_GEAR

@@ -18,10 +18,9 @@ from rigsight.diagnose.location.gap_parts import (
     RecordPart,
     TimePart,
 )
-from rigsight.diagnose.location.joint_planes import joint_parts
 from rigsight.diagnose.location.paths import path_parts, path_sentence
 from rigsight.diagnose.location.quantify import budget_intervals
-from rigsight.diagnose.location.state_plane import state_parts
+from rigsight.diagnose.location.state_plane import joint_parts, state_parts
 from rigsight.diagnose.location.trace import STAGES, Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
 from rigsight.diagnose.policy import MAPS

@@ -4,12 +4,15 @@ The force missing in the re-identified equations is ``m e'' + d e' + k e`` of th
 drive obey the equations and cancel. Effects that the simulation already contains are neglected in this, so that the map then
 shows the shape of the missing force but not its exact size. The residual is used up to the frequency at which it exceeds the
 noise.
+
+On a rig of several joints the planes are those of each joint, with the force that would act there if everything missing acted at
+this joint: the motion follows the sensors, with a force of any shape over time, and the re-identified parameters.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.signal
@@ -19,8 +22,11 @@ from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.bands import spectrum
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.trace import STAGES, Trace
-from rigsight.diagnose.policy import MAPS
+from rigsight.diagnose.policy import MAPS, VERDICT
+from rigsight.discover import JointMotion, joint_motions
+from rigsight.errors import SimulationError
 from rigsight.metrics import rms
+from rigsight.records.record import Record
 from rigsight.rigs import evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
@@ -185,3 +191,79 @@ def plane_units(units: Mapping[str, str]) -> dict[str, str]:
         **dict.fromkeys(("v_low", "v_high"), f"{x}/{time}"),
         **dict.fromkeys(("force_mean", "force_rms", "force_noise"), force),
     }
+
+
+Signals = Mapping[str, NDArray[np.float64]]
+
+
+def joint_parts(
+    context: FitContext, reidentified: FittedModel, scored: Sequence[Trace]
+) -> tuple[StatePart, ...]:
+    """Return the gap of each output over the plane of each joint's motion."""
+    # First the joint at which a force agrees best with the sensors. If a large effect is missing, the re-identified parameters
+    # are inaccurate and so is this agreement: it only sorts and excludes nothing.
+    # None beside effects that are modelled already, as the motion is followed with the rig's own equations, of a rig that nothing
+    # but prescribed motions move, and where a sensor's level is not known.
+    if not scored or context.modelled or not context.rig.mechanism.free:
+        return ()
+    if any(record.free_offsets for record in context.scoring):
+        return ()
+    share = max(1, MAPS.mapped_samples // len(scored))
+    stretches = [_stretch(context, trace, share) for trace in scored]
+    records = [_record(context, trace) for trace in stretches]
+    try:
+        motions = joint_motions(context.rig, records, reidentified.fit.values, context.noise)
+    except (SimulationError, np.linalg.LinAlgError):
+        # A diagnosis is still useful without this map.
+        return ()
+    motions = tuple(motion for motion in motions if np.isfinite(motion.remainder))
+    parts: list[StatePart] = []
+    for motion in sorted(motions, key=lambda motion: motion.remainder):
+        parts += plane_parts(
+            context, _plane(context, motion, reidentified.error_over_noise > VERDICT.at_floor), stretches
+        )
+    return tuple(parts)
+
+
+def _stretch(context: FitContext, trace: Trace, n_samples: int) -> Trace:
+    """Return the stretch of a record, at most so long, in which the gap is largest."""
+    if trace.t.size <= n_samples:
+        return trace
+    remainder = sum(
+        (trace.residual("reidentified", name) / context.noise[name]) ** 2 for name in trace.measured
+    )
+    energy = np.append(0.0, np.cumsum(remainder))
+    start = int(np.argmax(energy[n_samples:] - energy[:-n_samples]))
+    kept = slice(start, start + n_samples)
+
+    def cut(signals: Signals) -> Signals:
+        return {name: samples[kept] for name, samples in signals.items()}
+
+    return replace(
+        trace,
+        t=trace.t[kept],
+        inputs=cut(trace.inputs),
+        measured=cut(trace.measured),
+        before=cut(trace.before),
+        reidentified=cut(trace.reidentified),
+        after=cut(trace.after),
+    )
+
+
+def _record(context: FitContext, trace: Trace) -> Record:
+    origin = next(r for r in context.scoring if r.origin == trace.record)
+    return replace(origin, name=trace.record, window_of="", signals={**trace.inputs, **trace.measured})
+
+
+def _plane(context: FitContext, motion: JointMotion, lacks: bool) -> Plane:
+    force = -np.concatenate(motion.force)
+    return Plane(
+        x=np.concatenate(motion.displacement),
+        v=np.concatenate(motion.velocity),
+        # The resisting force is the missing force with the opposite sign.
+        force=force if lacks else np.full(force.size, NOTHING),
+        force_noise=rms(np.concatenate(motion.error)) if lacks else NOTHING,
+        forced=tuple(signal.name for signal in context.rig.outputs),
+        units=plane_units(context.rig.units_at(motion.joint.name)),
+        joint=motion.joint.name,
+    )

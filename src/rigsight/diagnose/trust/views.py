@@ -13,7 +13,7 @@ from rigsight.diagnose.trust.estimates import Estimates, beyond, estimates, mean
 from rigsight.diagnose.trust.patterns import Order, Pattern
 from rigsight.diagnose.trust.pieces import Piece, Pieces
 from rigsight.diagnose.trust.spectra import NoiseSpectra
-from rigsight.identify.undetermined import POORLY_KNOWN
+from rigsight.identify.information import POORLY_KNOWN
 
 Floats = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from scipy.optimize import least_squares
 from rigsight.errors import InputError, check_option
 from rigsight.frequency import FrequencyResponse, PlainRatio, hold_response
 from rigsight.identify.fit.covariance import propagated_covariance, sandwich_covariance
+from rigsight.identify.information import POORLY_KNOWN
 from rigsight.identify.transfer.transfer_form import Order, TransferFit, TransferForm
-from rigsight.identify.undetermined import POORLY_KNOWN
 
 Weighting = Literal["variance", "uniform", "relative"]
 

@@ -28,7 +28,7 @@ from rigsight.identify.identification import (
     JointIdentification,
     RecordIdentification,
 )
-from rigsight.identify.information import Information, information, reached_bounds
+from rigsight.identify.information import POORLY_KNOWN, Information, information, reached_bounds
 from rigsight.identify.linear_view import (
     LinearView,
     by_constants,
@@ -39,7 +39,6 @@ from rigsight.identify.linear_view import (
 )
 from rigsight.identify.record_identification import EstimationOptions, identify_record, with_own_fit
 from rigsight.identify.transfer.physical_parameters import PhysicalEstimates, form_gives_parameters
-from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
