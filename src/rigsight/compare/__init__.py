@@ -1,9 +1,13 @@
 """Comparison of many models on many records: frequency responses, steps and free runs, each with its noise floor."""
 
+from rigsight.compare.comparison import QUANTITIES as QUANTITIES
+from rigsight.compare.comparison import Column as Column
 from rigsight.compare.comparison import Comparison as Comparison
 from rigsight.compare.comparison import Competitor as Competitor
 from rigsight.compare.comparison import Failure as Failure
+from rigsight.compare.comparison import Floor as Floor
 from rigsight.compare.comparison import RecordComparison as RecordComparison
+from rigsight.compare.comparison import Score as Score
 from rigsight.compare.on_one_record import Yardstick as Yardstick
 from rigsight.compare.on_one_record import compare_on_record as compare_on_record
 from rigsight.compare.response_error import ResponseError as ResponseError
@@ -11,9 +15,5 @@ from rigsight.compare.response_error import SignalPath as SignalPath
 from rigsight.compare.response_error import response_error as response_error
 from rigsight.compare.response_error import response_floor as response_floor
 from rigsight.compare.response_error import signal_paths as signal_paths
-from rigsight.compare.score import QUANTITIES as QUANTITIES
-from rigsight.compare.score import Column as Column
-from rigsight.compare.score import Floor as Floor
-from rigsight.compare.score import Score as Score
 from rigsight.compare.step_error import StepWindow as StepWindow
 from rigsight.compare.step_error import step_window as step_window

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.compare.comparison import Competitor, Failure, RecordComparison
+from rigsight.compare.comparison import Column, Competitor, Failure, Floor, RecordComparison, Score
 from rigsight.compare.response_error import (
     ResponseError,
     SignalPath,
@@ -20,7 +19,6 @@ from rigsight.compare.response_error import (
     simulated_response,
     without_shares,
 )
-from rigsight.compare.score import Column, Floor, Score
 from rigsight.compare.step_error import DEFAULT_SECONDS, StepWindow, step_window, stepping_input
 from rigsight.errors import InputError, SimulationError
 from rigsight.frequency import FrequencyResponse
@@ -28,6 +26,7 @@ from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.transfer.record_response import Method
 from rigsight.metrics import nrmse
 from rigsight.records import Record
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 from rigsight.simulate import simulate
 from rigsight.simulate.model import Model
@@ -81,7 +80,7 @@ def compare_on_record(
         except InputError as error:
             notes.append(str(error))
     trials = [_trial(c, record, windows, yardstick, paths, measured, least, step) for c in competitors]
-    moved: dict[str, dict[str, NDArray[np.float64]]] = {}
+    moved: dict[str, dict[str, Floats]] = {}
     for trial in trials:
         for output, samples in trial.moved.items():
             moved.setdefault(output, {})[trial.model] = samples
@@ -124,7 +123,7 @@ class _Trial:
     record: str
     scores: list[Score] = field(default_factory=list)
     responses: dict[str, FrequencyResponse] = field(default_factory=dict)
-    moved: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    moved: dict[str, Floats] = field(default_factory=dict)
     failures: list[Failure] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 

@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, responses_of_inputs
@@ -21,7 +20,7 @@ from rigsight.identify.transfer.record_response import Method, driven_band, reco
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.metrics import rms
 from rigsight.records import Record
-from rigsight.records.record import Hold
+from rigsight.records.record import Floats, Hold
 from rigsight.records.signals import is_constant, moves_beyond_noise
 from rigsight.rigs import Rig
 
@@ -162,11 +161,7 @@ def simulated_response(
 
 
 def _response(
-    record: Record,
-    path: SignalPath,
-    method: Method,
-    least_clearness: float,
-    wanted: NDArray[np.float64] | None = None,
+    record: Record, path: SignalPath, method: Method, least_clearness: float, wanted: Floats | None = None
 ) -> FrequencyResponse:
     moving = [name for name in path.inputs if not is_constant(record[name])]
     if len(moving) > 1:

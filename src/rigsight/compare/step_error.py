@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from rigsight.errors import InputError
 from rigsight.metrics import rms
 from rigsight.records import Record
+from rigsight.records.record import Floats
 from rigsight.records.signals import is_constant, roughness
 
 DEFAULT_SECONDS = 4.0
@@ -37,11 +37,11 @@ class StepWindow:
     before: slice
     inside: slice
 
-    def moved(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    def moved(self, samples: Floats) -> Floats:
         """Return the samples inside less the mean before, shape (n_inside,)."""
         return np.asarray(samples[self.inside] - np.mean(samples[self.before]))
 
-    def error(self, measured: NDArray[np.float64], simulated: NDArray[np.float64]) -> float:
+    def error(self, measured: Floats, simulated: Floats) -> float:
         """Return the RMSE of two signals of shape (n_samples,), offsets removed."""
         return rms(self.moved(measured) - self.moved(simulated))
 
@@ -57,14 +57,14 @@ def stepping_input(record: Record, sources: Sequence[str]) -> str:
     return min(jumping or moving, key=lambda name: _first_jump(record[name]), default=sources[0])
 
 
-def _first_jump(samples: NDArray[np.float64]) -> int:
+def _first_jump(samples: Floats) -> int:
     """Return the first sample after the first large change; 0 for a constant."""
     change = np.abs(np.diff(samples))
     largest = float(change.max(initial=0.0))
     return int(np.argmax(change >= _JUMP * largest)) + 1 if largest > 0.0 else 0
 
 
-def _exceeds_noise(samples: NDArray[np.float64]) -> bool:
+def _exceeds_noise(samples: Floats) -> bool:
     """Return True if noise as rough as that of the samples does not explain their largest change."""
     change = np.abs(np.diff(samples))
     # The difference of two samples has twice the variance of their noise; of all changes the largest is tested, to both sides.

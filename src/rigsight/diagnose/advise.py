@@ -12,13 +12,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES
 from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep, step
-from rigsight.records.record import Hold, Record
+from rigsight.records.record import Floats, Hold, Record
 from rigsight.simulate import simulate
 
 
@@ -28,7 +27,7 @@ class _Experiment:
     source: str
     amplitude: float
     band: tuple[float, float] | None
-    inputs: Mapping[str, NDArray[np.float64]]
+    inputs: Mapping[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -102,7 +101,7 @@ def _menu(context: FitContext) -> Iterator[_Experiment]:
     t = dt * np.arange(n_samples, dtype=np.float64)
     slow, fast = (share * omega for share in NOTES.advised_band)
     fast = min(fast, 0.4 * math.pi / dt)
-    drives: tuple[tuple[str, tuple[float, float] | None, Callable[[float], NDArray[np.float64]]], ...] = (
+    drives: tuple[tuple[str, tuple[float, float] | None, Callable[[float], Floats]], ...] = (
         (
             "sweep",
             (slow, fast),

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.diagnose.advise import advise
@@ -42,7 +41,7 @@ from rigsight.errors import InputError
 from rigsight.identify import FitMemory
 from rigsight.identify.fit.windows import readings
 from rigsight.metrics import nrmse
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
 
@@ -285,7 +284,7 @@ def _with_disturbance(
     )
 
 
-def _up_to(floor: NoiseFloor, residual: NDArray[np.float64]) -> NoiseFloor:
+def _up_to(floor: NoiseFloor, residual: Floats) -> NoiseFloor:
     """Return a lower bound with the upper limit that an adequate model's remainder gives it; another floor as it is."""
     if not floor.lower_bound or not residual.size:
         return floor
@@ -309,13 +308,13 @@ def _evidence(found: Examination) -> tuple[str, ...]:
     return tuple(dict.fromkeys(rig.where(effect) for effect in found.judgement.model.effects))
 
 
-def _column(rig: Rig, model: FittedModel, output: str) -> NDArray[np.float64]:
+def _column(rig: Rig, model: FittedModel, output: str) -> Floats:
     index = [signal.name for signal in rig.outputs].index(output)
     column = np.concatenate([residual[:, index] for residual in model.residuals])
     return np.asarray(column[np.isfinite(column)])
 
 
-def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, NDArray[np.float64]]:
+def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, Floats]:
     shown = {signal.name: list(readings(records, signal.name).values()) for signal in rig.outputs}
     return {name: np.concatenate(parts) for name, parts in shown.items() if parts}
 

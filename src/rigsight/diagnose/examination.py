@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model, with_offsets_told
@@ -33,6 +32,7 @@ from rigsight.effects import Effect
 from rigsight.identify import FitMemory
 from rigsight.identify.fit.windows import Windowing
 from rigsight.inverse import Proposal
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 
 
@@ -146,11 +146,7 @@ def _raised(floor: NoiseFloor, factor: float) -> NoiseFloor:
 
 
 def _ranked(
-    models: AllModels,
-    effects: Sequence[Effect],
-    noise: NDArray[np.float64],
-    allowed: float,
-    rng: np.random.Generator,
+    models: AllModels, effects: Sequence[Effect], noise: Floats, allowed: float, rng: np.random.Generator
 ) -> tuple[Ranking, tuple[FittedModel, ...]]:
     """Return the ranking of all models with effects, and those that do not compete because other laws fit equally well."""
     context, reidentified, singles = models.alone.context, models.alone.reidentified, models.alone.singles
@@ -188,7 +184,7 @@ def _with_offset_rivals(
     context: FitContext,
     ranking: Ranking,
     effects: Sequence[Effect],
-    noise: NDArray[np.float64],
+    noise: Floats,
     rng: np.random.Generator,
     gap: float,
     criterion: Callable[[FittedModel], float],

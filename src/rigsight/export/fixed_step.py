@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from rigsight.effects.symbols import derivative
 from rigsight.export.equations import Exported
+from rigsight.records.record import Floats
 from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, rest_state
 from rigsight.simulate.equations.composition import without_vanished_effects
@@ -20,8 +20,6 @@ from rigsight.simulate.equations.straight_line import straight_line
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.input_hold import HeldInput, hold_input, together
 from rigsight.simulate.model import Model
-
-Floats = NDArray[np.float64]
 
 OSCILLATION = 0.03
 """Step times the angular frequency of the fastest oscillation: Runge-Kutta then errs by less than 1e-6 over its decay."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.records.record import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,20 +61,20 @@ class FrequencyResponse:
         If shapes differ, a value is not finite, frequencies do not increase, or a variance is negative.
     """
 
-    omega: NDArray[np.float64]
+    omega: Floats
     values: NDArray[np.complex128]
     source: str
     response: str
     unit: str
-    variance: NDArray[np.float64] | None = None
-    noise_variance: NDArray[np.float64] | None = None
-    coherence: NDArray[np.float64] | None = None
+    variance: Floats | None = None
+    noise_variance: Floats | None = None
+    coherence: Floats | None = None
     records: tuple[str, ...] = ()
     method: str = ""
     noise_shares: NDArray[np.complex128] | None = None
     noise_lines: NDArray[np.intp] | None = None
-    line_noise: NDArray[np.float64] | None = None
-    bias: NDArray[np.float64] | None = None
+    line_noise: Floats | None = None
+    bias: Floats | None = None
     noise_freedom: float = float("inf")
     shared_width: float = 0.0
 
@@ -122,22 +123,22 @@ class FrequencyResponse:
         return f"Frequency response {self.source} -> {self.response}"
 
     @property
-    def magnitude(self) -> NDArray[np.float64]:
+    def magnitude(self) -> Floats:
         """Magnitude in `unit`, shape (n_frequencies,)."""
         return np.abs(self.values)
 
     @property
-    def magnitude_db(self) -> NDArray[np.float64]:
+    def magnitude_db(self) -> Floats:
         """Magnitude in dB of one `unit`, shape (n_frequencies,); -inf where the value is zero."""
         with np.errstate(divide="ignore"):
             return np.asarray(20.0 * np.log10(self.magnitude))
 
     @property
-    def phase(self) -> NDArray[np.float64]:
+    def phase(self) -> Floats:
         """Phase [rad] unwrapped from the lowest frequency on, shape (n_frequencies,); negative for a lag."""
         return np.unwrap(np.angle(self.values))
 
-    def phase_next_to(self, omega: NDArray[np.float64], phase: NDArray[np.float64]) -> NDArray[np.float64]:
+    def phase_next_to(self, omega: Floats, phase: Floats) -> Floats:
         """Return the phase on the branch next to that of another curve: a turn of 2 pi is no difference.
 
         Parameters

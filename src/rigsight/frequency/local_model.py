@@ -31,7 +31,7 @@ from rigsight.frequency.signal_pair import (
     line_frequencies,
     pair_unit,
 )
-from rigsight.records.record import Hold, Record
+from rigsight.records.record import Floats, Hold, Record
 
 SPARE = 6
 """Equations in excess of the unknowns in the narrowest automatic band: with fewer, the variance is unreliable."""
@@ -53,7 +53,7 @@ def local_polynomial_response(
     transient: bool = True,
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
-    wanted: NDArray[np.float64] | None = None,
+    wanted: Floats | None = None,
     instrument: str | None = None,
 ) -> FrequencyResponse:
     """Return the frequency response with a polynomial of the frequency fitted around each line.
@@ -118,7 +118,7 @@ def local_rational_response(
     transient: bool = True,
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
-    wanted: NDArray[np.float64] | None = None,
+    wanted: Floats | None = None,
     instrument: str | None = None,
 ) -> FrequencyResponse:
     """Return the frequency response with a rational function of the frequency fitted around each line.
@@ -178,7 +178,7 @@ def _local_response(
     transient: bool,
     hold: Hold,
     band: tuple[float, float] | None,
-    wanted: NDArray[np.float64] | None,
+    wanted: Floats | None,
     instrument: str | None,
 ) -> FrequencyResponse:
     method = "local rational" if poles else "local polynomial"
@@ -313,11 +313,8 @@ class LocalFit:
 
 
 def _solve(
-    U: NDArray[np.complex128],
-    Y: NDArray[np.complex128],
-    lines: NDArray[np.intp],
-    model: _LocalModel,
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64]]:
+    U: NDArray[np.complex128], Y: NDArray[np.complex128], lines: NDArray[np.intp], model: _LocalModel
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], Floats]:
     """Return the values at some lines, the shares of the noise in them, the lines that this noise is from, and its power."""
     fit, picked = _fit(U, Y, lines, model)
     return fit.coefficient(0), fit.shares(0) * np.sqrt(fit.noise)[:, None], picked, fit.noise
@@ -329,9 +326,7 @@ def _solve_ratio(
     Y: NDArray[np.complex128],
     lines: NDArray[np.intp],
     model: _LocalModel,
-) -> tuple[
-    NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]
-]:
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], Floats, Floats]:
     """Return the results of `_solve` for the ratio of the responses of Y and U to R, and the power of U's over its variance."""
     # The noise of a line in both signals is treated as one noise, with the phase that it has in Y: noise that feedback brings
     # into both cancels, as it does in the ratio.

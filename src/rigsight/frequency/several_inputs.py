@@ -23,7 +23,7 @@ from rigsight.errors import InputError
 from rigsight.frequency.frequency_response import FrequencyResponse
 from rigsight.frequency.local_model import SPARE, LocalFit
 from rigsight.frequency.signal_pair import excited, hold_response, line_frequencies, pair_unit
-from rigsight.records.record import Hold, Record
+from rigsight.records.record import Floats, Hold, Record
 from rigsight.records.signals import mean_period, moves_beyond_noise
 
 _OWN_SHARE = 1e-4
@@ -63,7 +63,7 @@ class _Spectra:
     """Spectra of one record, scaled to equal noise in all records; inputs include their hold, and are zero if constant."""
 
     record: Record
-    omega: NDArray[np.float64]
+    omega: Floats
     inputs: NDArray[np.complex128]
     moves: NDArray[np.bool_]
     excites: NDArray[np.bool_]
@@ -290,9 +290,7 @@ class _LocalModels:
             f"multisine of it."
         )
 
-    def _solved(
-        self, omega: NDArray[np.float64]
-    ) -> tuple[NDArray[np.complex128], *tuple[NDArray[np.float64], ...]]:
+    def _solved(self, omega: Floats) -> tuple[NDArray[np.complex128], *tuple[Floats, ...]]:
         """Return values and variances of all inputs, degrees of freedom, and the share of each that others do not explain."""
         # Shapes (n_frequencies, n_moving), the third (n_frequencies,). The shares are those that each single other input, and all
         # others together, do not explain, shapes (n_frequencies, n_moving, n_moving) and (n_frequencies, n_moving).
@@ -328,7 +326,7 @@ class _LocalModels:
         return values, fit.noise[:, None] * shares, fit.freedom, *_own_shares(inputs, n_terms)
 
 
-def _frequencies(spectra: Sequence[_Spectra]) -> NDArray[np.float64]:
+def _frequencies(spectra: Sequence[_Spectra]) -> Floats:
     """Return the lines that each input excites in its finest record; if too many, some at equal logarithmic distances."""
     lines = []
     for index in np.flatnonzero(np.any([s.moves for s in spectra], axis=0)):
@@ -341,23 +339,19 @@ def _frequencies(spectra: Sequence[_Spectra]) -> NDArray[np.float64]:
     return np.unique(every[np.clip(np.searchsorted(every, wished), 0, every.size - 1)])
 
 
-def _at_lines(s: _Spectra, flags: NDArray[np.bool_], omega: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _at_lines(s: _Spectra, flags: NDArray[np.bool_], omega: Floats) -> NDArray[np.bool_]:
     """Return the flags at the lines of a record next to some frequencies; false above its last line."""
     nearest = np.clip(np.round(omega / s.line).astype(np.intp) - 1, 0, s.omega.size - 1)
     return np.asarray(flags[nearest] & (omega <= s.omega[-1]))
 
 
-def _without(
-    powers: NDArray[np.float64], parts: Sequence[NDArray[np.complex128]]
-) -> list[NDArray[np.complex128]]:
+def _without(powers: Floats, parts: Sequence[NDArray[np.complex128]]) -> list[NDArray[np.complex128]]:
     """Remove the transient from the equations of a record, by projecting out polynomials over each band."""
     basis = np.linalg.qr(powers)[0]
     return [part - basis @ (np.swapaxes(basis, 1, 2) @ part) for part in parts]
 
 
-def _own_shares(
-    inputs: NDArray[np.complex128], n_terms: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _own_shares(inputs: NDArray[np.complex128], n_terms: int) -> tuple[Floats, Floats]:
     """Return the share of each input's power that one other, and that all others, leave unexplained."""
     n_bands, n_rows, n_columns = inputs.shape
     n = n_columns // n_terms
@@ -367,7 +361,7 @@ def _own_shares(
         power = np.maximum(np.sum(np.abs(blocks[:, :, i, 0]) ** 2, axis=1), 1e-300)
         others = [j for j in range(n) if j != i]
 
-        def unexplained(rivals: list[int], i: int = i) -> NDArray[np.float64]:
+        def unexplained(rivals: list[int], i: int = i) -> Floats:
             terms = blocks[:, :, rivals].reshape(n_bands, n_rows, -1)
             return np.asarray(LocalFit(terms, blocks[:, :, i, 0]).left_over)
 

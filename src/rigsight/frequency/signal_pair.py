@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.record import Hold, Record
+from rigsight.records.record import Floats, Hold, Record
 
 _UNEXCITED = 1e-4
 """Power, relative to the strongest frequency, below which a source counts as silent: 40 dB."""
@@ -46,20 +46,20 @@ def check_alike(records: Sequence[Record], source: str, response: str) -> None:
             )
 
 
-def line_frequencies(n_samples: int, dt: float) -> NDArray[np.float64]:
+def line_frequencies(n_samples: int, dt: float) -> Floats:
     """Return the angular frequencies between zero and Nyquist, both excluded, of `n_samples` samples [rad/s]."""
     # Shape ((n_samples - 1) // 2,); they are lines ``1 : (n_samples + 1) // 2`` of a real Fourier transform.
     lines = np.arange(1, (n_samples + 1) // 2, dtype=np.float64)
     return np.asarray(lines * (2.0 * math.pi / (n_samples * dt)), dtype=np.float64)
 
 
-def among(omega: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.bool_]:
+def among(omega: Floats, wanted: Floats) -> NDArray[np.bool_]:
     """Return which frequencies are lines of another spectrum of records of the same length, shape (n_frequencies,)."""
     nearest = wanted[np.clip(np.searchsorted(wanted, omega) - np.array([[1], [0]]), 0, wanted.size - 1)]
     return np.asarray(np.min(np.abs(nearest - omega), axis=0) <= 1e-6 * omega)
 
 
-def hold_response(omega: NDArray[np.float64], dt: float, hold: Hold) -> NDArray[np.complex128]:
+def hold_response(omega: Floats, dt: float, hold: Hold) -> NDArray[np.complex128]:
     """Return the factor by which a hold changes the ratio of sampled signals, shape (n_frequencies,).
 
     Samples of the response divided by samples of a held source show ``G(j omega)`` times this factor, and images of
@@ -88,12 +88,7 @@ def hold_response(omega: NDArray[np.float64], dt: float, hold: Hold) -> NDArray[
     return np.ones(omega.shape, dtype=np.complex128)
 
 
-def excited(
-    omega: NDArray[np.float64],
-    power: NDArray[np.float64],
-    band: tuple[float, float] | None,
-    what: str,
-) -> NDArray[np.bool_]:
+def excited(omega: Floats, power: Floats, band: tuple[float, float] | None, what: str) -> NDArray[np.bool_]:
     """Return which frequencies can be estimated, shape (n_frequencies,)."""
     # A frequency is silent if its power is 40 dB below the strongest both per rad/s and per octave: neither the falling
     # density of a logarithmic sweep nor the few low octaves of a linear one are a lack of excitation.

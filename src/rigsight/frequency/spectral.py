@@ -32,7 +32,7 @@ from rigsight.frequency.signal_pair import (
     line_frequencies,
     pair_unit,
 )
-from rigsight.records.record import Hold, Record
+from rigsight.records.record import Floats, Hold, Record
 
 Estimator = Literal["H1", "H2", "Hv"]
 
@@ -141,7 +141,7 @@ def _spectra(
     records: Sequence[Record],
     source: str,
     response: str,
-    window: NDArray[np.float64],
+    window: Floats,
     overlapping: int,
     counts: NDArray[np.int_],
 ) -> NDArray[np.complex128]:
@@ -153,7 +153,7 @@ def _spectra(
     return np.asarray(np.average(spectra, axis=0, weights=counts), dtype=np.complex128)
 
 
-def _independent(window: NDArray[np.float64], step: int, n_segments: float) -> float:
+def _independent(window: Floats, step: int, n_segments: float) -> float:
     """Return the number of independent segments with the variance of the overlapping ones; Welch's formula."""
     power = float(window @ window)
     shared = 0.0
@@ -195,16 +195,14 @@ class PlainRatio(FrequencyResponse):
         """
         return np.asarray(_free_motions(self.omega, self.dt, poles) / self.drive[:, None])
 
-    def free_motion(self, weights: NDArray[np.float64], poles: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def free_motion(self, weights: Floats, poles: NDArray[np.complex128]) -> Floats:
         """Return the free motion with these weights of the basis over time, without its mean, shape (n_samples,)."""
         omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(self.n_samples, self.dt)[1:], dtype=np.float64)
         lines = _free_motions(omega, self.dt, poles) @ weights
         return np.asarray(np.fft.irfft(np.append(0.0, lines), self.n_samples))
 
 
-def _free_motions(
-    omega: NDArray[np.float64], dt: float, poles: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
+def _free_motions(omega: Floats, dt: float, poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Return ``z^-i / A(z)`` with the sampled poles: exact for all end states, since z^-n is 1 at the lines of n samples."""
     delayed = np.exp(-1j * omega * dt)
     below = np.prod(1.0 - np.exp(poles * dt) * delayed[:, None], axis=1)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
 from rigsight.records.formats.channel_file import file_format, open_channels
 from rigsight.records.formats.text_channels import TextColumns
+from rigsight.records.record import Floats
 from rigsight.records.sensor_signs import FULL_TURNS, codes, held, is_wrapped, wrapping_counter
 from rigsight.records.signals import clipping
 
@@ -69,7 +69,7 @@ def summarize(channel: Channel) -> ChannelSummary:
     )
 
 
-def _remarks(channel: Channel, samples: NDArray[np.float64]) -> Iterator[str]:
+def _remarks(channel: Channel, samples: Floats) -> Iterator[str]:
     if channel.stored.note:
         yield f"values are {channel.stored.note}"
     if channel.stored.unclear:
@@ -93,7 +93,7 @@ def _remarks(channel: Channel, samples: NDArray[np.float64]) -> Iterator[str]:
         yield f"looks clipped: {count} samples are exactly at its extreme {level:g}"
 
 
-def step_and_gaps(stamps: NDArray[np.float64]) -> tuple[float | None, int | None]:
+def step_and_gaps(stamps: Floats) -> tuple[float | None, int | None]:
     """Return the median step of time stamps, shape (n_samples,), and how often they jump; None where they do not rise."""
     steps = np.diff(stamps)
     if steps.size == 0 or not np.all((steps > 0.0) & (steps < np.inf)):

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
 from rigsight.records.channel_units import UnknownUnitError, factor
@@ -24,11 +23,11 @@ from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.formats.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
 from rigsight.records.formats.channel_file import file_format, open_channels
 from rigsight.records.formats.text_channels import TextColumns
+from rigsight.records.record import Floats
 
 _LISTED = 30
 """Channels that a message lists; a logger may record thousands."""
 _OWN_AXIS = "its own time axis"
-Floats = NDArray[np.float64]
 
 
 def read_columns(

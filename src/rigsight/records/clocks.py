@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.channel_names import NAMES_OF, closeness, plain_words
 from rigsight.records.column_mapping import Columns
+from rigsight.records.record import Floats
 from rigsight.records.stamps import seconds_since
 
 TIME = "t"
@@ -100,7 +100,7 @@ def possible_clocks(
     }
 
 
-def increases(stamps: NDArray[np.float64]) -> bool:
+def increases(stamps: Floats) -> bool:
     """Return True if numbers can be the stamps of a clock, shape (n_samples,)."""
     return stamps.size > 1 and bool(np.all(np.diff(stamps) > 0.0))
 
@@ -110,7 +110,7 @@ class Clock:
     """The time of a signal."""
 
     label: str  # how it is called
-    stamps: NDArray[np.float64]  # time stamps, shape (n_samples,)
+    stamps: Floats  # time stamps, shape (n_samples,)
     unit: str | None = None  # stated by the file; None where it is that of the campaign
     origin: np.datetime64 | None = None  # moment from which they count; None where the file does not say
 
@@ -149,7 +149,7 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
             "time, or all without."
         )
     first = min(known.values(), default=None)
-    axes: dict[str, NDArray[np.float64]] = {}
+    axes: dict[str, Floats] = {}
     for signal, clock in clocks.items():
         alike = next((s for s in axes if shared_clock([clocks[s], clock])), None)
         if alike is not None:

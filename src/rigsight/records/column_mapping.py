@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest, shown
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.records.record import Floats
 from rigsight.records.stamps import written_stamp
-
-Floats = NDArray[np.float64]
 
 FEWEST_SAMPLES = 50
 # Beyond, squares and quotients would overflow; data read with a wrong type looks like this.

@@ -6,15 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.conditioning import FEWEST_SAMPLES, TimeBase
 from rigsight.records.formats.channel import MOST_SAMPLES
-from rigsight.records.record import Hold
+from rigsight.records.record import Floats, Hold
 from rigsight.records.stamps import written_stamp
-
-Floats = NDArray[np.float64]
 
 # Of the sample time: closer than this, a stamp lies on the grid.
 _ON_GRID = 1e-6

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.records.channel_units import conversion, is_a
 from rigsight.records.column_mapping import ColumnMapping, Columns
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _CODE_SIZE = 1e30
 """From here on no reading in any unit: 9.9e37 and 9.91e37 (SCPI), 9.97e36 (NetCDF), 9.9e34 (DIAdem), 3.4e38 (end of a type)."""

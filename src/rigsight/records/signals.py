@@ -7,11 +7,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.records.record import Record
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats, Record
 
 # A cut leaves plateaus of at least this many samples, at least this often.
 SHORTEST_PLATEAU = 3

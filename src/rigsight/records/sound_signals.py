@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
 from rigsight.records.channel_names import closeness
 from rigsight.records.column_mapping import Columns
 from rigsight.records.conditioning import LARGEST_NUMBER
+from rigsight.records.record import Floats
 from rigsight.records.signals import clipping, is_constant
-
-Floats = NDArray[np.float64]
 
 _LISTED = 30
 """Columns that a message lists."""

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.records.record import Floats
+
 _FAR = 1e3
 """Durations of a record by which its stamps may exceed it before an axis counts from the first one."""
 _MOST_DIGITS = 17
@@ -34,7 +36,7 @@ def written_span(begin: float, end: float) -> str:
     return " to ".join(f"{text} s" for text in ends)
 
 
-def time_origin(t: NDArray[np.float64]) -> float:
+def time_origin(t: Floats) -> float:
     """Return the stamp that an axis counts from: 0, or the first one where stamps are far larger than the record is long."""
     if t.size < 2:
         return 0.0
@@ -42,7 +44,7 @@ def time_origin(t: NDArray[np.float64]) -> float:
     return first if max(abs(first), abs(last)) > _FAR * (last - first) else 0.0
 
 
-def time_label(t: NDArray[np.float64]) -> str:
+def time_label(t: Floats) -> str:
     """Return the label of a time axis that counts from `time_origin`."""
     origin = time_origin(t)
     if not origin:
@@ -50,7 +52,7 @@ def time_label(t: NDArray[np.float64]) -> str:
     return f"time [s] since {written_stamp(origin, float(t[-1] - t[0]) / (t.size - 1))} s"
 
 
-def seconds_since(stamps: NDArray[Any], origin: np.datetime64 | None) -> NDArray[np.float64]:
+def seconds_since(stamps: NDArray[Any], origin: np.datetime64 | None) -> Floats:
     """Return numpy dates, shape (n_samples,), as seconds [s] from `origin`, durations as seconds; NaN where one is missing."""
     if stamps.dtype.kind == "M":
         stamps = stamps - (stamps[:1] if origin is None else origin)

@@ -23,10 +23,9 @@ from rigsight.records.conditioning import (
     resolution,
     stamp_text,
 )
+from rigsight.records.record import Floats
 from rigsight.records.signals import is_constant
 from rigsight.records.stamps import written_span
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

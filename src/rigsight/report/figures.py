@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from markupsafe import Markup, escape
-from numpy.typing import NDArray
 
 from rigsight import plot
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import Place, kind_of
+from rigsight.records.record import Floats
 from rigsight.records.stamps import written_span
 from rigsight.report.quantities import gap_percent, rig_of
 from rigsight.report.wording import effect_label, listed, sentence_case, stage_names
@@ -187,7 +187,7 @@ def loop_figures(diagnosis: Diagnosis) -> list[PageFigure]:
     ]
 
 
-def _loops(displacement: NDArray[np.float64], error: NDArray[np.float64]) -> slice:
+def _loops(displacement: Floats, error: Floats) -> slice:
     """Return the few whole periods of the motion in which the error is largest; all samples where there are no more."""
     away = displacement - np.mean(displacement)
     # The sign of the motion with a dead band: noise about the middle is no turn.
@@ -246,10 +246,10 @@ class Curve:
 
     of: str  # what it shows, which decides its color: ``"measured"``, a stage of the diagnosis, or ``"floor"``
     name: str  # in the legend
-    y: NDArray[np.float64] | None = None  # None for an area
+    y: Floats | None = None  # None for an area
     # Limits of an area, one for all points or one per point; None for a line.
-    low: NDArray[np.float64] | float | None = None
-    high: NDArray[np.float64] | float | None = None
+    low: Floats | float | None = None
+    high: Floats | float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +296,7 @@ def points_per_curve(n_curves: int) -> int:
 def chart_data(
     title: str,
     label: str,
-    x: NDArray[np.float64],
+    x: Floats,
     panels: Sequence[ChartPanel],
     *,
     log: bool = False,
@@ -323,7 +323,7 @@ def _curve(curve: Curve) -> dict[str, Any]:
     }
 
 
-def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+def _numbers(values: Floats) -> list[float | None]:
     """Return numbers with the digits that are seen; None for what is not finite, for which JSON has no word."""
     known = values[np.isfinite(values)]
     reach = float(np.ptp(known)) or abs(float(known[0])) if known.size else 0.0

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.result import Estimate
 from rigsight.identify import FitResult
 from rigsight.identify.identification import HysteresisIdentification, Identification
 from rigsight.identify.linear_view import LinearView, Mode
+from rigsight.records.record import Floats
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.identification import derived_rows, error_rows
 from rigsight.report.quantities import ERRORS_HOLD, ParameterRow, parameter_row, written
@@ -165,7 +165,7 @@ def _transfer_function(view: LinearView, source: str, response: str) -> dict[str
     }
 
 
-def _polynomial(coefficients: NDArray[np.float64]) -> str:
+def _polynomial(coefficients: Floats) -> str:
     degree = coefficients.size - 1
     parts = [
         (value, f"{abs(value):.4g}{' s' if power else ''}{f'^{power}' if power > 1 else ''}")

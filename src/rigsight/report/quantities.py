@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rigsight.compare import Column
-from rigsight.compare.score import Quantity
+from rigsight.compare.comparison import Quantity
 from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.effects import AT, Effect, kind_of, placed
 from rigsight.parameters import Parameter

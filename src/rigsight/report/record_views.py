@@ -14,6 +14,7 @@ from rigsight import plot
 from rigsight.diagnose.location.trace import STAGES, Stage, Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.metrics import nrmse
+from rigsight.records.record import Floats
 from rigsight.records.stamps import time_label, time_origin
 from rigsight.report.figures import (
     Chart,
@@ -155,7 +156,7 @@ def _detail(trace: Trace, output: str, first: str) -> Detail:
     return Detail(begin, end, "Largest error", f"Show where the error is largest, {first}")
 
 
-def _kept(series: Sequence[NDArray[np.float64]], most_points: int) -> NDArray[np.int64]:
+def _kept(series: Sequence[Floats], most_points: int) -> NDArray[np.int64]:
     """Return the samples of a shorter line that keeps the peaks of these."""
     places = np.arange(series[0].size, dtype=np.float64)
     if places.size <= most_points:
@@ -166,7 +167,7 @@ def _kept(series: Sequence[NDArray[np.float64]], most_points: int) -> NDArray[np
     )
 
 
-def _largest(values: NDArray[np.float64], limit: float) -> float:
+def _largest(values: Floats, limit: float) -> float:
     return min(limit, float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)))
 
 

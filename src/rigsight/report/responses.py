@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import cast, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight import plot
 from rigsight.compare.response_error import (
@@ -26,7 +25,7 @@ from rigsight.identify.transfer.record_response import Method
 from rigsight.plot.drawing import TWO_SIDED
 from rigsight.plot.frequency_responses import decibel, thinned
 from rigsight.records import Record
-from rigsight.records.record import Hold, Kind
+from rigsight.records.record import Floats, Hold, Kind
 from rigsight.report.figures import Chart, ChartPanel, Curve, PageFigure, chart_data, curve_names, page_figure
 from rigsight.report.quantities import rig_of
 from rigsight.report.wording import sentence_case, stage_names, unit_text
@@ -76,7 +75,7 @@ def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, 
         simulated: dict[str, FrequencyResponse] = {}
         distances: dict[str, float] = {}
         for stage in stages:
-            outputs: Mapping[str, NDArray[np.float64]] = getattr(trace, stage)
+            outputs: Mapping[str, Floats] = getattr(trace, stage)
             try:
                 record = _record(diagnosis, trace, outputs)
                 response = simulated_response(record, path, _METHOD, own)
@@ -96,7 +95,7 @@ def _worst(diagnosis: Diagnosis, paths: Sequence[SignalPath]) -> tuple[SignalPat
     return tuple(path for path in paths if path in ranked)
 
 
-def _record(diagnosis: Diagnosis, trace: Trace, outputs: Mapping[str, NDArray[np.float64]]) -> Record:
+def _record(diagnosis: Diagnosis, trace: Trace, outputs: Mapping[str, Floats]) -> Record:
     hold = diagnosis.model.get("hold")
     return Record(
         name=trace.record,
@@ -200,9 +199,7 @@ def _by_amplitude(
     return found
 
 
-def _at(
-    measured: FrequencyResponse, simulated: FrequencyResponse, values: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _at(measured: FrequencyResponse, simulated: FrequencyResponse, values: Floats) -> Floats:
     """Return values at the lines of a measured response; a simulated one may lack some of them."""
     found = np.full(measured.omega.size, np.nan)
     kept = np.isin(simulated.omega, measured.omega)
@@ -210,7 +207,7 @@ def _at(
     return found
 
 
-def _bands(measured: FrequencyResponse, phase: NDArray[np.float64]) -> tuple[list[Curve], list[Curve]]:
+def _bands(measured: FrequencyResponse, phase: Floats) -> tuple[list[Curve], list[Curve]]:
     """Return the 95 % intervals of magnitude and phase."""
     if measured.variance is None:
         return [], []
@@ -226,7 +223,7 @@ def _bands(measured: FrequencyResponse, phase: NDArray[np.float64]) -> tuple[lis
     )
 
 
-def _cap(values: NDArray[np.float64]) -> tuple[float, float]:
+def _cap(values: Floats) -> tuple[float, float]:
     low, high = np.percentile(values, [0.5, 100.0])
     reach = _BELOW + 0.5 * (high - low)
     return float(low - reach), float(high + reach)

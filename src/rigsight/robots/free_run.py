@@ -6,19 +6,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records import Record
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.draft import RigDraft, with_known_constants
 from rigsight.simulate import compose, simulate
 
 if TYPE_CHECKING:
     import mujoco
-
-Floats = NDArray[np.float64]
-
 
 STEP, SAMPLES, STEPS_PER_SAMPLE = 1e-4, 500, 10
 """MuJoCo's step [s], samples that are compared, and steps from each to the next."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.records.record import Floats
 
 if TYPE_CHECKING:
     import mujoco
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 LARGEST_FILE = 20_000_000
 
-
-Floats = NDArray[np.float64]
 
 _ROUNDING = 1e-9
 """Share of the largest component below which another one is rounding of the quaternions that a model is stored with."""

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import least_squares
 
 from rigsight.effects import Place
 from rigsight.effects.symbols import derivative, v
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 from rigsight.simulate.compiled.kernel import kernel_of
 from rigsight.simulate.equations.composition import compose
@@ -34,8 +34,6 @@ WAITS = 7
 """Each wait is twice as long as the one before."""
 TOLERANCE = 1e-9
 """Error allowed per step, relative to the largest excursion of each state."""
-
-Floats = NDArray[np.float64]
 
 BALANCED = 1e-8
 """Imbalance of forces allowed at the end of the search, relative to that at its start."""

@@ -14,9 +14,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 Hold = Literal["zoh", "foh", "band_limited"]
 

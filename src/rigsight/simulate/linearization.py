@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvals
 
 from rigsight.errors import SimulationError
+from rigsight.records.record import Floats
 from rigsight.simulate.equations.derivatives import declared_start, slope_functions
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
 from rigsight.simulate.equations.tree import FirstOrderState, Output, late
 from rigsight.simulate.simulation import parameter_vector
 
-Floats = NDArray[np.float64]
 Stability = Literal["stable", "drifts", "undamped", "unstable"]
 
 _ROUNDED = 1e-7

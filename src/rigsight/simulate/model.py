@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from rigsight.effects import Effect
+from rigsight.records.record import Floats
 from rigsight.simulate.equations.composition import compose
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import Hold
@@ -86,7 +85,7 @@ class Model:
         }
 
 
-def at_parameters(structure: Structure, expression: sp.Expr, p: NDArray[np.float64]) -> Any:
+def at_parameters(structure: Structure, expression: sp.Expr, p: Floats) -> Any:
     """Return the value of an expression."""
     return _function(structure.parameter_symbols, expression)(*p)
 

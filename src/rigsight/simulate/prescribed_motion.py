@@ -8,14 +8,12 @@ from hashlib import sha256
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import dct, idct, idst
 from scipy.interpolate import make_interp_spline, make_smoothing_spline
 from scipy.optimize import minimize_scalar
 
+from rigsight.records.record import Floats
 from rigsight.simulate.input_hold import continued
-
-Floats = NDArray[np.float64]
 
 _cache: OrderedDict[bytes, tuple[Floats, Floats, Floats]] = OrderedDict()
 _cache_lock = Lock()

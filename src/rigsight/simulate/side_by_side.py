@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
+from rigsight.records.record import Floats
 from rigsight.simulate.compiled.kernel import FittedRecord, kernel_of
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import Structure
@@ -21,8 +22,6 @@ from rigsight.simulate.simulation import (
     simulate_outputs,
     state_vector,
 )
-
-Floats = NDArray[np.float64]
 
 _NUDGE = 1e-12
 """Perturbation of a state at rest: far below any accuracy, but unstable steps amplify it visibly."""

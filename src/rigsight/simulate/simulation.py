@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, SimulationError, check_option
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.simulate.compiled.kernel import kernel_of
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.equations.structure import Structure, ahead_name, bandwidth_name
@@ -32,8 +32,6 @@ _REASONS = {
     2: "the motion diverged; the model is unstable with these parameters",
     3: "not enough memory for the history of its delays",
 }
-
-Floats = NDArray[np.float64]
 
 
 def record_input(structure: Structure, record: Record) -> HeldInput:

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from rigsight.diagnose import Diagnosis
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.excitation import log_sweep, step
 from rigsight.records import Hold, Kind, Record, Role
+from rigsight.records.record import Floats
 from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.rigs.published import PublishedSet, published_sets
 from rigsight.simulate import Structure, compose, simulate
@@ -53,14 +53,14 @@ class _Run:
     amplitude: float
     hold: Hold
     duration: float
-    signal: Callable[[NDArray[np.float64], float], NDArray[np.float64]]
+    signal: Callable[[Floats, float], Floats]
 
 
-def _sweep(t: NDArray[np.float64], amplitude: float) -> NDArray[np.float64]:
+def _sweep(t: Floats, amplitude: float) -> Floats:
     return log_sweep(t, amplitude, *_SWEEP_OMEGA)
 
 
-def _step(t: NDArray[np.float64], amplitude: float) -> NDArray[np.float64]:
+def _step(t: Floats, amplitude: float) -> Floats:
     return step(t, amplitude, _STEP_START)
 
 
@@ -189,14 +189,14 @@ class VirtualRig:
         """The equations that are simulated."""
         return compose(RUNNING_GEAR, [effect_named(name) for name in self.truth.effects])
 
-    def time(self, duration: float) -> NDArray[np.float64]:
+    def time(self, duration: float) -> Floats:
         """Return the sample times of a record of `duration` [s], shape (n_samples,)."""
         return self.dt * np.arange(round(duration / self.dt), dtype=np.float64)
 
     def measure(
         self,
         name: str,
-        u: NDArray[np.float64],
+        u: Floats,
         rng: np.random.Generator,
         *,
         kind: Kind = "operation",
@@ -216,7 +216,7 @@ class VirtualRig:
         seen = {output: clean[output] + rng.normal(scale=s, size=u.size) for output, s in self.noise.items()}
         return clean.with_signals(u=u, **seen)
 
-    def _torque_disturbance(self, n_samples: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    def _torque_disturbance(self, n_samples: int, rng: np.random.Generator) -> Floats:
         pole = float(np.exp(-self.disturbance_corner * self.dt))
         settled = int(np.ceil(5.0 / (self.disturbance_corner * self.dt)))
         white = rng.normal(scale=self.disturbance * np.sqrt(1.0 - pole**2), size=n_samples + settled)

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, nearest
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
+from rigsight.records.record import Floats
 from rigsight.records.stamps import digits_for
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, parameter_vector, record_input, record_values, rest_state, simulate
@@ -137,7 +137,7 @@ def simulate_model(
     return simulate(model.structure, model.values, record, state)
 
 
-def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> NDArray[np.float64]:
+def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> Floats:
     structure = model.structure
     names = list(structure.state_names)
     # If an output equals a state, users know the state by the name of the output.
@@ -159,7 +159,7 @@ def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> 
     return state
 
 
-def _estimated_state(model: Model, record: Record) -> NDArray[np.float64]:
+def _estimated_state(model: Model, record: Record) -> Floats:
     rig = model.structure.rig
     noise = {s.name: float(np.std(record[s.name])) or 1.0 for s in rig.outputs if s.name in record}
     scales = characteristic_scales(rig, [record], model.values)
@@ -170,9 +170,7 @@ def _estimated_state(model: Model, record: Record) -> NDArray[np.float64]:
     return _of_all_effects(model.structure, simulated, result.rig_states[0])
 
 
-def _of_all_effects(
-    complete: Structure, simulated: Structure, state: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _of_all_effects(complete: Structure, simulated: Structure, state: Floats) -> Floats:
     """Return a state of the simulated equations as one of all effects; states of vanished effects are not used and are zero."""
     if simulated is complete:
         return state

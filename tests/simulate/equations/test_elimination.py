@@ -14,7 +14,7 @@ from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.identify.rig_equations import equations_of
 from rigsight.records.record import Hold, Record
-from rigsight.rigs import RIGS, Rig, coupled_inertia, has_short_inverse
+from rigsight.rigs import RIGS, Rig, has_short_inverse, mechanism
 from rigsight.simulate import (
     Structure,
     carries_tangents,
@@ -65,7 +65,7 @@ def both(
     chosen = [placed(effect_named(kind), place) for kind, _, place in (e.partition("@") for e in effects)]
     written = compose(rig, chosen)
     assert written.elimination is None
-    monkeypatch.setattr(coupled_inertia, "MOST_COUPLED", 0)
+    monkeypatch.setattr(mechanism, "MOST_COUPLED", 0)
     eliminated = compose(fresh(rig), chosen)
     assert eliminated.elimination is not None
     return written, eliminated
@@ -155,7 +155,7 @@ def test_equations_in_numbers_are_the_same(monkeypatch: pytest.MonkeyPatch) -> N
     written = equations_of(RIGS["two_link_arm"])
     # Which of both it is, is found when it is first asked.
     assert compose(RIGS["two_link_arm"]).elimination is None
-    monkeypatch.setattr(coupled_inertia, "MOST_COUPLED", 0)
+    monkeypatch.setattr(mechanism, "MOST_COUPLED", 0)
     eliminated = equations_of(fresh(RIGS["two_link_arm"]))
     rng = np.random.default_rng(3)
     z, u, p = rng.normal(size=(4, 7)), rng.normal(size=(6, 7)), rng.uniform(0.5, 1.5, 9)
@@ -200,7 +200,7 @@ def test_an_inertia_that_is_no_formula_is_told(monkeypatch: pytest.MonkeyPatch) 
     from rigsight.effects.symbols import m, x
 
     reading = replace(effect_named("quadratic_damping"), torque=m * x)
-    monkeypatch.setattr(coupled_inertia, "MOST_COUPLED", 1)
+    monkeypatch.setattr(mechanism, "MOST_COUPLED", 1)
     rig = fresh(RIGS["two_link_arm"])
     with pytest.raises(InputError, match=r"Set inertia in joints\.elbow"):
         compose(rig, [placed(reading, "elbow")])

@@ -14,7 +14,7 @@ from rigsight.diagnose.policy import NOTES
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response, responses_of_inputs
 from rigsight.identify.fit.windows import leading_output
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.records.signals import instrument_of, is_constant
 from rigsight.rigs import Rig
 
@@ -172,7 +172,7 @@ def _amplitude(record: Record, source: str, alone: bool) -> float:
 
 def _common(
     low: FrequencyResponse, high: FrequencyResponse
-) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128], NDArray[np.float64]]:
+) -> tuple[Floats, NDArray[np.complex128], NDArray[np.complex128], Floats]:
     """Return frequencies far enough apart to be independent, both responses there, and the variance of their difference."""
     omega = low.omega[(low.omega >= high.omega[0]) & (low.omega <= high.omega[-1])]
     parts = []
@@ -193,7 +193,7 @@ def _common(
     return omega[kept], first[kept], second[kept], (first_variance + second_variance)[kept]
 
 
-def _apart(indices: NDArray[np.intp], omega: NDArray[np.float64], width: float) -> NDArray[np.intp]:
+def _apart(indices: NDArray[np.intp], omega: Floats, width: float) -> NDArray[np.intp]:
     """Return those indices, from the first on, whose frequencies lie at least a width apart."""
     kept: list[int] = []
     for index in indices:

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.signal
-from numpy.typing import NDArray
 
 from rigsight.diagnose.policy import MAPS
+from rigsight.records.record import Floats
 
 
-def spectrum(samples: NDArray[np.float64], dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def spectrum(samples: Floats, dt: float) -> tuple[Floats, Floats]:
     """Return frequencies [rad/s] and the mean square at each of them, shape (n_lines,); they add up to that of the samples."""
     # The record is reflected at its ends: else the first and last half segment, where many sweeps have their slowest and fastest
     # waves, would weigh less than the rest.
@@ -30,9 +30,7 @@ def spectrum(samples: NDArray[np.float64], dt: float) -> tuple[NDArray[np.float6
     return 2.0 * np.pi * frequency, np.asarray(power * scale, dtype=np.float64)
 
 
-def band_edges(
-    records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], noise: float
-) -> NDArray[np.float64]:
+def band_edges(records: Sequence[tuple[Floats, Floats, float]], noise: float) -> Floats:
     """Return edges [rad/s] of bands over the excited range and of one above it, shape (n_bands + 2,)."""
     lows, highs = [], []
     for source, response, dt in records:
@@ -56,7 +54,7 @@ def band_edges(
     return np.concatenate([[0.0], inner, [nyquist]])
 
 
-def band_powers(samples: NDArray[np.float64], dt: float, edges: NDArray[np.float64]) -> NDArray[np.float64]:
+def band_powers(samples: Floats, dt: float, edges: Floats) -> Floats:
     """Return the mean square in each band, shape (n_edges - 1,); a line on the border of two bands is shared."""
     omega, power = spectrum(samples, dt)
     width = omega[1] - omega[0]
@@ -67,7 +65,7 @@ def band_powers(samples: NDArray[np.float64], dt: float, edges: NDArray[np.float
     return np.asarray(np.diff(inside), dtype=np.float64)
 
 
-def dominant_frequency(samples: NDArray[np.float64], dt: float, size: float) -> float:
+def dominant_frequency(samples: Floats, dt: float, size: float) -> float:
     """Return the center frequency of the power of a stretch [rad/s]; NaN where it is constant."""
     centered = samples - np.mean(samples)
     if samples.size < 2 or float(np.ptp(samples)) <= MAPS.rests * size:

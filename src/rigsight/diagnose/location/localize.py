@@ -7,7 +7,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.bands import band_edges, band_powers, dominant_frequency
@@ -25,6 +24,7 @@ from rigsight.diagnose.location.trace import STAGES, Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
 from rigsight.diagnose.policy import MAPS
 from rigsight.metrics import rms
+from rigsight.records.record import Floats
 
 
 def localize(
@@ -148,7 +148,7 @@ def _long_enough(stretches: Stretches) -> Stretches:
     return tuple((noise, dt) for noise, dt in stretches if noise.size >= MAPS.least_noise)
 
 
-def _colored(std: float, stretches: Stretches, edges: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _colored(std: float, stretches: Stretches, edges: Floats) -> Floats | None:
     """Return the power of the noise in each band from stretches of noise alone, shape (n_bands,); None without any."""
     if not stretches:
         return None
@@ -157,7 +157,7 @@ def _colored(std: float, stretches: Stretches, edges: NDArray[np.float64]) -> ND
     return np.asarray(mean * std**2 / float(np.sum(mean)))
 
 
-def _white(std: float, dt: float, edges: NDArray[np.float64]) -> NDArray[np.float64]:
+def _white(std: float, dt: float, edges: Floats) -> Floats:
     """Return the power of white noise in each band, shape (n_bands,)."""
     inside = np.minimum(edges, np.pi / dt)
     return np.asarray(std**2 * np.diff(inside) / (np.pi / dt))
@@ -225,7 +225,7 @@ def _share(part: float, total: float) -> float:
     return part / total if total > 0.0 else 0.0
 
 
-def _input(trace: Trace) -> NDArray[np.float64]:
+def _input(trace: Trace) -> Floats:
     """Return what drives a record: of several inputs the one that moves most beside its own middle."""
     if not trace.inputs:
         return np.zeros(trace.t.size)

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.optimize
 import scipy.signal
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
@@ -25,7 +24,7 @@ from rigsight.diagnose.policy import MAPS, NOTES, VERDICT
 from rigsight.effects import Place
 from rigsight.effects.symbols import derivative
 from rigsight.metrics import rms
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 
 
@@ -119,7 +118,7 @@ def _without(record: Record, names: set[str]) -> Record:
     return replace(record, signals={n: s for n, s in record.signals.items() if n not in names})
 
 
-def _column(model: FittedModel, index: int) -> list[NDArray[np.float64]]:
+def _column(model: FittedModel, index: int) -> list[Floats]:
     return [residual[:, index] for residual in model.residuals]
 
 
@@ -133,11 +132,7 @@ def _lateral_part(context: FitContext, leg: LateralLeg, motion: str, output: str
 
 
 def _part(
-    records: Sequence[Record],
-    output: str,
-    source: str,
-    residuals: dict[str, Sequence[NDArray[np.float64]]],
-    noise: float,
+    records: Sequence[Record], output: str, source: str, residuals: dict[str, Sequence[Floats]], noise: float
 ) -> PathPart:
     spread = float(np.std(np.concatenate([record[output] for record in records]))) or 1.0
     remainder = {stage: rms(np.concatenate(list(parts))) / spread for stage, parts in residuals.items()}
@@ -164,9 +159,9 @@ class LateralLeg:
 
     # Residual of y per scored record, shape (n_samples,): as given, with the best numbers, and with the
     # motion shifted too.
-    given: tuple[NDArray[np.float64], ...]
-    fitted: tuple[NDArray[np.float64], ...]
-    shifted: tuple[NDArray[np.float64], ...]
+    given: tuple[Floats, ...]
+    fitted: tuple[Floats, ...]
+    shifted: tuple[Floats, ...]
     # How much earlier the motion must have come for the best fit [s], and its standard error from a white
     # residual.
     shift: float
@@ -197,7 +192,7 @@ def fit_lateral_leg(context: FitContext, given: Mapping[str, float]) -> LateralL
     lowest, highest = np.log(MAPS.slowest_rate / longest), np.log(MAPS.fastest_rate / fitted_to[0].dt)
     first = float(np.clip(np.log(start.rate), lowest + 1e-6, highest - 1e-6))
 
-    def residual(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(theta: Floats) -> Floats:
         shift = float(theta[1]) * fitted_to[0].dt if theta.size > 1 else 0.0
         return _projected(fitted_to, names, float(np.exp(theta[0])), shift)[0]
 
@@ -237,7 +232,7 @@ def _given(rig: Rig, values: Mapping[str, float]) -> _Numbers:
     return _Numbers(rate, gain, offset)
 
 
-def _solved(records: Sequence[Record], names: tuple[str, str], theta: NDArray[np.float64]) -> _Numbers:
+def _solved(records: Sequence[Record], names: tuple[str, str], theta: Floats) -> _Numbers:
     shift = float(theta[1]) * records[0].dt if theta.size > 1 else 0.0
     coefficients = _projected(records, names, float(np.exp(theta[0])), shift)[1]
     return _Numbers(float(np.exp(theta[0])), float(coefficients[0]), float(coefficients[1]), shift)
@@ -245,7 +240,7 @@ def _solved(records: Sequence[Record], names: tuple[str, str], theta: NDArray[np
 
 def _projected(
     records: Sequence[Record], names: tuple[str, str], rate: float, shift: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Return residuals of all records and gain, offset and initial values that are best for a rate and a shift."""
     columns, targets = [], []
     for i, record in enumerate(records):
@@ -263,7 +258,7 @@ def _projected(
     return target - matrix @ coefficients, coefficients
 
 
-def _remainder(record: Record, names: tuple[str, str], numbers: _Numbers) -> NDArray[np.float64]:
+def _remainder(record: Record, names: tuple[str, str], numbers: _Numbers) -> Floats:
     """Return the residual of y with these parameters; only the initial value is fitted."""
     decay = _decay(record, numbers.rate)
     follows = numbers.gain * _response(_moved(record, names[0], numbers.shift), record.dt, numbers.rate)
@@ -271,7 +266,7 @@ def _remainder(record: Record, names: tuple[str, str], numbers: _Numbers) -> NDA
     return np.asarray(remainder - decay * (decay @ remainder) / (decay @ decay))
 
 
-def _moved(record: Record, name: str, shift: float) -> NDArray[np.float64]:
+def _moved(record: Record, name: str, shift: float) -> Floats:
     if shift == 0.0:
         return record[name]
     time = record.dt * np.arange(record.n_samples)
@@ -279,11 +274,11 @@ def _moved(record: Record, name: str, shift: float) -> NDArray[np.float64]:
     return np.asarray(CubicSpline(time, record[name])(at))
 
 
-def _decay(record: Record, rate: float) -> NDArray[np.float64]:
+def _decay(record: Record, rate: float) -> Floats:
     return np.asarray(np.exp(-rate * record.dt * np.arange(record.n_samples)))
 
 
-def _response(motion: NDArray[np.float64], dt: float, rate: float) -> NDArray[np.float64]:
+def _response(motion: Floats, dt: float, rate: float) -> Floats:
     """Return the answer from rest of ``y' = rate (x - y)`` to samples joined by straight lines, shape (n_samples,)."""
     ahead, behind, kept = _coefficients(rate * dt)
     response = scipy.signal.lfilter([ahead, behind], [1.0, -kept], motion)

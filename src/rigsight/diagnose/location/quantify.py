@@ -11,11 +11,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.location.trace import STAGES, Trace
 from rigsight.diagnose.noise.block_means import blocks_of
 from rigsight.diagnose.policy import MAPS
+from rigsight.records.record import Floats
 
 Interval = tuple[float, float]
 
@@ -30,8 +30,8 @@ def budget_intervals(
 
 
 def gap_intervals(
-    residuals: Mapping[str, Sequence[NDArray[np.float64]]],
-    measured: Sequence[NDArray[np.float64]],
+    residuals: Mapping[str, Sequence[Floats]],
+    measured: Sequence[Floats],
     noise_floor: float,
     rng: np.random.Generator,
 ) -> dict[str, Interval]:
@@ -52,7 +52,7 @@ def gap_intervals(
     return {stage: _limits(values) for stage, values in drawn.items()}
 
 
-def _limits(values: NDArray[np.float64]) -> Interval:
+def _limits(values: Floats) -> Interval:
     if not np.all(np.isfinite(values)):
         return math.nan, math.nan
     low, high = np.quantile(values, MAPS.limits)

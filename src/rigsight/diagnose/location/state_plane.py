@@ -26,7 +26,7 @@ from rigsight.diagnose.policy import MAPS, VERDICT
 from rigsight.discover import JointMotion, joint_motions
 from rigsight.errors import SimulationError
 from rigsight.metrics import rms
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
@@ -38,9 +38,9 @@ NOTHING = float("nan")
 class _Motion:
     """Displacement, velocity and the missing force of one record, shape (n_samples,) each, and the noise of the force."""
 
-    x: NDArray[np.float64]
-    v: NDArray[np.float64]
-    force: NDArray[np.float64]
+    x: Floats
+    v: Floats
+    force: Floats
     force_noise: float
 
 
@@ -49,9 +49,9 @@ class Plane:
     """A motion and the missing force there, of all records one after the other."""
 
     # Displacement, velocity and force, shape (n_samples,).
-    x: NDArray[np.float64]
-    v: NDArray[np.float64]
-    force: NDArray[np.float64]
+    x: Floats
+    v: Floats
+    force: Floats
     force_noise: float  # standard deviation that the sensors' noise gives the force
     forced: tuple[str, ...]  # outputs that the force acts on
     units: Mapping[str, str]  # of each key of a part
@@ -150,7 +150,7 @@ def _motion(context: FitContext, values: Mapping[str, float], trace: Trace) -> _
     return _Motion(x, np.gradient(x, trace.dt), force, noise)
 
 
-def _low_pass(samples: NDArray[np.float64], dt: float, noise: float) -> NDArray[np.float64] | None:
+def _low_pass(samples: Floats, dt: float, noise: float) -> Floats | None:
     """Return a filter that keeps what stands out of the noise, None where nothing does."""
     omega, power = spectrum(samples, dt)
     out = np.flatnonzero(power > MAPS.stands_out * noise**2 / omega.size)
@@ -165,11 +165,11 @@ def _low_pass(samples: NDArray[np.float64], dt: float, noise: float) -> NDArray[
     )
 
 
-def _filtered(sections: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
+def _filtered(sections: Floats, samples: Floats) -> Floats:
     return np.asarray(scipy.signal.sosfiltfilt(sections, samples), dtype=np.float64)
 
 
-def _cells(values: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+def _cells(values: Floats) -> tuple[NDArray[np.intp], Floats]:
     """Return the cell of each value and the edges of the cells."""
     low, high = float(np.min(values)), float(np.max(values))
     if high <= low:
@@ -178,7 +178,7 @@ def _cells(values: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.fl
     return np.clip(np.searchsorted(edges, values, side="right") - 1, 0, MAPS.cells - 1), edges
 
 
-def _finite_mean(values: NDArray[np.float64]) -> float:
+def _finite_mean(values: Floats) -> float:
     finite = values[np.isfinite(values)]
     return float(np.mean(finite)) if finite.size else NOTHING
 
@@ -193,7 +193,7 @@ def plane_units(units: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-Signals = Mapping[str, NDArray[np.float64]]
+Signals = Mapping[str, Floats]
 
 
 def joint_parts(

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.identify.fit.windows import readings
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 
 Stage = Literal["before", "reidentified", "after"]
@@ -27,20 +26,20 @@ class Trace:
     role: str
     kind: str
     amplitude: float | None
-    t: NDArray[np.float64]  # shape (n_samples,) [s]
+    t: Floats  # shape (n_samples,) [s]
     # Signal name -> shape (n_samples,).
-    inputs: Mapping[str, NDArray[np.float64]]
-    measured: Mapping[str, NDArray[np.float64]]
-    before: Mapping[str, NDArray[np.float64]]
-    reidentified: Mapping[str, NDArray[np.float64]]
-    after: Mapping[str, NDArray[np.float64]]
+    inputs: Mapping[str, Floats]
+    measured: Mapping[str, Floats]
+    before: Mapping[str, Floats]
+    reidentified: Mapping[str, Floats]
+    after: Mapping[str, Floats]
 
     @property
     def dt(self) -> float:
         """Sample time [s]."""
         return float(self.t[-1] - self.t[0]) / max(1, self.t.size - 1)
 
-    def residual(self, stage: Stage, output: str) -> NDArray[np.float64]:
+    def residual(self, stage: Stage, output: str) -> Floats:
         """Return measured minus simulated of a stage, shape (n_samples,)."""
         simulated = {"before": self.before, "reidentified": self.reidentified, "after": self.after}[stage]
         return np.asarray(self.measured[output] - simulated[output], dtype=np.float64)
@@ -62,9 +61,9 @@ def traces_of(
 def _joined(
     rig: Rig,
     records: Sequence[Record],
-    before: Sequence[NDArray[np.float64]],
-    reidentified: Sequence[NDArray[np.float64]],
-    after: Sequence[NDArray[np.float64]],
+    before: Sequence[Floats],
+    reidentified: Sequence[Floats],
+    after: Sequence[Floats],
 ) -> tuple[Trace, ...]:
     names = [signal.name for signal in rig.outputs]
     groups: dict[str, list[int]] = {}
@@ -77,10 +76,10 @@ def _joined(
         measured = {n: readings(parts, n)[name] for n in names if n in first}
 
         def simulated(
-            residuals: Sequence[NDArray[np.float64]],
+            residuals: Sequence[Floats],
             indices: Sequence[int] = indices,
-            measured: Mapping[str, NDArray[np.float64]] = measured,
-        ) -> dict[str, NDArray[np.float64]]:
+            measured: Mapping[str, Floats] = measured,
+        ) -> dict[str, Floats]:
             joined = np.concatenate([residuals[i] for i in indices])
             return {n: measured[n] - joined[:, names.index(n)] for n in measured}
 

@@ -16,14 +16,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import TRUST
 from rigsight.identify import Coordinates, FitResult, RecordDerivatives, derivatives, own_derivatives
-from rigsight.records.record import Record
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats, Record
 
 _UNDETERMINED = 1e-7
 """Share of the largest singular value below which a direction of the numbers is not told by a record."""

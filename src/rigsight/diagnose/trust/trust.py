@@ -18,7 +18,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 from scipy.stats import chi2, norm
 from scipy.stats import f as f_distribution
@@ -33,7 +32,7 @@ from rigsight.diagnose.trust.statement import statement
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, views
 from rigsight.identify import FitResult
 from rigsight.identify.information import POORLY_KNOWN
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 
 _NOT_SIMULATED = "Whether the parameters hold in each record could not be tested: the model cannot be simulated in one of them."
 _NOTHING_FITTED = "No parameter was fitted, so none can differ from record to record."
@@ -114,7 +113,7 @@ def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) 
     )
 
 
-def _wider(model: FittedModel, std: Mapping[str, float]) -> NDArray[np.float64]:
+def _wider(model: FittedModel, std: Mapping[str, float]) -> Floats:
     """Return the factor by which bootstrap standard errors exceed those of the formula, at least 1, shape (n_free,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         formula = np.array([model.fit.standard_errors[name] for name in model.fit.free])
@@ -273,9 +272,6 @@ def _text(fit: FitResult, names: tuple[str, str], block: np.ndarray, correlation
 
 def _percent(share: float) -> str:
     return f"{float(f'{100.0 * share:.2g}'):g} %"
-
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.policy import TRUST
-from rigsight.diagnose.trust.estimates import Estimates, beyond, estimates, mean, told_by_most
+from rigsight.diagnose.trust.estimates import Estimates, NoiseSpectra, beyond, estimates, mean, told_by_most
 from rigsight.diagnose.trust.patterns import Order, Pattern
 from rigsight.diagnose.trust.pieces import Piece, Pieces
-from rigsight.diagnose.trust.spectra import NoiseSpectra
 from rigsight.identify.information import POORLY_KNOWN
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 RECORD, PORTION, WINDOW_LENGTH = "record", "portion", "window"
 _NAMES = ("half", "quarter")

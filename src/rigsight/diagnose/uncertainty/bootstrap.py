@@ -18,21 +18,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import BOOTSTRAP
 from rigsight.diagnose.result import Candidate, Diagnosis, StdMethod
-from rigsight.diagnose.uncertainty.replicates import Replicates
-from rigsight.diagnose.uncertainty.sources import FEWEST, SLOWER, Sources, likeliest_sources
+from rigsight.diagnose.uncertainty.replicates import FEWEST, SLOWER, Replicates, Sources, likeliest_sources
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, OneStep
+from rigsight.records.record import Floats
 
 _STREAM = 1
 """Beside the seed: other draws of a diagnosis stay what they are without these."""
 
 
-Floats = NDArray[np.float64]
 _Shown = list[tuple[Floats, Floats]]
 """A white force along each record and its effect on the residual, shapes (n_samples, n_draws) and (n_samples, n_outputs,
 n_draws)."""

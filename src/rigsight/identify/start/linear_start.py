@@ -17,12 +17,11 @@ from dataclasses import replace
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.identify.start.any_rig_start import any_rig_start
 from rigsight.identify.start.equation_error import solve_in_frequency, spectra_of
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Follower, Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -241,7 +240,7 @@ def first_order(records: Sequence[Record], source: str, response: str) -> tuple[
 
 def _equation_error(
     records: Sequence[Record], source: str, response: str, orders: tuple[int, ...], gain: float
-) -> NDArray[np.float64]:
+) -> Floats:
     """Solve ``sum_i a_i (j omega)^order_i X = gain U + transient`` for the a_i."""
     for name in (source, response):
         _check_moves(records, name)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError, check_option
 from rigsight.frequency import (
@@ -22,7 +21,7 @@ from rigsight.frequency import (
 from rigsight.frequency.signal_pair import excited, line_frequencies
 from rigsight.identify.transfer.transfer_form import Order, TransferFit
 from rigsight.identify.transfer.transfer_function import MISFIT, fit_frequency_response
-from rigsight.records.record import Hold, Record
+from rigsight.records.record import Floats, Hold, Record
 from rigsight.records.signals import mean_period
 
 _Response = TypeVar("_Response", bound=FrequencyResponse)
@@ -81,7 +80,7 @@ def record_response(
     least_clearness: float = _CLEAR,
     clear_alone: bool = False,
     with_coherence: bool = True,
-    wanted: NDArray[np.float64] | None = None,
+    wanted: Floats | None = None,
     instrument: str | None = None,
     drive: str | None = None,
     moves_freely: bool = False,
@@ -138,7 +137,7 @@ class _Local:
     method: Method
     resolution: float | None
     hold: Hold
-    wanted: NDArray[np.float64] | None
+    wanted: Floats | None
     band: tuple[float, float] | None
 
     def resolved(self, instrument: str | None) -> tuple[int, float, float, str]:
@@ -240,9 +239,7 @@ def _thesis(record: Record, source: str, response: str, order: Order, upper_cut:
     return thesis_response(record, source, response, _THESIS_DROPS[order], upper, float(heard[0]))
 
 
-def _smaller_variance(
-    found: FrequencyResponse, other: FrequencyResponse, extra: NDArray[np.float64]
-) -> FrequencyResponse:
+def _smaller_variance(found: FrequencyResponse, other: FrequencyResponse, extra: Floats) -> FrequencyResponse:
     """Return at each line the one of two local models of the same bands that has the smaller variance."""
     assert found.variance is not None
     assert other.variance is not None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from rigsight.errors import InputError
-from rigsight.records.record import Hold
+from rigsight.records.record import Floats, Hold
 
 Order = Literal["pt1", "pt2"]
 
@@ -40,12 +40,12 @@ class TransferForm:
         """Number of poles, and of the logarithms that set them."""
         return 2 if self.order == "pt2" else 1
 
-    def vector(self, omega_b: float, zeta: float, dead_time: float) -> NDArray[np.float64]:
+    def vector(self, omega_b: float, zeta: float, dead_time: float) -> Floats:
         """Return the parameters for a gain of one, shape (n_parameters,)."""
         damping = [np.log(zeta)] if self.order == "pt2" else []
         return np.array([1.0, np.log(omega_b), *damping, *([dead_time] if self.with_dead_time else [])])
 
-    def natural(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def natural(self, theta: Floats) -> tuple[Floats, Floats]:
         """Return the parameters without logarithms and d natural / d theta (a diagonal), shape (n_parameters,) each."""
         values, chain = theta.copy(), np.ones_like(theta)
         shape = slice(1, 1 + self.n_poles)
@@ -53,7 +53,7 @@ class TransferForm:
         chain[shape] = values[shape]
         return values, chain
 
-    def _split(self, theta: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    def _split(self, theta: Floats) -> tuple[float, float, float, float]:
         zeta = float(np.exp(theta[2])) if self.order == "pt2" else 0.0
         return (
             float(theta[0]),
@@ -62,14 +62,14 @@ class TransferForm:
             float(theta[-1]) if self.with_dead_time else 0.0,
         )
 
-    def poles(self, theta: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def poles(self, theta: Floats) -> NDArray[np.complex128]:
         """Return the poles [1/s], shape (order,)."""
         _, omega_b, zeta, _ = self._split(theta)
         if self.order == "pt1":
             return np.array([-omega_b], dtype=np.complex128)
         return np.asarray(omega_b * (-zeta + np.array([1.0, -1.0]) * np.sqrt(complex(zeta**2 - 1.0))))
 
-    def response(self, omega: NDArray[np.float64], theta: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def response(self, omega: Floats, theta: Floats) -> NDArray[np.complex128]:
         """Return G(j omega), shape (n_frequencies,)."""
         gain, omega_b, zeta, dead_time = self._split(theta)
         ratio = omega / omega_b
@@ -78,7 +78,7 @@ class TransferForm:
             return np.asarray(gain * delay / (1.0 + 1j * ratio))
         return np.asarray(gain * delay / (1.0 - ratio**2 + 2j * zeta * ratio))
 
-    def derivatives(self, omega: NDArray[np.float64], theta: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def derivatives(self, omega: Floats, theta: Floats) -> NDArray[np.complex128]:
         """Return d G(j omega) / d theta, shape (n_frequencies, n_parameters)."""
         _, omega_b, zeta, dead_time = self._split(theta)
         ratio = omega / omega_b
@@ -98,9 +98,7 @@ class TransferForm:
             columns.append(-1j * omega * value)
         return np.column_stack(columns)
 
-    def sampled_response(
-        self, omega: NDArray[np.float64], dt: float, hold: Hold, theta: NDArray[np.float64]
-    ) -> NDArray[np.complex128]:
+    def sampled_response(self, omega: Floats, dt: float, hold: Hold, theta: Floats) -> NDArray[np.complex128]:
         """Return the ratio of samples to those of a held input, shape (n_frequencies,).
 
         Exact for ``"zoh"`` and ``"foh"`` but for free motions, also for a dead time between two samples.
@@ -159,8 +157,8 @@ class TransferFit:
     names: tuple[str, ...]
     values: dict[str, float]
     standard_errors: dict[str, float]
-    covariance: NDArray[np.float64]
-    residuals: NDArray[np.float64] | NDArray[np.complex128]
+    covariance: Floats
+    residuals: Floats | NDArray[np.complex128]
     misfit: float
     success: bool
     message: str
@@ -169,21 +167,21 @@ class TransferFit:
     unit: str
     method: str
     records: tuple[str, ...] = ()
-    free_motion: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    free_motion_covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    free_motion: Floats = field(default_factory=lambda: np.zeros(0))
+    free_motion_covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def residual_rms(self) -> float:
         """RMS of the residuals, in the unit of the fitted quantity."""
         return float(np.sqrt(np.mean(np.abs(self.residuals) ** 2)))
 
-    def covariance_of(self, *names: str) -> NDArray[np.float64]:
+    def covariance_of(self, *names: str) -> Floats:
         """Return the covariance of some parameters in the order given, shape (n, n)."""
         rows = [self.names.index(name) for name in names]
         return self.covariance[np.ix_(rows, rows)]
 
     @property
-    def theta(self) -> NDArray[np.float64]:
+    def theta(self) -> Floats:
         """Parameters as a vector of the form, shape (n_parameters,)."""
         theta = self.form.vector(
             self.values["omega_b"], self.values.get("zeta", 1.0), self.values.get("dead_time", 0.0)
@@ -191,11 +189,11 @@ class TransferFit:
         theta[0] = self.values["gain"]
         return theta
 
-    def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def at(self, omega: Floats) -> NDArray[np.complex128]:
         """Return G(j omega) of the fit, dead time included, shape (n_frequencies,)."""
         return self.form.response(omega, self.theta)
 
-    def standard_error_at(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    def standard_error_at(self, omega: Floats) -> Floats:
         """Return the standard error ``sqrt(E |G - truth|^2)`` of G(j omega) by the delta method, shape (n_frequencies,)."""
         theta = self.theta
         _, chain = self.form.natural(theta)
@@ -234,9 +232,7 @@ class TransferFit:
         return rational * control.tf(*control.pade(self.values["dead_time"], pade_order))
 
 
-def _transition(
-    a: NDArray[np.float64], b: NDArray[np.float64], time: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _transition(a: Floats, b: Floats, time: float) -> tuple[Floats, Floats, Floats]:
     """Return the effects after `time` of the state, of a constant input and of a ramp with slope one."""
     n = b.size
     augmented = np.zeros((n + 2, n + 2))

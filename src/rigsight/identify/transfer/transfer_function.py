@@ -22,6 +22,7 @@ from rigsight.frequency import FrequencyResponse, PlainRatio, hold_response
 from rigsight.identify.fit.covariance import propagated_covariance, sandwich_covariance
 from rigsight.identify.information import POORLY_KNOWN
 from rigsight.identify.transfer.transfer_form import Order, TransferFit, TransferForm
+from rigsight.records.record import Floats
 
 Weighting = Literal["variance", "uniform", "relative"]
 
@@ -118,16 +119,16 @@ class _Problem:
     """Weighted errors and their derivatives as functions of the parameter vector of a form."""
 
     form: TransferForm
-    omega: NDArray[np.float64]
+    omega: Floats
     values: NDArray[np.complex128]
-    weights: NDArray[np.float64]
+    weights: Floats
     """One over the standard deviation of a real component, shape (n_lines,)."""
     magnitude_only: bool
     weighting: Weighting
     longest_dead_time: float
     measured: FrequencyResponse
 
-    def fitted(self, theta: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def fitted(self, theta: Floats) -> NDArray[np.complex128]:
         """Return what the form shows at the lines, with the images of a held source around multiples of the sample rate."""
         ratio = self.measured
         if not isinstance(ratio, PlainRatio) or ratio.hold == "band_limited":
@@ -135,16 +136,16 @@ class _Problem:
         sampled = self.form.sampled_response(self.omega, ratio.dt, ratio.hold, theta)
         return np.asarray(sampled / hold_response(self.omega, ratio.dt, ratio.hold))
 
-    def errors(self, theta: NDArray[np.float64]) -> NDArray[np.complex128] | NDArray[np.float64]:
+    def errors(self, theta: Floats) -> NDArray[np.complex128] | Floats:
         if self.magnitude_only:
             return np.asarray(np.abs(self.values) - np.abs(self.form.response(self.omega, theta)))
         remainder = self.values - self.fitted(theta)
         return remainder - self.free_motions(theta) @ self._free(theta, remainder)
 
-    def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(self, theta: Floats) -> Floats:
         return _components(self.errors(theta) * self.weights)
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def jacobian(self, theta: Floats) -> Floats:
         slopes = self.form.derivatives(self.omega, theta)
         if self.magnitude_only:
             fitted = self.form.response(self.omega, theta)
@@ -155,20 +156,18 @@ class _Problem:
         basis = np.linalg.qr(_components(self.free_motions(theta) * self.weights[:, None]))[0]
         return np.asarray(weighted - basis @ (basis.T @ weighted))
 
-    def free_motions(self, theta: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def free_motions(self, theta: Floats) -> NDArray[np.complex128]:
         """Return the basis of the free motion in the values, shape (n_lines, n_motions); empty if they contain none."""
         if not isinstance(self.measured, PlainRatio):
             return np.zeros((self.omega.size, 0), dtype=np.complex128)
         return self.measured.free_motions(self.form.poles(theta))
 
-    def _free(self, theta: NDArray[np.float64], remainder: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def _free(self, theta: Floats, remainder: NDArray[np.complex128]) -> Floats:
         """Return the best weights of the basis of the free motion in what the form leaves, shape (n_motions,)."""
         basis, remainder = self.free_motions(theta) * self.weights[:, None], remainder * self.weights
         return np.asarray(np.linalg.lstsq(_components(basis), _components(remainder), rcond=None)[0])
 
-    def _with_moving_poles(
-        self, theta: NDArray[np.float64], slopes: NDArray[np.complex128]
-    ) -> NDArray[np.complex128]:
+    def _with_moving_poles(self, theta: Floats, slopes: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Add the change of the free motion with the poles to the derivatives."""
         weights = self._free(theta, self.values - self.fitted(theta))
         if not weights.size:
@@ -181,7 +180,7 @@ class _Problem:
             found[:, i] += change @ weights / (2.0 * _DIFFERENCE)
         return found
 
-    def free_motion(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def free_motion(self, theta: Floats) -> tuple[Floats, Floats]:
         """Return the weights of the free motion's basis and their covariance."""
         weights = self._free(theta, self.values - self.fitted(theta))
         slopes = self._with_moving_poles(theta, self.form.derivatives(self.omega, theta))
@@ -190,11 +189,11 @@ class _Problem:
         covariance = sandwich_covariance(columns.T @ columns, size**2 * (columns.T @ columns))
         return weights, covariance[: weights.size, : weights.size]
 
-    def misfit(self, theta: NDArray[np.float64]) -> float:
+    def misfit(self, theta: Floats) -> float:
         residual = self.residual(theta)
         return float(np.sqrt(residual @ residual / (residual.size - theta.size)))
 
-    def covariance(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def covariance(self, theta: Floats) -> Floats:
         slopes = self.jacobian(theta)
         bread = slopes.T @ slopes
         if self.measured.noise_shares is not None:
@@ -208,7 +207,7 @@ class _Problem:
             return sandwich_covariance(bread, widened * bread)
         return sandwich_covariance(bread, misfit**2 * bread)
 
-    def _shared_filling(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _shared_filling(self, theta: Floats) -> Floats:
         """Return the covariance of J^T r from the shares of each independent line of noise in all values."""
         shares, lines = self.measured.noise_shares, self.measured.noise_lines
         assert shares is not None
@@ -230,7 +229,7 @@ class _Problem:
             filling += np.outer(most, most)
         return filling
 
-    def fit(self, start: NDArray[np.float64]) -> Any:
+    def fit(self, start: Floats) -> Any:
         """Return the result of the optimizer from a start."""
         lower, upper = self.bounds()
         inside = np.clip(start, lower, upper)
@@ -251,7 +250,7 @@ class _Problem:
             measured=self.measured.at(kept),
         )
 
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def bounds(self) -> tuple[Floats, Floats]:
         low, high = self._reach()
         lower = self.form.vector(low, _DAMPING_RANGE[0], 0.0)
         upper = self.form.vector(high, _DAMPING_RANGE[1], max(self.longest_dead_time, 1e-12))
@@ -262,7 +261,7 @@ class _Problem:
         positive = self.omega[self.omega > 0.0]
         return float(positive[0] / _BEYOND), float(positive[-1] * _BEYOND)
 
-    def starts(self) -> list[NDArray[np.float64]]:
+    def starts(self) -> list[Floats]:
         """Return the best points of the grid, each with its best gain."""
         omega, weights = self.omega, self.weights
         measured: NDArray[np.complex128] = self.values
@@ -360,7 +359,7 @@ def _check_informative(measured: FrequencyResponse, form: TransferForm) -> None:
         )
 
 
-def _band_notes(measured: FrequencyResponse, omega_b: float, errors: NDArray[np.float64]) -> list[str]:
+def _band_notes(measured: FrequencyResponse, omega_b: float, errors: Floats) -> list[str]:
     low, high = float(measured.omega[0]), float(measured.omega[-1])
     if np.all(np.isfinite(errors)) and errors[1] < POORLY_KNOWN * omega_b and low <= omega_b <= high:
         return []
@@ -381,9 +380,7 @@ def _reading_notes(magnitude_only: bool, misfit: float) -> list[str]:
     return notes
 
 
-def _components(
-    values: NDArray[np.complex128] | NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _components(values: NDArray[np.complex128] | Floats) -> Floats:
     """Return real and imaginary part of each row next to each other, so that the parts of a line are adjacent."""
     if not np.iscomplexobj(values):
         return np.asarray(values, dtype=np.float64)
@@ -391,7 +388,7 @@ def _components(
     return np.asarray(parts.reshape(2 * values.shape[0], *values.shape[1:]))
 
 
-def _projected(values: NDArray[np.complex128], basis: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _projected(values: NDArray[np.complex128], basis: Floats) -> NDArray[np.complex128]:
     """Return what an orthonormal basis of components leaves of some values, shape (n_lines,)."""
     if not basis.size:
         return values

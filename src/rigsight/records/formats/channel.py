@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.records.record import Floats
 
 # CF conventions 1.11, chapter 8.1, and the NetCDF attribute conventions; NWB says conversion and offset for the same.
 _CONVENTIONS = (("scale_factor", "add_offset"), ("conversion", "offset"))
@@ -153,7 +154,7 @@ class TimeAxis:
     # Moment from which they count, the same for all channels of a file; None where the file does not say.
     origin: np.datetime64 | None = None
 
-    def stamps(self) -> NDArray[np.float64]:
+    def stamps(self) -> Floats:
         """Return the time stamps, shape (n_samples,)."""
         if self.load is not None:
             return as_stamps(self.load())
@@ -255,12 +256,12 @@ def check_total(file: str, n_samples: int) -> None:
         )
 
 
-def as_floats(samples: object) -> NDArray[np.float64]:
+def as_floats(samples: object) -> Floats:
     """Return stored numbers as floats, shape (n_samples,)."""
     return np.ascontiguousarray(np.asarray(samples).reshape(-1), dtype=np.float64)
 
 
-def as_stamps(samples: object) -> NDArray[np.float64]:
+def as_stamps(samples: object) -> Floats:
     """Return stored time as floats, shape (n_samples,)."""
     # Stamps in single precision are read as the decimal numbers that they print as: 0.1 was meant, not 0.10000000149.
     array = np.asarray(samples).reshape(-1)

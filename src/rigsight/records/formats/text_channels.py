@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.clocks import is_time
@@ -35,8 +34,7 @@ from rigsight.records.formats.table_head import (
     sniff,
     without_comment,
 )
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _PIECE = 1 << 20
 _LONGEST_LINE = 1_000_000

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from rigsight.errors import MachineError
 from rigsight.libraries import is_kept, library_file
+from rigsight.records.record import Floats
 from rigsight.simulate.compiled.kernel_source import connect, include_folders, kernel_source
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
-
-Floats = NDArray[np.float64]
 
 _TYPES: dict[str, Any] = {"a": ctypes.c_void_p, "l": ctypes.c_long, "d": ctypes.c_double, "i": ctypes.c_int}
 """Types of arguments: address of an array, long, double, int."""

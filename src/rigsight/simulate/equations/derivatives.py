@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.effects.symbols import derivative, positive_part
+from rigsight.records.record import Floats
 from rigsight.rigs import evaluated
 from rigsight.simulate.equations.elimination import Elimination
 from rigsight.simulate.equations.kinks import absolute
 from rigsight.simulate.equations.straight_line import StraightLine, in_order, of_parts, straight_line
 from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
-
-Floats = NDArray[np.float64]
 
 _NEAR = 1e-6
 """Distance from an equilibrium up to which a state counts as one, relative to each state or in SI units; the search for it stops

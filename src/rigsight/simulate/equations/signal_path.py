@@ -15,7 +15,6 @@ from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
 from rigsight.simulate.equations.binder import Binder, DefinedSignals
-from rigsight.simulate.equations.lagrange import equations_of_motion, measured_before, observer_acceleration
 from rigsight.simulate.equations.structure import ahead_name, bandwidth_name, input_symbols
 from rigsight.simulate.equations.tree import (
     EquationsOfMotion,
@@ -23,7 +22,10 @@ from rigsight.simulate.equations.tree import (
     FirstOrderState,
     Kind,
     Output,
+    equations_of_motion,
     late,
+    measured_before,
+    observer_acceleration,
     shifted,
 )
 from rigsight.units import at_place, size_of

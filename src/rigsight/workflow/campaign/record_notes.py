@@ -7,11 +7,11 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.records.channel_units import UnknownUnitError, conversion, has_si, is_a
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig, rotational
 
 _SEGMENTS = 8
@@ -21,7 +21,7 @@ _DRIVEN = 1e-2
 _LEAST_RATIO = 30.0
 """Ratio of gains from which a unit is asked about: below degrees for radians (57). That no amplitude changes a gain so much is an
 assumption; on nine campaigns, and 24 drawn ones of development seeds, ratios reached 6."""
-_Gain = tuple[NDArray[np.float64], NDArray[np.float64]]
+_Gain = tuple[Floats, Floats]
 """Frequencies at which an input drives, and the gains there."""
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records import Kind, Role
@@ -18,6 +17,7 @@ from rigsight.records.channel_units import has_si, in_drive_unit, is_a
 from rigsight.records.clocks import increases, is_time
 from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
 from rigsight.records.read_record import TIME
+from rigsight.records.record import Floats
 from rigsight.records.signals import repeated_period
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, distinguishing, guess_file
@@ -102,7 +102,7 @@ def quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _in_si(samples: NDArray[np.float64], guess: Guess) -> NDArray[np.float64]:
+def _in_si(samples: Floats, guess: Guess) -> Floats:
     from rigsight.records.channel_units import UnknownUnitError, factor
 
     if guess.unit is None:
@@ -273,7 +273,7 @@ def _column(guess: Guess, clocks: Mapping[str, str]) -> list[str]:
     return [f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}"]
 
 
-def guess_kind(samples: NDArray[np.float64]) -> Kind:
+def guess_kind(samples: Floats) -> Kind:
     """Return the kind of an input of shape (n_samples,): a guess that the user should check."""
     steps = np.diff(samples)
     jumps = int(np.count_nonzero(steps))
@@ -286,7 +286,7 @@ def guess_kind(samples: NDArray[np.float64]) -> Kind:
     return "operation"
 
 
-def guess_amplitude(samples: NDArray[np.float64], kind: Kind) -> float | None:
+def guess_amplitude(samples: Floats, kind: Kind) -> float | None:
     """Return the amplitude of an input, in its unit; None for operation, which has none."""
     if kind == "operation":
         return None
@@ -294,7 +294,7 @@ def guess_amplitude(samples: NDArray[np.float64], kind: Kind) -> float | None:
     return float(f"{size:.3g}")
 
 
-def _is_sweep(samples: NDArray[np.float64]) -> bool:
+def _is_sweep(samples: Floats) -> bool:
     """Return True if zero crossings become ever denser, or ever rarer."""
     centered = samples - 0.5 * (samples.min() + samples.max())
     where = np.flatnonzero(np.abs(centered) > 0.05 * np.max(np.abs(centered)))

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from operator import attrgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
@@ -19,6 +18,7 @@ from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_function import MISFIT
 from rigsight.metrics import nrmse
 from rigsight.records import Record
+from rigsight.records.record import Floats
 from rigsight.records.signals import roughness
 from rigsight.report.quantities import gap_percent
 from rigsight.report.wording import sentence_case
@@ -106,7 +106,7 @@ def held_parameters(campaign: Campaign, records: Sequence[Record]) -> dict[str, 
 
 
 def _columns(
-    residuals: Sequence[NDArray[np.float64]], records: Sequence[Record], outputs: Sequence[str]
+    residuals: Sequence[Floats], records: Sequence[Record], outputs: Sequence[str]
 ) -> dict[str, float]:
     """Return the NRMSE of each output that was measured, over all windows of one record."""
     found = {}
@@ -154,12 +154,12 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
     )
 
 
-def _moves(samples: NDArray[np.float64]) -> bool:
+def _moves(samples: Floats) -> bool:
     """Return True if a fit that leaves no more than the noise of an output would follow it: at rest there is only noise."""
     return roughness(samples) < UNSERVED * float(np.std(samples))
 
 
-def _leaves_motion(relative: float, samples: NDArray[np.float64]) -> bool:
+def _leaves_motion(relative: float, samples: Floats) -> bool:
     """Return True if an error, relative to the motion, is above the noise of the samples and not small."""
     return relative > _SMALL_LOSS and relative * float(np.std(samples)) > MISFIT * roughness(samples)
 

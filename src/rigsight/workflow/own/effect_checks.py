@@ -11,13 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.effects import Effect, Energy, Place
 from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
+from rigsight.records.record import Floats
 from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, Signal, joint_of
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
@@ -211,7 +211,7 @@ def energy_of_cycles(effect: Effect) -> list[tuple[dict[str, float], float]]:
     return found
 
 
-def last_period(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+def last_period(samples: Floats) -> Floats:
     """Return the last full period of a sine test, shape (PER_PERIOD,)."""
     return samples[-PER_PERIOD - 1 : -1]
 
@@ -345,5 +345,5 @@ def _reported(values: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
 
 
-def _difference(samples: NDArray[np.float64], plain: NDArray[np.float64]) -> str:
+def _difference(samples: Floats, plain: Floats) -> str:
     return f"by {float(np.max(np.abs(samples - plain)) / np.max(np.abs(plain))):.2g} of the motion"
