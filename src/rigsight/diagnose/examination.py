@@ -33,7 +33,6 @@ from rigsight.identify import FitMemory
 from rigsight.identify.fit.windows import Windowing
 from rigsight.inverse import Proposal
 from rigsight.records.record import Floats
-from rigsight.rigs import Rig
 
 
 @dataclass(frozen=True)
@@ -172,12 +171,9 @@ def _ranked(
                 context, ranking, effects, noise, rng, gap, evidence.criterion, counts
             )
         if ranking.order[0].error_over_noise > allowed:
-            ranking = plausible_first(ranking, reidentified, _places(context.rig, ranking))
+            places = {e.name: context.rig.acts_at(e) for model in ranking.order for e in model.effects}
+            ranking = plausible_first(ranking, reidentified, places)
     return with_last(ranking, of_no_size), tuple(imitations)
-
-
-def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:
-    return {effect.name: rig.acts_at(effect) for model in ranking.order for effect in model.effects}
 
 
 def _with_offset_rivals(

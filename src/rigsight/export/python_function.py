@@ -58,6 +58,7 @@ def python_function(exported: Exported, source: str) -> str:
     every = {**names, **modes}
     inputs = [quantity.name for quantity in exported.inputs]
     unpack = unpacked_states(exported, own)
+    slopes = {slope_symbol(i): f"slopes[{i}]" for i in range(len(exported.states))}
     limits = [PYTHON.expression(limit, names) for limit in exported.limits.values()]
     fragments = {
         "TITLE": f"Simulation of {exported.title}",
@@ -90,7 +91,7 @@ def python_function(exported: Exported, source: str) -> str:
             {**names, friction_sign(exported): "friction_sign"},
             equations.shown_steps,
         ),
-        "SLIP_RATE": _returned_one(unpack, slip_rate(exported), {**names, **_slopes(exported)}),
+        "SLIP_RATE": _returned_one(unpack, slip_rate(exported), {**names, **slopes}),
         "LIMITS": sequence(limits),
         "DELAY": _number(exported, structure.delay, "0.0"),
         "SENSOR_DELAY": _number(exported, structure.first_shown_late, "None"),
@@ -172,10 +173,6 @@ def _number(exported: Exported, expression: sp.Expr | None, without: str) -> str
 def _returned_one(unpack: list[str], expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
     lines = PYTHON.statements(["result"], [expression], names)
     return indented([*unpack, *lines, "return result"], 2)
-
-
-def _slopes(exported: Exported) -> dict[sp.Symbol, str]:
-    return {slope_symbol(i): f"slopes[{i}]" for i in range(len(exported.states))}
 
 
 def _pieces(exported: Exported, inputs: list[str]) -> str:

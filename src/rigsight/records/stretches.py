@@ -79,7 +79,9 @@ def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ())
     spans = [(begin, stop) for begin, stop in [*spans, (latest, np.inf)] if begin < stop]
     parts = [part for begin, stop in spans if (part := _part(table, time, begin, stop)) is not None]
     long = [part for part in parts if part.lines.size >= FEWEST_SAMPLES]
-    moving = [part for part in long if _moves(part, outputs)]
+    moving = [
+        part for part in long if not outputs or any(not is_constant(part.values[name]) for name in outputs)
+    ]
     where = _where(stamps, table, ends)
     n_samples = max(stamps.size for stamps in clocks.values())
     kept = sum(part.lines.size for part in moving)
@@ -139,10 +141,6 @@ def _where(stamps: Floats, table: Columns, ends: NDArray[np.intp]) -> str:
         f"between {table.row}s {table.lines[first]} and {table.lines[first + 1]} ({missing_behind(stamps, first)}; the time "
         f"jumps from {stamp_text(stamps, first)} to {stamp_text(stamps, first + 1)}){others}"
     )
-
-
-def _moves(part: Columns, outputs: Sequence[str]) -> bool:
-    return not outputs or any(not is_constant(part.values[name]) for name in outputs)
 
 
 def _part(table: Columns, time: str, begin: float, stop: float) -> Columns | None:

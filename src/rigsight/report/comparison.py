@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import RenderableType
 from rich.table import Table
 
-from rigsight.compare import Column, Comparison, RecordComparison
+from rigsight.compare import Comparison, RecordComparison
 from rigsight.compare.comparison import best
 from rigsight.plot import (
     ErrorPanel,
@@ -120,7 +120,10 @@ def comparison_view(
         heads=[column_label(column) for column in columns],
         floor=[error_text(comparison.floor(column, record), column.quantity) for column in columns],
         rows={
-            name: [_cell(row, column, name in winners[column]) for column in columns]
+            name: [
+                Cell(error_text(row.get(column), column.quantity), name in winners[column])
+                for column in columns
+            ]
             for name, row in table.items()
         },
         figures=[
@@ -130,10 +133,6 @@ def comparison_view(
         ],
         notes=notes,
     )
-
-
-def _cell(row: Mapping[Column, float], column: Column, is_best: bool) -> Cell:
-    return Cell(error_text(row.get(column), column.quantity), is_best)
 
 
 def _tables(view: View, text: Writer, width: int) -> Iterator[Table]:

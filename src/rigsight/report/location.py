@@ -164,7 +164,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     if states:
         figures.append(_states_figure(states, output, _motion(diagnosis), key, rest))
     if len({p.amplitude for p in amplitudes}) > 1:
-        labels = [_amplitude_label(p) for p in amplitudes]
+        labels = [f"{_size(p)}\n{'scored' if p.scored else 'fitted'}" for p in amplitudes]
         spoken = list(zip((label.replace("\n", " ") for label in labels), amplitudes, strict=True))
         which = "; ".join(f"{_size(p)} {p.records[0]}" for p in amplitudes)
         figures.append(
@@ -267,10 +267,6 @@ def _place(part: StatePart, motion: str) -> str:
     low, high = part.x_low * scale.factor, part.x_high * scale.factor
     place = f"{motion} {low:.3g} to {high:.3g} {scale.unit} and rate {part.v_low:.3g} to {part.v_high:.3g} {part.units['v_low']}"
     return place.replace(" -", " \u2212")
-
-
-def _amplitude_label(part: AmplitudePart) -> str:
-    return f"{_size(part)}\n{'scored' if part.scored else 'fitted'}"
 
 
 def _size(part: AmplitudePart) -> str:

@@ -106,10 +106,7 @@ def _rotational(name: str) -> Rig:
     return rig_of_text(text, f"{name}.toml", check_units=False)
 
 
-def _of_one_motion() -> tuple[Rig, ...]:
-    return AXIS, ELEMENT, RUNNING_GEAR, _rotational("axis"), _rotational("element")
-
-
 def is_built_in_motion(rig: Rig) -> bool:
     """Return True if a rig has the equations of a built-in one of one motion, in the same words, whatever it is called itself."""
-    return any(rig.mechanism == own.mechanism for own in _of_one_motion())
+    built_in = (AXIS, ELEMENT, RUNNING_GEAR, _rotational("axis"), _rotational("element"))
+    return any(rig.mechanism == own.mechanism for own in built_in)

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import sympy as sp
 
+from rigsight.records.record import Floats
 from rigsight.robots.declared_numbers import DeclaredNumbers, Field
-from rigsight.robots.tree import Floats, TreeBody, TreeJoint
+from rigsight.robots.tree import TreeBody, TreeJoint
 
 AXES = "xyz"
 

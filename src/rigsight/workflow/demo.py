@@ -167,10 +167,6 @@ effects = [{effects}]
 '''
 
 
-def _default_noise() -> Mapping[str, float]:
-    return {"psi": 2e-5, "y": 2e-5}
-
-
 @dataclass(frozen=True)
 class VirtualRig:
     """A running gear with known true parameters."""
@@ -178,7 +174,7 @@ class VirtualRig:
     # Parameter set that is simulated.
     truth: PublishedSet = field(default_factory=lambda: published_sets()[VIRTUAL_RIG_SET])
     # Standard deviation of the white sensor noise, by output [rad], [m].
-    noise: Mapping[str, float] = field(default_factory=_default_noise)
+    noise: Mapping[str, float] = field(default_factory=lambda: {"psi": 2e-5, "y": 2e-5})
     disturbance: float = 1e-3  # standard deviation of the torque disturbance [N m]
     # Angular frequency below which the disturbance is white [rad/s]; above, it falls by 20 dB per decade.
     disturbance_corner: float = 5.0

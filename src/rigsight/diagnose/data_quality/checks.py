@@ -78,7 +78,7 @@ def with_best_model(quality: DataQuality, context: FitContext, model: FittedMode
     found = [
         replace(
             finding,
-            sentence=f"With {named} in the model: {_inside_a_sentence(finding.sentence)}"
+            sentence=f"With {named} in the model: {finding.sentence[:1].lower()}{finding.sentence[1:]}"
             if named
             else finding.sentence,
             serious=finding.serious or replaces_delay,
@@ -86,10 +86,6 @@ def with_best_model(quality: DataQuality, context: FitContext, model: FittedMode
         for finding in timing.findings()
     ]
     return replace(quality, findings=(*found, *others))
-
-
-def _inside_a_sentence(sentence: str) -> str:
-    return sentence[:1].lower() + sentence[1:]
 
 
 def sensor_faults(rig: Rig, record: Record) -> list[Finding]:

@@ -38,7 +38,10 @@ def localize(
     floors: Sequence[NoiseFloor] = (),
 ) -> Localization:
     """Return the gap split in every way."""
-    stretches = {floor.output: _long_enough(floor.stretches) for floor in floors}
+    stretches: dict[str, Stretches] = {
+        floor.output: tuple((noise, dt) for noise, dt in floor.stretches if noise.size >= MAPS.least_noise)
+        for floor in floors
+    }
     scored = [trace for trace in traces if trace.role == scored_on]
     one_motion = context.rig.has_one_motion
     by_path = path_parts(context, before, reidentified, after) if one_motion else ()
@@ -98,7 +101,7 @@ def _by_amplitude(context: FitContext, traces: Sequence[Trace], scored_on: str) 
                         scored=not fitted,
                         records=tuple(trace.record for trace in holding),
                         measured_rms=_spread(holding, output),
-                        units={**units, "measured_rms": _unit(context, output)},
+                        units={**units, "measured_rms": context.rig.signal_units[output]},
                     )
                 )
     return parts
@@ -142,10 +145,6 @@ def _by_band(
                 )
             )
     return parts
-
-
-def _long_enough(stretches: Stretches) -> Stretches:
-    return tuple((noise, dt) for noise, dt in stretches if noise.size >= MAPS.least_noise)
 
 
 def _colored(std: float, stretches: Stretches, edges: Floats) -> Floats | None:
@@ -230,7 +229,3 @@ def _input(trace: Trace) -> Floats:
     if not trace.inputs:
         return np.zeros(trace.t.size)
     return max(trace.inputs.values(), key=lambda samples: float(np.ptp(samples)))
-
-
-def _unit(context: FitContext, output: str) -> str:
-    return next(signal.unit for signal in context.rig.outputs if signal.name == output)

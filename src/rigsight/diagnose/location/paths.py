@@ -70,7 +70,8 @@ def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
     if clean and first.reidentified > VERDICT.at_floor * first.noise_floor:
         return (
             f"The gap arises before {lateral.source} is measured: {motion}, but {said}. So the cause is the drive or "
-            f"{_words(rig)}, not the lateral part and not a delay of the {lateral.source} sensor."
+            f"{rig.place_name(Place.DYNAMICS).replace('_', ' ')}, not the lateral part and not a delay of the {lateral.source} "
+            "sensor."
         )
     if clean:
         return f"No section of the signal path has a noticeable gap: {motion}, {said}."
@@ -89,10 +90,6 @@ def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
 
 def _times(value: float, part: PathPart) -> str:
     return f"{value / part.noise_floor:.3g} times its noise floor"
-
-
-def _words(rig: Rig) -> str:
-    return rig.place_name(Place.DYNAMICS).replace("_", " ")
 
 
 def _motion_alone(context: FitContext, reidentified: FittedModel) -> FittedModel:

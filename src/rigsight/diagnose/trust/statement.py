@@ -11,7 +11,9 @@ from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.patterns import Pattern
 from rigsight.diagnose.trust.result import CorrelatedParameters, GroupValue, ParameterTrust
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
+from rigsight.identify.information import listed
 
+_LENGTHS = {"whole": "whole records", "half": "halves", "quarter": "quarters"}
 _ONE_RECORD = "A single record cannot show whether they hold at another amplitude."
 
 
@@ -27,13 +29,13 @@ def statement(
     sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.reported]]
     if len(_alike(differing)) > TRUST.reported:
         rest = [number.name for alike in _alike(differing)[TRUST.reported :] for number in alike]
-        sentences.append(f"{_listed(rest)} also {'differs' if len(rest) == 1 else 'differ'}.")
+        sentences.append(f"{listed(rest)} also {'differs' if len(rest) == 1 else 'differ'}.")
     compared = [number for number in numbers if number.pattern is Pattern.STABLE]
     if compared:
         sentences.append(_same(compared, bool(differing), len(compared) == len(numbers), asked))
     if left_open:
         verb = "is" if len(left_open) == 1 else "are"
-        sentences.append(f"{_listed(left_open)} {verb} not determined even by all records together.")
+        sentences.append(f"{listed(left_open)} {verb} not determined even by all records together.")
     open_numbers = [
         number.name
         for number in numbers
@@ -42,7 +44,7 @@ def statement(
     if open_numbers:
         it = "it" if len(open_numbers) == 1 else "them"
         where = "no two groups of records determine" if n_records > 1 else "no part of the record determines"
-        sentences.append(f"{_listed(open_numbers)} could not be compared: {where} {it} alone.")
+        sentences.append(f"{listed(open_numbers)} could not be compared: {where} {it} alone.")
     if n_records == 1:
         sentences.append(_ONE_RECORD)
     return " ".join([*sentences, *(pair.text for pair in pairs[: TRUST.pairs_told])])
@@ -62,12 +64,12 @@ def _alike(numbers: Sequence[ParameterTrust]) -> list[list[ParameterTrust]]:
 def _differs(alike: Sequence[ParameterTrust]) -> str:
     reported = [_course(number) for number in alike[: TRUST.reported]]
     if len(alike) > TRUST.reported:
-        reported.append(f"{_listed([number.name for number in alike[TRUST.reported :]])} likewise")
+        reported.append(f"{listed([number.name for number in alike[TRUST.reported :]])} likewise")
     cause = alike[0].points_to.cause if alike[0].points_to else ""
     text = f"{'; '.join(reported)}: {cause}." if cause else f"{'; '.join(reported)}."
     first, *others = alike[0].goes_with or ("",)
     if others:
-        text += f" In these records {first} and {_listed(others)} change together, so their influences cannot be separated."
+        text += f" In these records {first} and {listed(others)} change together, so their influences cannot be separated."
     return text
 
 
@@ -106,12 +108,9 @@ def _values(number: ParameterTrust, first: GroupValue, second: GroupValue, prepo
     unit = "" if number.unit in ("", "1", "input") else f" {number.unit}"
     digits = _digits(first, second)
     return " and ".join(
-        f"{one.value:.{digits}g}{unit} {preposition} {_group(one.group)}" for one in (first, second)
+        f"{one.value:.{digits}g}{unit} {preposition} {_LENGTHS.get(one.group, one.group)}"
+        for one in (first, second)
     )
-
-
-def _group(label: str) -> str:
-    return {"whole": "whole records", "half": "halves", "quarter": "quarters"}.get(label, label)
 
 
 def _digits(first: GroupValue, second: GroupValue) -> int:
@@ -142,11 +141,9 @@ def _same(numbers: Sequence[ParameterTrust], is_rest: bool, are_all: bool, asked
     if vague:
         name = max(vague, key=vague.__getitem__)
         more = (
-            f", {_listed([other for other in vague if other != name])} hardly better"
-            if len(vague) > 1
-            else ""
+            f", {listed([other for other in vague if other != name])} hardly better" if len(vague) > 1 else ""
         )
-        text += f" But single groups determine {name} only to {_percent(vague[name])}{more}: smaller differences would not show."
+        text += f" But single groups determine {name} only to {percent(vague[name])}{more}: smaller differences would not show."
     return text
 
 
@@ -158,9 +155,6 @@ def _vagueness(number: ParameterTrust) -> float:
     return float(np.median(errors)) / abs(number.value)
 
 
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """Return a share in percent with two digits."""
     return f"{float(f'{100.0 * share:.2g}'):g} %"

@@ -28,7 +28,7 @@ from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.patterns import Order, Pattern, Role, meaning, orders, roles
 from rigsight.diagnose.trust.pieces import pieces
 from rigsight.diagnose.trust.result import CorrelatedParameters, GroupValue, ParameterTrust, Trust
-from rigsight.diagnose.trust.statement import statement
+from rigsight.diagnose.trust.statement import percent, statement
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, views
 from rigsight.identify import FitResult
 from rigsight.identify.information import POORLY_KNOWN
@@ -260,18 +260,14 @@ def _text(fit: FitResult, names: tuple[str, str], block: np.ndarray, correlation
             together = float(np.sqrt(max(relative[0, 0] + relative[1, 1] - 2.0 * sign * relative[0, 1], 0.0)))
             what = f"ratio {first}/{second}" if sign > 0.0 else f"product {first}*{second}"
             return (
-                f"{first} and {second} are determined only as the {what} ({_percent(together)}); each alone only to "
-                f"{_percent(float(max(alone)))}."
+                f"{first} and {second} are determined only as the {what} ({percent(together)}); each alone only to "
+                f"{percent(float(max(alone)))}."
             )
     freer = 1.0 / np.sqrt(max(1.0 - correlation**2, 1e-12))
     return (
         f"{first} and {second} can hardly be separated (correlation {correlation:.4f}): if one were known, the standard error of "
         f"the other would be {freer:.2g} times smaller."
     )
-
-
-def _percent(share: float) -> str:
-    return f"{float(f'{100.0 * share:.2g}'):g} %"
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,13 @@ def calibrate_to_records(
     begin = start_values(structure, begin)
     chosen = checked_free(structure, free_parameters(structure, outputs) if free is None else free)
     scales = characteristic_scales(rig, records, begin)
-    noise = dict(output_noise or {name: 0.01 * _size(records, name) for name in outputs})
+    noise = dict(
+        output_noise
+        or {
+            name: 0.01 * (float(np.sqrt(np.mean([np.var(record[name]) for record in records]))) or 1.0)
+            for name in outputs
+        }
+    )
     tell = progress or (lambda _: None)
 
     simple, simple_free = special_structure(structure, chosen)
@@ -206,10 +212,6 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: Floats) -> Floats
 def _shifts(structure: Structure) -> set[str]:
     """Return parameters that affect only means, or outputs other than the first; the search does not need them."""
     return {p.name for p in structure.rig.parameters} - numbers_of_motion(structure.rig)
-
-
-def _size(records: Sequence[Record], name: str) -> float:
-    return float(np.sqrt(np.mean([np.var(record[name]) for record in records]))) or 1.0
 
 
 def numbers_of_motion(rig: Rig) -> set[str]:

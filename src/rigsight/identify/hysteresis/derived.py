@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from rigsight.effects import symbols as canonical
-from rigsight.effects.effect import Effect, SumAndDifference
+from rigsight.effects.effect import Effect
 from rigsight.errors import InputError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
@@ -87,7 +87,7 @@ def derived_quantities(
     units = {p.name: p.unit for p in structure.parameters}
     pairs: list[Derived] = []
     saturation, words = None, ""
-    for effect, pair in _pairs(structure):
+    for effect, pair in ((e, pair) for e in structure.effects for pair in e.searched_as):
         first, second = (structure.parameter_name(effect, name) for name in (pair.first, pair.second))
         unit = units.get(first, "")
         pairs += [
@@ -214,10 +214,6 @@ def _determined(fit: FitResult) -> bool:
         structure.parameter_name(effect, p.name) for effect in structure.effects for p in effect.parameters
     }
     return all(np.isfinite(error) for name, error in fit.standard_errors.items() if name in own)
-
-
-def _pairs(structure: Structure) -> list[tuple[Effect, SumAndDifference]]:
-    return [(effect, pair) for effect in structure.effects for pair in effect.searched_as]
 
 
 def saturation_level(effect: Effect) -> sp.Expr | None:

@@ -53,7 +53,10 @@ def linear_start(
     InputError
         If the records do not move the rig.
     """
-    if not rig.has_one_motion or not _knows_its_gain(rig, {**constants, **known}):
+    if not rig.has_one_motion:
+        return any_rig_start(rig, records, constants, known)
+    gain = {symbol.name for symbol in rig.motion.drive_gain.free_symbols}
+    if rig.is_driven and not gain <= {*constants, *known}:
         return any_rig_start(rig, records, constants, known)
     driven = [record for record in records if not is_constant(record[rig.inputs[0].name])]
     if rig.is_driven and not driven:
@@ -70,10 +73,6 @@ def linear_start(
         for name, value in found.items()
     }
     return {**clipped, **known}
-
-
-def _knows_its_gain(rig: Rig, known: Mapping[str, float]) -> bool:
-    return not rig.is_driven or all(symbol.name in known for symbol in rig.motion.drive_gain.free_symbols)
 
 
 def _one_offset(rig: Rig) -> dict[str, float]:

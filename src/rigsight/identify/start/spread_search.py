@@ -115,7 +115,8 @@ def ends_of_search(
     first = space.start()
     spreads = [_SPREADS[i % len(_SPREADS)] for i in range(_SCREENED)]
     thetas = [first, *(first + spread * rng.standard_normal(first.size) for spread in spreads)]
-    costs = [_cost(errors(space.values(theta))) for theta in thetas]
+    # This sum stays finite for a start that is far off.
+    costs = [float(np.sum(np.log1p(errors(space.values(theta)) ** 2))) for theta in thetas]
     found: list[tuple[float, Floats]] = []
     for index in np.argsort(costs)[:_FOLLOWED]:
         found.append(_descent(space, errors, thetas[index], first))
@@ -152,8 +153,3 @@ def _descent(
     back = np.clip(found.x - untold.T @ (untold @ (found.x - expected)), *bounds)
     cost, cost_back = float(np.sum(found.fun**2)), float(np.sum(pulled(back) ** 2))
     return (cost_back, back) if cost_back <= cost + _TOLD else (cost, found.x)
-
-
-def _cost(errors: Floats) -> float:
-    """Return a sum that ranks starts and stays finite for a start that is far off."""
-    return float(np.sum(np.log1p(errors**2)))

@@ -107,7 +107,7 @@ class SlopeFunctions:
         with np.errstate(all="ignore"):
             found = (
                 least_squares(balance, begin, jac=slopes, x_scale="jac")
-                if _is_finite(balance, slopes, begin)
+                if np.all(np.isfinite(balance(begin))) and np.all(np.isfinite(slopes(begin)))
                 else None
             )
         state[held] = begin if found is None or not found.success else found.x
@@ -150,12 +150,6 @@ def declared_start(structure: Structure, p: Floats) -> Floats:
         if symbol in structure.states:
             found[structure.states.index(symbol)] = evaluated(expression, values)
     return found
-
-
-def _is_finite(
-    balance: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], place: Floats
-) -> bool:
-    return bool(np.all(np.isfinite(balance(place))) and np.all(np.isfinite(slopes(place))))
 
 
 def _whole(structure: Structure, arguments: Sequence[sp.Symbol], by: Sequence[sp.Symbol]) -> _Motion:
@@ -212,11 +206,7 @@ def _function(arguments: Sequence[sp.Symbol], expressions: Any) -> Callable[...,
     return sp.lambdify(arguments, expressions, _MODULES, cse=True)  # type: ignore[no-any-return]
 
 
-def _positive_part(x: float) -> float:
-    return max(x, 0.0)
-
-
-_MODULES: list[Any] = [{positive_part.__name__: _positive_part}, "numpy"]
+_MODULES: list[Any] = [{positive_part.__name__: lambda x: max(x, 0.0)}, "numpy"]
 
 
 def slopes_of(line: StraightLine, by: Sequence[sp.Symbol]) -> StraightLine:

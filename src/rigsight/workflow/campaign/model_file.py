@@ -82,7 +82,12 @@ def model_of(content: Mapping[str, Any], own_effects: Iterable[Effect] = ()) -> 
 def _model(
     path: Path, content: dict[str, Any], own_effects: Iterable[Effect], own_rigs: Iterable[Rig] = ()
 ) -> Model:
-    table = _checked_table(path, content)
+    try:
+        table = ModelTable.model_validate(content)
+    except ValidationError as error:
+        reported = [_message(path, problem) for problem in map(dict, error.errors(include_url=False))]
+        more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
+        raise InputError("\n".join(reported[:5]) + more) from None
     structure = _structure(path, table, _rig(path, table, own_rigs), own_effects)
     return Model(structure, _values(path, structure, table), table.hold)
 
@@ -113,15 +118,6 @@ def _locate(model: Path) -> Path:
             f"Folder {model} contains no {MODEL_FILE}. 'rigsight diagnose' writes one into its --out folder."
         )
     return path
-
-
-def _checked_table(path: Path, data: dict[str, Any]) -> ModelTable:
-    try:
-        return ModelTable.model_validate(data)
-    except ValidationError as error:
-        reported = [_message(path, problem) for problem in map(dict, error.errors(include_url=False))]
-        more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
-        raise InputError("\n".join(reported[:5]) + more) from None
 
 
 def _message(path: Path, problem: dict[str, Any]) -> str:

@@ -51,7 +51,7 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
     for record in identification.records if by_record else ():
         drawing = bode_figure(record, identification)
         if drawing is not None:
-            file = _free_name(f"bode_{_plain(record.record.name)}", found)
+            file = _free_name("bode_" + re.sub(r"[^\w.-]+", "_", record.record.name), found)
             what = f"Bode plot of record '{record.record.name}', measured against fitted, 95 % bands"
             found[file] = (what, svg_text(drawing, file))
     drawing = responses_figure(identification) if by_record else None
@@ -162,10 +162,6 @@ def amplitudes_figure(identification: Identification) -> Figure | None:
         return None
     parameters = _parameters(identification)
     return amplitude_dependence(parameters, _amplitude_label(identification)) if parameters else None
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[^\w.-]+", "_", name)
 
 
 def _free_name(stem: str, taken: Iterable[str]) -> str:

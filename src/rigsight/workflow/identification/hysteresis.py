@@ -14,7 +14,7 @@ from rigsight.errors import InputError
 from rigsight.identify import FitResult, GreyBoxFit, calibrate_to_records, characteristic_scales
 from rigsight.identify.hysteresis.calibration import free_parameters, special_structure
 from rigsight.identify.identification import EffectScore, HysteresisIdentification, Identification
-from rigsight.metrics import nrmse
+from rigsight.metrics import nrmse, rms
 from rigsight.records import Record
 from rigsight.report.quantities import gap_percent
 from rigsight.rigs import Rig
@@ -195,7 +195,7 @@ def _statement(effects: Sequence[str], fit: FitResult, scores: Sequence[EffectSc
         seen = [s for s in scores if s.role == role and motion in s.without and motion in s.nrmse]
         if seen:
             before, after = (
-                _rms([errors[motion] for errors in of])
+                rms(np.array([errors[motion] for errors in of]))
                 for of in zip(*((s.without, s.nrmse) for s in seen), strict=True)
             )
             parts.append(f"from {gap_percent(before)} to {gap_percent(after)} on {called}")
@@ -213,7 +213,3 @@ def _unscored(diverging: Sequence[str]) -> str:
         return ""
     names = " and ".join(f"'{name}'" for name in diverging)
     return f" The calibrated model diverges on {names} of the held-out records: no error is given there."
-
-
-def _rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

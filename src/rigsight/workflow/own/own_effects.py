@@ -76,7 +76,11 @@ def own_effects(
         return ()
     stage = Stage(CHECKING, len(found), listener)
     for own in found:
-        _check_parents(own, taken)
+        for parent in own.effect.parents:
+            if parent not in taken:
+                raise InputError(
+                    f"{own.declared}: effect '{own.effect.name}' starts from '{parent}', which is not a known effect."
+                )
         if check:
             broken = failed_checks(own.effect)
             if broken:
@@ -104,14 +108,6 @@ def equation_text(effect: Effect) -> str:
 def _message(own: OwnEffect, faults: Sequence[str]) -> str:
     start = f"{own.declared}: effect '{own.effect.name}': "
     return "\n".join(f"{start}{fault}" for fault in faults[:5])
-
-
-def _check_parents(own: OwnEffect, taken: Iterable[str]) -> None:
-    for parent in own.effect.parents:
-        if parent not in taken:
-            raise InputError(
-                f"{own.declared}: effect '{own.effect.name}' starts from '{parent}', which is not a known effect."
-            )
 
 
 def _loaded(path: Path) -> list[OwnEffect]:

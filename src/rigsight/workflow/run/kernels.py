@@ -52,8 +52,4 @@ def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: List
 
 def _compile(structure: Structure) -> str:
     compile_kernels(structure)
-    return _described(structure)
-
-
-def _described(structure: Structure) -> str:
     return ", ".join(structure.effect_names) or structure.rig.name
