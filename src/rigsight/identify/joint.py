@@ -24,24 +24,11 @@ _DIFFERENT = 0.01
 
 
 @dataclass(frozen=True)
-class RecordResidual:
-    """Error of a parameter set on one record."""
-
-    # Name and kind of the record.
-    record: str
-    kind: str
-    rms: dict[str, float]  # RMS of measured minus simulated by output, in its unit
-    relative: dict[str, float]  # the same over the RMS of the measured output about its mean
-
-
-@dataclass(frozen=True)
 class KindFit:
-    """The fit of one kind of records, and its errors on all records."""
+    """The fit of one kind of records alone."""
 
     kind: str  # ``"sweep"``, ``"step"``, ..., or the name of its group
     fit: FitResult  # fit of the records of this kind alone
-    # Errors on every record; for the records of other kinds only the initial states are fitted.
-    residuals: tuple[RecordResidual, ...]
     # By parameter: this kind's value minus the joint one, in standard errors of this kind's; NaN if it is
     # undetermined.
     shift: dict[str, float]
@@ -53,7 +40,6 @@ class JointFit:
 
     fit: FitResult  # the fit of all records
     noise: dict[str, float]  # standard deviation by which residuals of each output were divided
-    residuals: tuple[RecordResidual, ...]  # its error on every record
     kinds: tuple[KindFit, ...]  # the fits of each kind alone
     # Probability of such differences between the kinds by chance, if one set fits all (chi-squared).
     probability: float
@@ -72,7 +58,6 @@ def fit_jointly(
     known: Mapping[str, float] | None = None,
     start: Mapping[str, float] | None = None,
     output_noise: Mapping[str, float] | None = None,
-    max_evaluations: int = 60,
     group_of: Callable[[Record], str] | None = None,
 ) -> JointFit:
     """Fit one parameter set to sweeps and steps together, and one to each kind for comparison.
@@ -91,8 +76,6 @@ def fit_jointly(
         Start values, required for parameters of effects; missing ones of the rig are estimated from the spectra.
     output_noise
         Standard deviation of the residuals of each output. Default: estimated from the joint fit's own residuals, repeatedly.
-    max_evaluations
-        Limit of each fit.
     group_of
         Name of the group in which a record is compared, instead of its kind; a single group is then allowed, without comparison.
 
@@ -120,27 +103,23 @@ def fit_jointly(
     free = tuple(p.name for p in structure.parameters if p.fitted and p.name not in fixed)
     scales = characteristic_scales(structure.rig, records, begin)
     noise = dict(output_noise) if output_noise is not None else _spread(structure, records)
-    fit = GreyBoxFit(structure, records, scales, noise).fit(begin, free, max_evaluations=max_evaluations)
+    fit = GreyBoxFit(structure, records, scales, noise).fit(begin, free)
     if output_noise is None:
         for _ in range(_NOISE_ROUNDS):
             found = _residual_noise(structure, fit, noise)
             settled = all(abs(found[name] / noise[name] - 1.0) < _SETTLED for name in noise)
             noise = found
-            fit = GreyBoxFit(structure, records, scales, noise).fit(
-                fit.values, free, fit.initial_states, max_evaluations
-            )
+            fit = GreyBoxFit(structure, records, scales, noise).fit(fit.values, free, fit.initial_states)
             if settled:
                 break
     kinds = []
     for kind, own in groups.items():
-        alone = GreyBoxFit(structure, own, scales, noise).fit(fit.values, free, None, max_evaluations)
-        scored = GreyBoxFit(structure, records, scales, noise).fit(alone.values, ())
-        kinds.append(KindFit(kind, alone, _residuals(records, scored), _shift(alone, fit)))
+        alone = GreyBoxFit(structure, own, scales, noise).fit(fit.values, free)
+        kinds.append(KindFit(kind, alone, _shift(alone, fit)))
     probability, differing = _same_set(kinds)
     return JointFit(
         fit,
         noise,
-        _residuals(records, fit),
         tuple(kinds),
         probability,
         _statement(
@@ -188,18 +167,6 @@ def _residual_noise(structure: Structure, fit: FitResult, noise: Mapping[str, fl
             remainder = np.concatenate([residual[:, i] for residual in fit.residuals])
             found[signal.name] = max(float(np.sqrt(np.nanmean(remainder**2))), 1e-6 * noise[signal.name])
     return found
-
-
-def _residuals(records: Sequence[Record], fit: FitResult) -> tuple[RecordResidual, ...]:
-    results = []
-    for record, residual in zip(records, fit.residuals, strict=False):
-        rms, relative = {}, {}
-        for i, signal in enumerate(fit.structure.rig.outputs):
-            if signal.name in record:
-                rms[signal.name] = float(np.sqrt(np.mean(residual[:, i] ** 2)))
-                relative[signal.name] = rms[signal.name] / max(float(np.std(record[signal.name])), 1e-300)
-        results.append(RecordResidual(record.name, record.kind, rms, relative))
-    return tuple(results)
 
 
 def _shift(alone: FitResult, joint: FitResult) -> dict[str, float]:

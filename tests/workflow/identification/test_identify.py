@@ -75,7 +75,7 @@ def test_the_joint_set_is_better_than_any_record_alone(linear: Identification) -
 def test_validation_records_are_scored_and_never_fitted(linear: Identification) -> None:
     scores = {s.record: s for s in linear.joint.scores if s.role == "validation"}
     assert set(scores) == {"check", "beyond"}
-    assert {r.record for r in linear.joint.fit.residuals} == {"low", "high", "step"}
+    assert {alone.kind for alone in linear.joint.fit.kinds} == {"low", "high", "step"}
     for score in scores.values():
         assert score.nrmse["psi"] < 0.01
         assert score.nrmse["y"] < 0.05
