@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from rigsight.diagnose.data_quality.finding import AmplitudeDependence
+from rigsight.diagnose.data_quality.finding import AmplitudeDependence, Answer
 from rigsight.diagnose.policy import NOTES
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response, responses_of_inputs
@@ -45,47 +45,41 @@ def amplitude_dependences(
 
 
 def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) -> AmplitudeDependence:
-    path = f"{source} -> {response}"
     records = [record for record in records if response in record and not is_constant(record[source])]
-    if not records:
-        return AmplitudeDependence(
-            "cannot tell",
-            f"'{source}' changes in no record in which '{response}' can be used, so there is no frequency response {path}.",
-            path=path,
-        )
-    alone = len(rig.inputs) == 1
+    path, alone = f"{source} -> {response}", len(rig.inputs) == 1
     pair = _extremes(records, source, alone)
-    if pair is None:
-        heights = {f"{_amplitude(r, source, alone):.2g}" for r in records if r.kind == "step"}
-        if len(heights) > 1:
-            return AmplitudeDependence(
-                "cannot tell",
-                f"There are steps of {len(heights)} heights, but no frequency response is found from steps, and the other usable "
-                f"records do not have two amplitudes{'' if alone else f' of {source}'}. Only frequency responses {path} are "
-                f"compared here; record a sweep or a multisine at two amplitudes for that.",
-                path=path,
-            )
-        return AmplitudeDependence(
-            "cannot tell",
-            f"The usable records have only one amplitude{'' if alone else f' of {source}'}, so they cannot tell whether the "
-            f"frequency "
-            f"response {path} changes with it. Record another amplitude.",
-            path=path,
+    if pair is not None:
+        answer, sentence = _between(pair, source, response, rig)
+        return AmplitudeDependence(answer, sentence, (pair[0].name, pair[1].name), path)
+    heights = {f"{_amplitude(r, source, alone):.2g}" for r in records if r.kind == "step"}
+    if not records:
+        why = f"'{source}' changes in no record in which '{response}' can be used, so there is no frequency response {path}."
+    elif len(heights) > 1:
+        why = (
+            f"There are steps of {len(heights)} heights, but no frequency response is found from steps, and the other usable "
+            f"records do not have two amplitudes{'' if alone else f' of {source}'}. Only frequency responses {path} are "
+            f"compared here; record a sweep or a multisine at two amplitudes for that."
         )
-    names = (pair[0].name, pair[1].name)
+    else:
+        why = (
+            f"The usable records have only one amplitude{'' if alone else f' of {source}'}, so they cannot tell whether the "
+            f"frequency response {path} changes with it. Record another amplitude."
+        )
+    return AmplitudeDependence("cannot tell", why, path=path)
+
+
+def _between(pair: tuple[Record, Record], source: str, response: str, rig: Rig) -> tuple[Answer, str]:
+    """Return whether the response differs between two records of other amplitudes, and the answer with numbers."""
+    path, alone = f"{source} -> {response}", len(rig.inputs) == 1
     try:
         low, high, by = _responses(pair, source, response, rig)
     except InputError as error:
-        return AmplitudeDependence(
-            "cannot tell", f"The frequency responses {path} cannot be compared: {error}", names, path
-        )
+        return "cannot tell", f"The frequency responses {path} cannot be compared: {error}"
     omega, first, second, variance = _common(low, high)
     if omega.size < NOTES.fewest_lines:
-        return AmplitudeDependence(
-            "cannot tell",
-            f"{names[0]} and {names[1]} have too few common frequencies at which the response {path} stands out of the noise.",
-            names,
-            path,
+        return "cannot tell", (
+            f"{pair[0].name} and {pair[1].name} have too few common frequencies at which the response {path} stands out of the "
+            "noise."
         )
     size = np.maximum(np.abs(first), np.abs(second))
     relative = np.abs(second - first) / size
@@ -97,28 +91,19 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
     span = f"{lowest:.3g} and {highest:.3g} {'' if unit == 'input' else unit}".rstrip()
     if np.mean(changed) >= NOTES.lines_changed:
         worst = int(np.argmax(np.where(changed, relative, 0.0)))
-        return AmplitudeDependence(
-            "yes",
+        return "yes", (
             f"The frequency response {path} changes with the amplitude{by}: between {span} by up to "
-            f"{relative[worst]:.0%} of its size (at {omega[worst]:.3g} rad/s), so a nonlinear effect is involved.",
-            names,
-            path,
+            f"{relative[worst]:.0%} of its size (at {omega[worst]:.3g} rad/s), so a nonlinear effect is involved."
         )
     seen = float(np.median(3.0 * np.sqrt(variance) / size))
     if np.mean(chance < NOTES.line_chance) < NOTES.lines_changed and seen > 0.1:
-        return AmplitudeDependence(
-            "cannot tell",
+        return "cannot tell", (
             f"Between {span} the frequency responses {path}{by} agree within their noise, but the noise would hide changes up to "
-            f"{seen:.0%}.",
-            names,
-            path,
+            f"{seen:.0%}."
         )
-    return AmplitudeDependence(
-        "no",
+    return "no", (
         f"The frequency response {path} does not change with the amplitude{by} between {span} "
-        f"(by {float(np.median(relative)):.1%} in the median): the cause is linear, or too small to show here.",
-        names,
-        path,
+        f"(by {float(np.median(relative)):.1%} in the median): the cause is linear, or too small to show here."
     )
 
 

@@ -27,15 +27,7 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         """Return the finding as it stands in ``diagnosis.json``."""
-        return {
-            "kind": self.kind,
-            "sentence": self.sentence,
-            "mend": self.remedy,
-            "serious": self.serious,
-            "record": self.record,
-            "signal": self.signal,
-            "explained": self.explained,
-        }
+        return {{"remedy": "mend"}.get(key, key): value for key, value in vars(self).items()}
 
 
 @dataclass(frozen=True)
