@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.compare import step_window
-from rigsight.compare.step_error import stepping_input
+from rigsight.compare.response_error import stepping_input
 from rigsight.errors import InputError
 from rigsight.excitation import step
 from rigsight.records import Record

@@ -12,8 +12,8 @@ from rigsight.compare.on_one_record import Yardstick as Yardstick
 from rigsight.compare.on_one_record import compare_on_record as compare_on_record
 from rigsight.compare.response_error import ResponseError as ResponseError
 from rigsight.compare.response_error import SignalPath as SignalPath
+from rigsight.compare.response_error import StepWindow as StepWindow
 from rigsight.compare.response_error import response_error as response_error
 from rigsight.compare.response_error import response_floor as response_floor
 from rigsight.compare.response_error import signal_paths as signal_paths
-from rigsight.compare.step_error import StepWindow as StepWindow
-from rigsight.compare.step_error import step_window as step_window
+from rigsight.compare.response_error import step_window as step_window

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.signal import welch
 
-from rigsight.compare.step_error import StepWindow
+from rigsight.compare.response_error import StepWindow
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method
 from rigsight.json_data import json_data

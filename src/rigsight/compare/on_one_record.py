@@ -10,16 +10,19 @@ import numpy as np
 
 from rigsight.compare.comparison import Column, Competitor, Failure, Floor, RecordComparison, Score
 from rigsight.compare.response_error import (
+    DEFAULT_SECONDS,
     ResponseError,
     SignalPath,
+    StepWindow,
     measured_responses,
     response_error,
     response_floor,
     signal_paths,
     simulated_response,
+    step_window,
+    stepping_input,
     without_shares,
 )
-from rigsight.compare.step_error import DEFAULT_SECONDS, StepWindow, step_window, stepping_input
 from rigsight.errors import InputError, SimulationError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify import GreyBoxFit, characteristic_scales

@@ -271,7 +271,10 @@ class Diagnosis:
             "observer_bandwidth": self.bandwidth,
             "scored_on": self.scored_on,
             "data_quality": [] if self.data_quality is None else self.data_quality.to_json(),
-            "advice": [_advice(advice) for advice in self.advice],
+            "advice": [
+                {{"source": "input"}.get(key, key): value for key, value in vars(advice).items()}
+                for advice in self.advice
+            ],
             "notes": self.notes,
         }
         return json_data(content)
@@ -294,16 +297,4 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "log_evidence": grounds and grounds.evidence,
         "success": candidate.success,
         "message": candidate.message,
-    }
-
-
-def _advice(advice: Advice) -> dict[str, Any]:
-    return {
-        "rival": advice.rival,
-        "waveform": advice.waveform,
-        "input": advice.source,
-        "amplitude": advice.amplitude,
-        "band": advice.band,
-        "output": advice.output,
-        "separation": advice.separation,
     }

@@ -257,24 +257,9 @@ def _local_response(
 class LocalFit:
     """Least squares in many local bands at once; linearly dependent terms share a coefficient.
 
-    Parameters
-    ----------
-    terms
-        Shape (n_bands, n_equations, n_terms).
-    sides
-        Right-hand sides of the equations, shape (n_bands, n_equations).
-    absorbed
-        Number of equations that do not count, one for all bands or of shape (n_bands,): as many as terms were projected out of
-        both before, and those that are zero because a record has no such frequency.
-
-    Attributes
-    ----------
-    left_over
-        Sum of squares of the residual, shape (n_bands,).
-    noise
-        The same per degree of freedom, shape (n_bands,).
-    freedom
-        Degrees of freedom, shape (n_bands,).
+    Terms have the shape (n_bands, n_equations, n_terms), the right-hand sides (n_bands, n_equations). `absorbed` equations do not
+    count, one number for all bands or of shape (n_bands,): as many as terms were projected out of both before, and those that
+    are zero because a record has no such frequency.
     """
 
     def __init__(
@@ -291,6 +276,7 @@ class LocalFit:
         projected = np.einsum("lws,lw->ls", left.conj(), sides)
         theta = np.einsum("lsp,ls->lp", right.conj(), inverse * projected)
         residual = sides - np.einsum("lwp,lp->lw", terms / scales, theta)
+        # Shape (n_bands,) each: degrees of freedom, sum of squares of the residual, and the same per degree of freedom.
         self.freedom = terms.shape[1] - absorbed - np.count_nonzero(kept, axis=1)
         self.left_over = np.sum(np.abs(residual) ** 2, axis=1)
         self.noise = self.left_over / self.freedom

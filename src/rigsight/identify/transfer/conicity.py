@@ -91,31 +91,29 @@ def estimate_conicity(
     # At the maximum of c_y its derivative is zero, and the delta method fails.
     error = standard_error / slope if unbounded is not None and slope > 0.0 else math.inf
     percent = f"{100.0 * level:g} %"
-    interval: tuple[float, float] | None = (
-        _bounded(high_c, largest, r_0, b),
-        _bounded(low_c, largest, r_0, b),
-    )
-    determined, text = False, f"{percent} interval {interval[0]:.3g} to {interval[1]:.3g} rad"
+    lower, upper = _bounded(high_c, largest, r_0, b), _bounded(low_c, largest, r_0, b)
+    determined, text = False, f"{percent} interval {lower:.3g} to {upper:.3g} rad"
     if low_c >= 1.0:
-        value, interval = 0.0, None
+        value = 0.0
         statement = (
             f"c_y = {c_y:.4g} lies above 1 with its whole {percent} interval ({low_c:.4g} to {high_c:.4g}): no positive conicity "
             "gives this. Speed, sensor scales, or a lag between the sensors are wrong by more than the noise; delta_0 is not "
             "determined."
         )
-    elif interval[0] <= 0.0 and interval[1] >= plausible:
+    elif lower <= 0.0 and upper >= plausible:
         statement = (
             f"The records do not determine delta_0: its {text} covers every plausible conicity (up to {plausible:g} rad). "
             f"c_y would have to be known to {100.0 * 0.1 * 0.024 * slope / c_y:.1g} % to know a conicity of 0.024 rad to 10 %."
         )
-    elif interval[0] <= 0.0:
-        statement = f"The records give an upper limit only: delta_0 is below {interval[1]:.3g} rad ({percent}); zero is possible."
+    elif lower <= 0.0:
+        statement = f"The records give an upper limit only: delta_0 is below {upper:.3g} rad ({percent}); zero is possible."
     else:
-        determined, statement = interval[1] - interval[0] < plausible, f"delta_0 = {value:.4g} rad, {text}."
+        determined, statement = upper - lower < plausible, f"delta_0 = {value:.4g} rad, {text}."
         if not determined:
             statement += (
                 " It differs from zero, but its interval is wider than the range of plausible conicities."
             )
+    interval = None if low_c >= 1.0 else (lower, upper)
     return ConicityEstimate(value, unbounded, error, interval, level, determined, statement)
 
 

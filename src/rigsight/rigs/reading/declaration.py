@@ -47,28 +47,10 @@ _LONGEST_QUOTE = 60
 
 
 class Declaration:
-    """The tables of a rig file with their expressions.
+    """The tables of a rig file with their expressions, by the path of keys of each.
 
-    Parameters
-    ----------
-    content
-        What TOML made of the file.
-    places
-        Line and column of each value, see `toml_places`.
-    source
-        How messages call the file.
-
-    Attributes
-    ----------
-    content, table
-        Its tables, as TOML made them and as they are checked.
-    expressions
-        Each expression by its path of keys.
-
-    Raises
-    ------
-    InputError
-        If a key is unknown or missing, a value has the wrong type, or an expression cannot be read.
+    `content` is what TOML made of the file, `places` are line and column of each value, see `toml_places`, and `source` is how
+    messages call the file.
     """
 
     def __init__(self, content: dict[str, Any], places: Mapping[Path, tuple[int, int]], source: str) -> None:
