@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigsight.errors import InputError, check_option
+from rigsight.records.record import Floats
 
 Lines = Literal["full", "odd", "odd_random"]
 
@@ -24,7 +25,7 @@ _CLIP = 0.9
 """Share of the peak that an iteration clips at: lower converges faster, and to a higher crest factor."""
 
 
-def crest_factor(signal: NDArray[np.float64]) -> float:
+def crest_factor(signal: Floats) -> float:
     """Return the peak over the root mean square of a signal of shape (n_samples,); a sine has the square root of 2.
 
     Raises
@@ -58,12 +59,12 @@ class Multisine:
 
     dt: float
     lines: NDArray[np.int_]
-    amplitudes: NDArray[np.float64]
-    phases: NDArray[np.float64]
-    samples: NDArray[np.float64]
+    amplitudes: Floats
+    phases: Floats
+    samples: Floats
 
     @property
-    def omega(self) -> NDArray[np.float64]:
+    def omega(self) -> Floats:
         """Angular frequencies of the lines [rad/s], shape (n_lines,)."""
         return np.asarray(2.0 * np.pi * self.lines / (self.samples.size * self.dt))
 
@@ -72,7 +73,7 @@ class Multisine:
         """Peak over root mean square."""
         return crest_factor(self.samples)
 
-    def periods(self, count: int) -> NDArray[np.float64]:
+    def periods(self, count: int) -> Floats:
         """Return `count` periods, shape (count * n_per_period,).
 
         Raises
@@ -197,7 +198,7 @@ def multisine(
     amplitudes = relative[np.argsort(lines)]
     amplitudes = amplitudes * (effective * math.sqrt(2.0) / float(np.linalg.norm(amplitudes)))
 
-    def period(phases: NDArray[np.float64]) -> NDArray[np.float64]:
+    def period(phases: Floats) -> Floats:
         coefficients = np.zeros(n_per_period // 2 + 1, dtype=np.complex128)
         coefficients[chosen] = 0.5 * n_per_period * amplitudes * np.exp(1j * phases)
         return np.asarray(np.fft.irfft(coefficients, n_per_period))

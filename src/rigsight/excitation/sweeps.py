@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.records.record import Floats
 
 
-def linear_sweep(
-    t: NDArray[np.float64], amplitude: float, omega_start: float, omega_stop: float
-) -> NDArray[np.float64]:
+def linear_sweep(t: Floats, amplitude: float, omega_start: float, omega_stop: float) -> Floats:
     """Return a sine whose angular frequency changes linearly in time, shape (n_samples,).
 
     Parameters
@@ -40,9 +38,7 @@ def linear_sweep(
     return np.asarray(amplitude * np.sin(omega_start * tau + 0.5 * rate * tau**2))
 
 
-def log_sweep(
-    t: NDArray[np.float64], amplitude: float, omega_start: float, omega_stop: float
-) -> NDArray[np.float64]:
+def log_sweep(t: Floats, amplitude: float, omega_start: float, omega_stop: float) -> Floats:
     """Return a sine that spends the same time on every octave, shape (n_samples,).
 
     Parameters
@@ -71,7 +67,7 @@ def log_sweep(
     return np.asarray(amplitude * np.sin(omega_start / growth * np.expm1(growth * tau)))
 
 
-def step(t: NDArray[np.float64], amplitude: float, start: float) -> NDArray[np.float64]:
+def step(t: Floats, amplitude: float, start: float) -> Floats:
     """Return zero before the time `start` [s] and `amplitude` from it on, shape (n_samples,).
 
     Parameters
@@ -86,9 +82,7 @@ def step(t: NDArray[np.float64], amplitude: float, start: float) -> NDArray[np.f
     return np.where(t >= start, amplitude, 0.0)
 
 
-def stepped_sine(
-    t: NDArray[np.float64], amplitude: float, omega: NDArray[np.float64], cycles: int = 10
-) -> NDArray[np.float64]:
+def stepped_sine(t: Floats, amplitude: float, omega: Floats, cycles: int = 10) -> Floats:
     """Return one sine after the other without a break, each for whole periods, then zero, shape (n_samples,).
 
     Parameters
@@ -135,7 +129,7 @@ def time_bandwidth_product(duration: float, omega_start: float, omega_stop: floa
     return duration * abs(omega_stop - omega_start) / (2.0 * math.pi)
 
 
-def _elapsed(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+def _elapsed(t: Floats) -> tuple[Floats, float]:
     if t.ndim != 1 or t.size < 2:
         raise InputError(
             f"A sweep needs times of shape (n_samples,) with at least two samples, got {t.shape}."
@@ -145,11 +139,7 @@ def _elapsed(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
 
 
 def _check_frequencies(
-    t: NDArray[np.float64],
-    omega_start: float,
-    omega_stop: float,
-    lowest: float,
-    names: tuple[str, str] = ("start", "end"),
+    t: Floats, omega_start: float, omega_stop: float, lowest: float, names: tuple[str, str] = ("start", "end")
 ) -> None:
     nyquist = math.pi * (t.size - 1) / float(t[-1] - t[0])
     for what, omega in zip(names, (omega_start, omega_stop), strict=True):

@@ -60,9 +60,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
     )
     rest, parts = _rest(exported, names), template_parts("export", "model_parts.c.txt")
     fragments = {
-        "HEADER": "\n".join(
-            f" * {line}".rstrip() for line in header_lines(exported, source, with_parameters=False)
-        ),
+        "HEADER": "\n".join(f" * {line}".rstrip() for line in header_lines(exported, source)),
         "TITLE": f"Simulation of {exported.title}",
         "HOLD_TEXT": hold_text(exported),
         "COLUMNS": ",".join(inputs),

@@ -34,7 +34,7 @@ def control_system(exported: Exported, source: str, name: str) -> str:
         template("export", "control.py.txt"),
         {
             "TITLE": exported.title[0].upper() + exported.title[1:],
-            "HEADER": "\n".join(header_lines(exported, source, with_parameters=False)),
+            "HEADER": "\n".join(header_lines(exported, source)),
             "CALL": inputs[0] if len(inputs) == 1 else f"[{', '.join(inputs)}]",
             "KINKS": _KINKS if exported.frozen.modes else _SMOOTH,
             "PARAMETERS": indented(parameter_entries(exported)),

@@ -1,4 +1,4 @@
-"""Header of an exported file: source, equations, parameters with units, and how to supply inputs."""
+"""Header of an exported file: source, equations, signals with units, and how to supply inputs."""
 
 from __future__ import annotations
 
@@ -80,19 +80,10 @@ def signal_lines(exported: Exported) -> list[str]:
     return lines + [f"state {q.name} [{q.unit}]" for q in exported.states]
 
 
-def parameter_lines(exported: Exported) -> list[str]:
-    """Return the parameters with numbers, units and descriptions, one a line."""
-    pairs = zip(exported.parameters, exported.values, strict=True)
-    return [f"{q.name} = {value!r} [{q.unit}]: {q.description}" for q, value in pairs]
-
-
-def header_lines(exported: Exported, source: str, *, with_parameters: bool = True) -> list[str]:
+def header_lines(exported: Exported, source: str) -> list[str]:
     """Return what stands at the head of every exported file."""
     lines = [f"{made_by(source)}; SI units.", "", "Equations:"]
-    lines += [f"  {line}" for line in (*equation_lines(exported), *signal_lines(exported))]
-    if with_parameters:
-        lines += ["", "Parameters:", *(f"  {line}" for line in parameter_lines(exported))]
-    return lines
+    return lines + [f"  {line}" for line in (*equation_lines(exported), *signal_lines(exported))]
 
 
 def indented(lines: list[str], level: int = 1) -> str:

@@ -52,7 +52,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
     prepare = MATLAB.statements(list(constants.values()), list(equations.constants.values()), names)
     modes = {mode: f"s({i + 1})" for i, mode in enumerate(frozen.modes)}
     inputs = [quantity.name for quantity in exported.inputs]
-    head = header_lines(exported, source, with_parameters=False)
+    head = header_lines(exported, source)
     late = structure.first_shown_late
     fragments = {
         "HEADER": "\n".join(f"% {line}".rstrip() for line in head),

@@ -63,7 +63,7 @@ def modelica(exported: Exported, source: str, name: str) -> str:
         if i == 0 and structure.first_shown_late is not None:
             value = f"delay({value}, {MODELICA.expression(structure.first_shown_late, names)})"
         equations.append(f"{own} = {value};")
-    head = header_lines(exported, source, with_parameters=False)
+    head = header_lines(exported, source)
     lines = [
         f'model {name} "{_quoted(exported.title)}"',
         *(f"  // {line}".rstrip() for line in head),

@@ -62,7 +62,7 @@ def python_function(exported: Exported, source: str) -> str:
     limits = [PYTHON.expression(limit, names) for limit in exported.limits.values()]
     fragments = {
         "TITLE": f"Simulation of {exported.title}",
-        "HEADER": "\n".join(header_lines(exported, source, with_parameters=False)),
+        "HEADER": "\n".join(header_lines(exported, source)),
         "PARAMETERS": indented(parameter_entries(exported)),
         "STATES": sequence([repr(state.name) for state in exported.states]),
         "STEP": repr(exported.step),

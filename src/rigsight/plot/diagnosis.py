@@ -8,7 +8,6 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.location.trace import Stage, Trace
 from rigsight.diagnose.result import Diagnosis
@@ -30,6 +29,7 @@ from rigsight.plot.drawing import (
     text_width,
     with_unit,
 )
+from rigsight.records.record import Floats
 from rigsight.records.stamps import time_label, time_origin
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def step_window(trace: Trace, output: str) -> slice | None:
     return slice(max(0, start - length // 8), min(stop, start + length))
 
 
-def _settling(after: NDArray[np.float64]) -> int:
+def _settling(after: Floats) -> int:
     """Return the number of samples after a step until what follows stays near its end."""
     known = np.nan_to_num(after)
     rest = known[-max(1, known.size // 10) :]
@@ -107,7 +107,7 @@ def detail_window(trace: Trace, output: str) -> slice:
     return _largest(residual, min(n, length))
 
 
-def _largest(residual: NDArray[np.float64], length: int) -> slice:
+def _largest(residual: Floats, length: int) -> slice:
     total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(residual, posinf=0.0, neginf=0.0) ** 2)])
     start = int(np.argmax(total[length:] - total[: total.size - length]))
     return slice(start, start + length)
@@ -215,25 +215,20 @@ def comparison(
     diagnosis: Diagnosis,
     trace: Trace,
     output: str,
-    window: slice | None = None,
     after_label: str = "after",
     stages: Mapping[Stage, str] | None = None,
 ) -> Figure:
     """Draw measured against simulated, by default given and after, with the residuals below."""
     from matplotlib.ticker import MaxNLocator
 
-    shown = window or slice(None)
-    t = (trace.t - time_origin(trace.t))[shown]
+    t = trace.t - time_origin(trace.t)
     names = stages or {"before": "given simulation", "after": after_label}
-    measured = np.asarray(trace.measured[output][shown], dtype=np.float64)
-    errors: dict[Stage, NDArray[np.float64]] = {
-        stage: -trace.residual(stage, output)[shown] for stage in names
-    }
+    measured = np.asarray(trace.measured[output], dtype=np.float64)
+    errors: dict[Stage, Floats] = {stage: -trace.residual(stage, output) for stage in names}
     factor, unit = shown_in(diagnosis.units.get(output, ""), measured)
     error_factor, error_unit = shown_in(diagnosis.units.get(output, ""), *errors.values())
 
-    width, height = (3.5 if window else 6.6), 3.9
-    figure = new_figure(width, height, layout=None)
+    figure = new_figure(6.6, 3.9, layout=None)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     set_margins(figure, 0.66, 0.14, 0.46, 0.34, between=(0.0, 0.15))
     line(top, t, measured * factor, _BINS, color=MEASURED, label="measured", linewidth=2.6, alpha=0.55)
@@ -252,9 +247,8 @@ def comparison(
         ax.grid()
         ax.margins(x=0.0)
         ax.yaxis.set_major_locator(MaxNLocator(5))
-        ax.xaxis.set_major_locator(MaxNLocator(4 if window else 9))
-    if not window:
-        figure.legend(loc="upper left", ncols=3, fontsize=8.5, handlelength=2.2, columnspacing=1.4)
+        ax.xaxis.set_major_locator(MaxNLocator(9))
+    figure.legend(loc="upper left", ncols=3, fontsize=8.5, handlelength=2.2, columnspacing=1.4)
     return figure
 
 
@@ -269,10 +263,10 @@ class ForceLoop:
     motion_unit: str
     force_unit: str
     # Shape (n_samples,).
-    displacement: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    simulated: Mapping[Stage, NDArray[np.float64]]  # stage -> its force, shape (n_samples,)
+    displacement: Floats
+    velocity: Floats
+    measured: Floats
+    simulated: Mapping[Stage, Floats]  # stage -> its force, shape (n_samples,)
 
 
 @in_style

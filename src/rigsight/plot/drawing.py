@@ -14,7 +14,8 @@ from functools import wraps
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rigsight.records.record import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,9 +120,7 @@ def display_scale(unit: str, size: float) -> DisplayScale:
     return DisplayScale(10.0**-exponent, _PREFIXES[exponent] + unit)
 
 
-def envelope(
-    t: NDArray[np.float64], values: NDArray[np.float64], n_bins: int = _ENVELOPE_BINS
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def envelope(t: Floats, values: Floats, n_bins: int = _ENVELOPE_BINS) -> tuple[Floats, Floats]:
     """Return a shorter line with the same picture: lowest and highest finite sample of each bin, in their order in time."""
     if values.size <= 2 * n_bins:
         return t, values
@@ -152,14 +151,12 @@ def plain_log_ticks(ax: Axes, left: float, right: float) -> None:
     ax.set_xticks(ticks, [f"{tick:g}" if tick < 1e5 else f"1e{int(np.log10(tick))}" for tick in ticks])
 
 
-def line(
-    ax: Axes, t: NDArray[np.float64], values: NDArray[np.float64], n_bins: int = _ENVELOPE_BINS, **style: Any
-) -> None:
+def line(ax: Axes, t: Floats, values: Floats, n_bins: int = _ENVELOPE_BINS, **style: Any) -> None:
     """Draw a line over time with all its peaks; where it is not finite, there is a gap."""
     ax.plot(*envelope(t, np.where(np.isfinite(values), values, np.nan), n_bins), **style)
 
 
-def shown_in(unit: str, *series: NDArray[np.float64]) -> tuple[float, str]:
+def shown_in(unit: str, *series: Floats) -> tuple[float, str]:
     """Return factor and unit in which all of these series are shown."""
     peaks = [float(np.max(np.abs(s[np.isfinite(s)]), initial=0.0)) for s in series]
     scale = display_scale(unit, max(peaks))

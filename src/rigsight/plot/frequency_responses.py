@@ -20,6 +20,7 @@ from rigsight.plot.drawing import (
     plain_log_ticks,
     set_margins,
 )
+from rigsight.records.record import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,9 +41,9 @@ _LIGHTEST = 0.84
 class FittedCurve:
     """A fitted frequency response."""
 
-    omega: NDArray[np.float64]  # angular frequencies [rad/s], shape (n,)
+    omega: Floats  # angular frequencies [rad/s], shape (n,)
     values: NDArray[np.complex128]  # complex response, shape (n,)
-    std: NDArray[np.float64]  # ``sqrt(E |error|^2)``, shape (n,)
+    std: Floats  # ``sqrt(E |error|^2)``, shape (n,)
     label: str  # what it is called
 
 
@@ -144,7 +145,7 @@ def amplitude_colors(count: int) -> list[str]:
     return [to_hex(scale(i / max(count - 1, 1))) for i in range(count)]
 
 
-def decibel(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def decibel(values: Floats) -> Floats:
     """Return magnitudes in dB of one unit; zero is far below any axis."""
     return np.asarray(20.0 * np.log10(np.maximum(values, 1e-300)))
 
@@ -194,14 +195,14 @@ def _draw_phase(ax: Axes, measured: FrequencyResponse, fitted: FittedCurve | Non
     ax.yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
 
 
-def limit(ax: Axes, values: NDArray[np.float64]) -> None:
+def limit(ax: Axes, values: Floats) -> None:
     """Give an axis limits that are not determined by a few outliers or by a band that reaches zero."""
     low, high = np.percentile(values[np.isfinite(values)], [0.5, 100.0])
     margin = 0.08 * max(high - low, 3.0)
     ax.set_ylim(float(low - margin), float(high + margin))
 
 
-def span(ax: Axes, omegas: Sequence[NDArray[np.float64]]) -> None:
+def span(ax: Axes, omegas: Sequence[Floats]) -> None:
     """Let the logarithmic frequency axis span these frequencies [rad/s], each ascending."""
     left, right = min(float(omega[0]) for omega in omegas), max(float(omega[-1]) for omega in omegas)
     ax.set_xscale("log")
@@ -263,9 +264,7 @@ def _draw_cell(top: Axes, bottom: Axes, cell: ResponseCell) -> None:
 
 
 @in_style
-def varied_responses(
-    omega: NDArray[np.float64], curves: Sequence[Curve], pair: str, unit: str, title: str
-) -> Figure:
+def varied_responses(omega: Floats, curves: Sequence[Curve], pair: str, unit: str, title: str) -> Figure:
     """Draw magnitude [dB] and phase [deg] over angular frequency, one color and line style per curve."""
     import matplotlib as mpl
 

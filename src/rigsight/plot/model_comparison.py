@@ -31,6 +31,7 @@ from rigsight.plot.frequency_responses import (
     span,
     thinned,
 )
+from rigsight.records.record import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,9 +64,9 @@ class StepPanel:
     # Which output.
     title: str
     unit: str
-    t: NDArray[np.float64]  # time from the step [s], shape (n_samples,)
-    measured: NDArray[np.float64]  # shape (n_samples,)
-    simulated: Mapping[str, NDArray[np.float64]]  # model -> shape (n_samples,)
+    t: Floats  # time from the step [s], shape (n_samples,)
+    measured: Floats  # shape (n_samples,)
+    simulated: Mapping[str, Floats]  # model -> shape (n_samples,)
 
 
 @dataclass(frozen=True)

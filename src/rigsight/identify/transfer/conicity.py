@@ -49,12 +49,7 @@ class ConicityEstimate:
 
 
 def estimate_conicity(
-    c_y: float,
-    standard_error: float,
-    r_0: float,
-    b: float,
-    level: float = LEVEL,
-    plausible: float = PLAUSIBLE,
+    c_y: float, standard_error: float, r_0: float, b: float, level: float = LEVEL
 ) -> ConicityEstimate:
     """Return delta_0 from the creep factor, limited to positive values, with its interval.
 
@@ -69,8 +64,6 @@ def estimate_conicity(
         Wheel radius and track width [m].
     level
         Confidence level.
-    plausible
-        Largest plausible conicity [rad].
 
     Raises
     ------
@@ -100,15 +93,15 @@ def estimate_conicity(
             "gives this. Speed, sensor scales, or a lag between the sensors are wrong by more than the noise; delta_0 is not "
             "determined."
         )
-    elif lower <= 0.0 and upper >= plausible:
+    elif lower <= 0.0 and upper >= PLAUSIBLE:
         statement = (
-            f"The records do not determine delta_0: its {text} covers every plausible conicity (up to {plausible:g} rad). "
+            f"The records do not determine delta_0: its {text} covers every plausible conicity (up to {PLAUSIBLE:g} rad). "
             f"c_y would have to be known to {100.0 * 0.1 * 0.024 * slope / c_y:.1g} % to know a conicity of 0.024 rad to 10 %."
         )
     elif lower <= 0.0:
         statement = f"The records give an upper limit only: delta_0 is below {upper:.3g} rad ({percent}); zero is possible."
     else:
-        determined, statement = upper - lower < plausible, f"delta_0 = {value:.4g} rad, {text}."
+        determined, statement = upper - lower < PLAUSIBLE, f"delta_0 = {value:.4g} rad, {text}."
         if not determined:
             statement += (
                 " It differs from zero, but its interval is wider than the range of plausible conicities."
