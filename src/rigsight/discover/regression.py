@@ -14,7 +14,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -222,12 +222,7 @@ def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...],
     if validation:
         return estimation, validation, ""
     if len(estimation) > 1:
-        names = [signal.name for signal in data.rig.inputs or data.rig.outputs]
-
-        def strength(record: Record) -> float:
-            return float(np.sqrt(sum(np.var(record[name]) for name in names if name in record)))
-
-        middle = sorted(estimation, key=strength)[len(estimation) // 2]
+        middle = sorted(estimation, key=partial(strength, data.rig))[len(estimation) // 2]
         rest = tuple(record for record in estimation if record is not middle)
         return (
             rest,
@@ -240,6 +235,12 @@ def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...],
         (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
         "There is a single record; its last part was set aside to select the terms, so no other amplitude is tested.",
     )
+
+
+def strength(rig: Rig, record: Record) -> float:
+    """Return the size of the inputs of a record, or of the outputs of a rig without inputs."""
+    names = [signal.name for signal in rig.inputs or rig.outputs]
+    return float(np.sqrt(sum(np.var(record[name]) for name in names if name in record)))
 
 
 def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> Rows:

@@ -6,18 +6,17 @@ linearized about the current estimate of the motion, a smoother improves the est
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.discover.joints.force_observer import Cases, Gains, cases_of, gains_of, smoothed, whitened
+from rigsight.discover.joints.force_observer import Cases, Gains, cases_of, gains_of, smoothed, squares
 from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionEquations
 from rigsight.effects import Effect, placed
 from rigsight.effects.effect import Energy, GainTrend, Place, Signature, State
-from rigsight.parameters import Parameter
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Joint, Rig
 from rigsight.simulate import Structure, compose
@@ -63,13 +62,6 @@ DECADES = (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0)
 """Intensities of an unknown force that are tried, in decades of its size and the motion's angular frequency."""
 BREADTH = 30.0
 """Standard deviation of the first state in units of its size: the estimate of a state that no sensor measures may be far off."""
-_KNOWN = 0.5
-"""Relative standard deviation of a parameter that was identified without the force. Without this prior, a parameter that the
-sensors do not distinguish from the force (the inertia of the joint on which it acts) would diverge."""
-_FACTOR = 2.0
-"""Largest factor by which one linearized estimate may change a parameter."""
-_FACTOR_IN_ALL = 4.0
-"""Largest factor by which a parameter may differ from its prior value; a force at the wrong joint could distort it further."""
 
 
 @dataclass(eq=False)
@@ -78,26 +70,18 @@ class FollowedMotion:
 
     equations: MotionEquations  # of the rig with the forces
     forces: tuple[tuple[int, int], ...]  # index of each force and of its rate among the states
-    fitted: tuple[Parameter, ...]  # parameters with respect to which the equations have derivatives
     values: dict[str, float]  # constants and parameters
     motions: list[Floats]  # states per record, shape (n_samples, n_states) each
     sizes: Floats  # typical size of each state, shape (n_states,)
     omega: float  # angular frequency of the motion [rad/s]
     decade: float = 0.0  # common logarithm of the forces' intensity
     errors: list[Floats] = field(default_factory=list)  # standard errors of the states, as `motions`
-    known: dict[str, float] = field(init=False)  # prior values of constants and parameters
     # Samples of each record after which the forces may jump, shape (n_samples,); None for none.
     jumps: list[NDArray[np.bool_] | None] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Keep the prior values; they hold an estimate that the records do not determine."""
-        self.known = dict(self.values)
+        """Let the forces jump nowhere."""
         self.jumps = [None] * len(self.motions)
-
-    @property
-    def offsets(self) -> Floats:
-        """Differences of the fitted parameters from their prior values, shape (n_fitted,)."""
-        return np.array([self.values[p.name] - self.known[p.name] for p in self.fitted])
 
     def linearized(self, records: Sequence[Record]) -> list[LinearizedMotion]:
         """Linearize about the current estimate of the motion in each record."""
@@ -112,13 +96,12 @@ class FollowedMotion:
 
 
 def with_unknown_forces(
-    rig: Rig, joints: Sequence[str], fitted: Sequence[Parameter]
+    rig: Rig, effects: Sequence[Effect], joints: Sequence[str], fitted: Sequence[str]
 ) -> tuple[MotionEquations, tuple[tuple[int, int], ...]]:
-    """Return the equations of a rig with an unknown force at each of some joints, and the indices of the forces in the state."""
-    effects = [placed(UNKNOWN_FORCE, joint) for joint in joints]
-    structure = compose(rig, effects)
-    equations = MotionEquations(structure, [p.name for p in fitted])
-    return equations, tuple(force_states(structure, effect) for effect in effects)
+    """Return the equations of a rig with effects and an unknown force at each of some joints, and where these are in the state."""
+    forces = [placed(UNKNOWN_FORCE, joint) for joint in joints]
+    structure = compose(rig, [*effects, *forces])
+    return MotionEquations(structure, fitted), tuple(force_states(structure, force) for force in forces)
 
 
 def improved(
@@ -126,71 +109,63 @@ def improved(
 ) -> float:
     """Estimate motion and forces once more, for several rigs with the same number of states at once."""
     n_records = len(records)
-    linear = [motion for one in followed for motion in one.linearized(records)]
-    cases = cases_of(
-        linear,
-        noise,
-        [one.sizes for one in followed for _ in records],
-        followed[0].forces,
-        BREADTH,
-        [own for one in followed for own in one.jumps],
-        lasting=True,
-    )
+    cases = _cases(followed, records, noise)
     tried = np.tile(np.asarray(decades), (len(followed), 1))
     gains = gains_of(cases, _intensities(followed, tried, n_records))
-    costs = _squares(cases, gains) + gains.log_variances
+    costs = squares(cases, gains) + gains.log_variances
     for own, one, ranked in zip(tried, followed, costs.reshape(len(followed), n_records, -1), strict=True):
         known = np.nan_to_num(np.sum(ranked, axis=0), nan=np.inf)
         one.decade = float(own[int(np.argmin(known))])
-    chosen = np.array([[one.decade] for one in followed])
-    gains = gains_of(cases, _intensities(followed, chosen, n_records), keep=True)
-    deviation, error = smoothed(cases, gains, cases.drive[..., 0], cases.data[..., 0])
+    deviation, error = smoothed(cases, _likeliest(cases, followed, n_records), slice(0, 1))
     moved = 0.0
     for i, one in enumerate(followed):
         one.errors = []
         others = np.setdiff1d(np.arange(one.sizes.size), np.ravel(one.forces))
         for j, motion in enumerate(one.motions):
-            step = deviation[: motion.shape[0], i * n_records + j]
+            step = deviation[: motion.shape[0], i * n_records + j, :, 0]
             one.motions[j] = motion + step * one.sizes
             one.errors.append(error[: motion.shape[0], i * n_records + j] * one.sizes)
             moved = max(moved, float(np.max(np.abs(step[:, others]))))
     return moved
 
 
+def force_by_parameter(
+    followed: Sequence[FollowedMotion], records: Sequence[Record], noise: Floats
+) -> list[list[Floats]]:
+    """Return how much less force would be missing with more of each parameter, per rig and record.
+
+    Shape (n_samples, n_parameters) each, for rigs with one unknown force: what a wrong value of a parameter adds to this force.
+    """
+    n_records = len(records)
+    cases = _cases(followed, records, noise)
+    ((force, _),) = followed[0].forces
+    gains = _likeliest(cases, followed, n_records)
+    changed, _ = smoothed(cases, gains, slice(1, None), slice(force, force + 1))
+    return [
+        [
+            changed[: motion.shape[0], i * n_records + j, 0] * one.sizes[force]
+            for j, motion in enumerate(one.motions)
+        ]
+        for i, one in enumerate(followed)
+    ]
+
+
+def _cases(followed: Sequence[FollowedMotion], records: Sequence[Record], noise: Floats) -> Cases:
+    return cases_of(
+        [motion for one in followed for motion in one.linearized(records)],
+        noise,
+        [one.sizes for one in followed for _ in records],
+        followed[0].forces,
+        BREADTH,
+        [own for one in followed for own in one.jumps],
+    )
+
+
+def _likeliest(cases: Cases, followed: Sequence[FollowedMotion], n_records: int) -> Gains:
+    chosen = np.array([[one.decade] for one in followed])
+    return gains_of(cases, _intensities(followed, chosen, n_records), keep=True)
+
+
 def _intensities(followed: Sequence[FollowedMotion], decades: Floats, n_records: int) -> Floats:
     omega = np.array([[one.omega] for one in followed])
     return np.repeat(10.0**decades * omega, n_records, axis=0)
-
-
-def _squares(cases: Cases, gains: Gains) -> Floats:
-    """Return the sum of squares of the filter's whitened prediction errors, shape (n_cases, n_intensities)."""
-    total = np.zeros(gains.variance.shape[1:3])
-
-    def tell(_sample: int, _sensor: int, rows: Floats) -> None:
-        nonlocal total
-        total += rows[..., 0] ** 2
-
-    whitened(cases, gains, lambda k: cases.drive[k, :, :, :1], lambda k: cases.data[k, :, :, :1], tell)
-    return total
-
-
-def prior_spread(one: FollowedMotion, target: float, own: Floats) -> Floats:
-    """Return the prior standard deviations of the parameters, shape (n_fitted,)."""
-    known = np.array([one.known[p.name] for p in one.fitted])
-    reach = np.sqrt(target / np.where(own > 0.0, own, 1.0))
-    return np.where(known != 0.0, _KNOWN * np.abs(known), reach)
-
-
-def within_reach(one: FollowedMotion, found: Mapping[str, float]) -> dict[str, float]:
-    """Return the estimates of the parameters, limited to their bounds and to the range in which the linearization is trusted."""
-    values = dict(one.values)
-    for parameter in one.fitted:
-        value = values[parameter.name]
-        low, high = parameter.lower, parameter.upper
-        for origin, factor in ((value, _FACTOR), (one.known[parameter.name], _FACTOR_IN_ALL)):
-            if origin > 0.0 and parameter.lower >= 0.0:
-                low, high = max(low, origin / factor), min(high, origin * factor)
-            elif origin != 0.0:
-                low, high = max(low, origin - factor * abs(origin)), min(high, origin + factor * abs(origin))
-        values[parameter.name] = float(np.clip(found[parameter.name], low, high))
-    return values

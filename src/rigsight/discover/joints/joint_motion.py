@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 from rigsight.discover.joints.followed_motion import (
     DECADES,
     FollowedMotion,
+    force_by_parameter,
     improved,
     joint_motion,
     with_unknown_forces,
 )
 from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionEquations
+from rigsight.effects import Effect
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Joint, Rig
-from rigsight.simulate import parameter_vector, record_input, rest_state
+from rigsight.simulate import compose, parameter_vector, record_input, rest_state
 from rigsight.simulate.equations.derivatives import slope
 from rigsight.simulate.simulation import record_values
 
@@ -45,6 +47,8 @@ class JointMotion:
     velocity: tuple[Floats, ...]
     force: tuple[Floats, ...]  # the unknown force that resists it
     error: tuple[Floats, ...]  # its standard error
+    # What a unit too much of each fitted parameter adds to the force, shape (n_samples, n_parameters); empty if there are none.
+    by_parameter: tuple[Floats, ...]
     remainder: float  # weighted sum of squares of the sensor residuals of this motion
 
 
@@ -54,50 +58,53 @@ def noise_of(rig: Rig, noise: Mapping[str, float]) -> Floats:
 
 
 def joint_motions(
-    rig: Rig, records: Sequence[Record], values: Mapping[str, float], noise: Mapping[str, float]
+    rig: Rig,
+    records: Sequence[Record],
+    values: Mapping[str, float],
+    noise: Mapping[str, float],
+    effects: Sequence[Effect] = (),
+    fitted: Sequence[str] = (),
 ) -> tuple[JointMotion, ...]:
     """Return each joint with the unknown force that would have to act there alone, in the order of the rig.
 
-    The values are constants and re-identified parameters, the noise is the floor of each output.
+    The force is that beside some effects. The values are constants and re-identified parameters, the noise is the floor of each
+    output; the influence of fitted parameters on the force is returned as well.
     """
     floors = noise_of(rig, noise)
     joints = rig.mechanism.joints
-    every = _at_every_joint(rig, records, dict(values), floors)
+    every = _at_every_joint(rig, effects, records, dict(values), floors)
     n_own = every.sizes.size - 2 * len(joints)
     alone = []
-    fitted = tuple(p for p in rig.parameters if p.fitted)
     for index, joint in enumerate(joints):
         size = every.sizes[n_own + 2 * index : n_own + 2 * index + 2]
-        equations, forces = with_unknown_forces(rig, [joint.name], fitted)
+        equations, forces = with_unknown_forces(rig, effects, [joint.name], fitted)
         columns = [*range(n_own), n_own + 2 * index, n_own + 2 * index + 1]
         motions = [motion[:, columns] for motion in every.motions]
         sizes = np.append(every.sizes[:n_own], size)
-        alone.append(FollowedMotion(equations, forces, fitted, dict(values), motions, sizes, every.omega))
+        alone.append(FollowedMotion(equations, forces, dict(values), motions, sizes, every.omega))
     improved(alone, records, floors, DECADES)
-    return followed_again(joints, alone, records, noise)
-
-
-def followed_again(
-    joints: Sequence[Joint],
-    alone: Sequence[FollowedMotion],
-    records: Sequence[Record],
-    noise: Mapping[str, float],
-) -> tuple[JointMotion, ...]:
-    """Return each joint with its force, estimated again about the current motion; the force may jump where the joint rests."""
+    # Estimated again about this motion; the force may jump where the joint rests.
     for joint, one in zip(joints, alone, strict=True):
         one.jumps = list(_resting(joint, one, records))
-    floors = noise_of(alone[0].equations.structure.rig, noise)
     improved(alone, records, floors, DECADES)
-    return tuple(_found(joint, one, records, floors) for joint, one in zip(joints, alone, strict=True))
+    changes = force_by_parameter(alone, records, floors) if fitted else [[] for _ in joints]
+    return tuple(
+        _found(joint, one, records, floors, change)
+        for joint, one, change in zip(joints, alone, changes, strict=True)
+    )
 
 
 def _at_every_joint(
-    rig: Rig, records: Sequence[Record], values: dict[str, float], noise: Floats
+    rig: Rig,
+    effects: Sequence[Effect],
+    records: Sequence[Record],
+    values: dict[str, float],
+    noise: Floats,
 ) -> FollowedMotion:
     """Return the motion that follows the sensors with an unknown force at every joint."""
     joints = rig.mechanism.joints
-    equations, forces = with_unknown_forces(rig, [joint.name for joint in joints], ())
-    structure = equations.structure
+    equations, forces = with_unknown_forces(rig, effects, [joint.name for joint in joints], ())
+    structure = compose(rig, effects)
     rest = [
         rest_state(
             structure,
@@ -106,11 +113,16 @@ def _at_every_joint(
         )
         for record in records
     ]
-    motions = [np.tile(state, (record.n_samples, 1)) for state, record in zip(rest, records, strict=True)]
+    # The forces, which are the last states, begin at zero: an equilibrium with them would be searched for in vain.
+    nothing = np.zeros(2 * len(joints))
+    motions = [
+        np.tile(np.append(state, nothing), (record.n_samples, 1))
+        for state, record in zip(rest, records, strict=True)
+    ]
     linear = equations.about(records[0], values, motions[0])
     omega = _typical_rate(rig, records, noise)
     sizes = _sizes(rig, equations, forces, records, values, linear, omega)
-    followed = FollowedMotion(equations, forces, (), values, motions, sizes, omega)
+    followed = FollowedMotion(equations, forces, values, motions, sizes, omega)
     improved([followed], records, noise, DECADES)
     for _ in range(_PASSES):
         if improved([followed], records, noise, (followed.decade,)) < _SETTLED:
@@ -187,7 +199,13 @@ def _resting(joint: Joint, one: FollowedMotion, records: Sequence[Record]) -> It
         yield slow | turns | np.append(slow[1:], False)
 
 
-def _found(joint: Joint, one: FollowedMotion, records: Sequence[Record], noise: Floats) -> JointMotion:
+def _found(
+    joint: Joint,
+    one: FollowedMotion,
+    records: Sequence[Record],
+    noise: Floats,
+    by_parameter: Sequence[Floats],
+) -> JointMotion:
     expressions = joint_motion(one.equations.structure, joint)
     moved = [
         one.equations.along(expressions, record, one.values, motion)
@@ -202,5 +220,6 @@ def _found(joint: Joint, one: FollowedMotion, records: Sequence[Record], noise: 
         velocity=tuple(v for _, v in moved),
         force=tuple(motion[:, force] for motion in one.motions),
         error=tuple(error[:, force] for error in one.errors),
+        by_parameter=tuple(by_parameter),
         remainder=one.remainder(records, noise),
     )

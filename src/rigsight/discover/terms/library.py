@@ -18,7 +18,7 @@ import sympy as sp
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from rigsight.discover.motion import Motion
-from rigsight.discover.regression import Projected, Regressed
+from rigsight.discover.regression import Projected, Regressed, alike
 from rigsight.discover.terms.hysteresis import best_loop, is_loop
 from rigsight.discover.terms.monomials import MONOMIALS
 from rigsight.effects import CATALOGUE, Effect
@@ -37,6 +37,7 @@ Filter = tuple[sp.Matrix, sp.Matrix]
 
 
 _GRID = 10
+_SAME_COLUMN = 0.999
 _LEAST_SHARE = 0.02
 _MOST_SHARE = 3.0
 
@@ -127,6 +128,25 @@ def _best_inner(effect: Effect, regressed: Regressed) -> Candidate | None:
         if share > highest:
             best, highest = candidate, share
     return best
+
+
+def distinct(
+    library: Sequence[Candidate], projected: Projected
+) -> tuple[list[Candidate], dict[str, list[str]]]:
+    """Leave out terms that these records do not distinguish from an earlier one; return the rest, and the terms each replaces."""
+    if not library:
+        return [], {}
+    columns = np.column_stack([candidate.column for candidate in library])
+    stands_for: dict[str, list[str]] = {}
+    dropped: set[int] = set()
+    for i, j, _ in alike(projected, columns, _SAME_COLUMN):
+        # A loop may degenerate to friction or damping, but not vice versa: the simpler term represents it.
+        loops = [is_loop(library[k].effect) for k in (i, j)]
+        first, second = (j, i) if loops == [True, False] else (i, j)
+        if first not in dropped and second not in dropped:
+            dropped.add(second)
+            stands_for.setdefault(library[first].name, []).append(library[second].name)
+    return [candidate for i, candidate in enumerate(library) if i not in dropped], stands_for
 
 
 def mixed(signals: TermSignals, parts: Floats, projected: Projected) -> tuple[Candidate, float]:
