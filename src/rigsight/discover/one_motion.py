@@ -31,6 +31,7 @@ from rigsight.records.signals import is_constant
 from rigsight.rigs import evaluated
 from rigsight.simulate import compose
 
+_LONGEST_SEED = 3
 _SAME_REST = 1e-5
 """Shift of the rest position, in units of the motion, below which the columns do not change."""
 
@@ -59,7 +60,10 @@ class OneMotion:
         projected = regressed.projected
         library, same = distinct(_library(data, regressed), projected)
         place = PlaceRegression(
-            projected, tuple(c.name for c in library), partial(values_of_one_motion, rig, bench.values)
+            projected,
+            tuple(candidate.name for candidate in library),
+            partial(values_of_one_motion, rig, bench.values),
+            _LONGEST_SEED,
         )
         begun = replace(
             bench,

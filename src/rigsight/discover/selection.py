@@ -22,7 +22,6 @@ from rigsight.identify import FitResult
 from rigsight.records.record import Floats
 
 _SEEDS = 5
-_LONGEST_SEED = 3
 _MOST_TERMS = 5
 _GROWTH = 3
 _WORTH = 0.02
@@ -204,7 +203,7 @@ def _proposed_at(bench: Bench, place: PlaceRegression) -> dict[Support, float]:
             remainder(support), len(support), projected.independent
         )
         for support in supports
-        if 0 < len(support) <= _LONGEST_SEED and worth(support)
+        if 0 < len(support) <= place.longest and worth(support)
     }
 
 

@@ -29,6 +29,7 @@ class PlaceRegression:
     offered: tuple[str, ...]  # names of the terms that have a column
     # The rig's parameters from the coefficients of its own terms, and the force per unit of the other coefficients.
     rig_values: Callable[[Floats], tuple[dict[str, float], float]]
+    longest: int  # number of terms that are proposed together at most
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,8 @@ from rigsight.identify import FitResult, swallowed_by_offsets, without_offsets
 from rigsight.records.record import Record
 from rigsight.simulate import compose
 
+RULED_OUT = 3.0
+"""Factor over the smallest sensor residual (RMS) of all joints above which a force at a joint alone is not the cause."""
 _WORTH = 0.5
 """Share of a missing force that a term must explain to be reported as its law, at a joint without a term of the equation."""
 
@@ -61,11 +63,17 @@ class EachJoint:
                 raise
             return bench
         places, candidates = [], dict(bench.candidates)
+        # A term that stands for others does so in every regression.
+        without = {*fit.structure.effect_names}.union(*self.same.values())
+        least = min(force.motion.remainder for force in forces.values())
         for force in forces.values():
-            place, library, same = force.place(bench.rig, fit.structure.effect_names)
+            if force.motion.remainder > RULED_OUT**2 * least:
+                continue
+            place, library, same = force.place(bench.rig, without)
             places.append(place)
             candidates |= {candidate.name: candidate for candidate in library}
-            self.same.update(same)
+            for name, others in same.items():
+                self.same.setdefault(name, []).extend(others)
         return replace(bench, candidates=candidates, places=tuple(places), about=fit)
 
     def _forces(
@@ -91,6 +99,7 @@ class EachJoint:
         records = [record for record in self.data.records if record.role == "estimation"]
         effects = final.structure.effects
         own_joints = {effect.at for effect in effects}
+        represented = set[str]().union(*self.same.values()) - {*final.structure.effect_names}
         found: dict[tuple[str, ...], dict[str, MissingForce]] = {}
         included: dict[str, float] = {}
         joints = []
@@ -100,12 +109,14 @@ class EachJoint:
             if key not in found:
                 found[key] = self._forces(bench, records, final, others, final.free)
             force = found[key][joint.name]
-            place, library, _ = force.place(bench.rig, key)
+            place, library, _ = force.place(bench.rig, represented)
             again = replace(
                 bench, candidates={**bench.candidates, **{c.name: c for c in library}}, places=[place]
             )
-            names = most_likely(again, place, selection, final)
-            drawn = inclusion(again, place, names, rng)
+            drawn = {}
+            # Elsewhere the force would be a law only if the equation were wrong.
+            if joint.name in own_joints or not own_joints:
+                drawn = inclusion(again, place, most_likely(again, place, selection, final), rng)
             included |= drawn
             joints.append(_joint_force(again, place, force, selection, final, drawn))
         joints.sort(key=lambda own: (own.joint not in own_joints, own.error_over_noise))

@@ -63,7 +63,8 @@ class MissingForce:
                     values[name] = float(np.clip(values[name] + change, low, high))
             return values, 1.0
 
-        return PlaceRegression(projected, tuple(c.name for c in library), rig_values), library, same
+        # Terms are added one by one, because the force is estimated anew beside each.
+        return PlaceRegression(projected, tuple(c.name for c in library), rig_values, 1), library, same
 
     def along(self, effect: Effect, own: Mapping[str, float], index: int) -> Floats:
         """Return the force of an effect at this joint along a record, shape (n_samples,)."""
