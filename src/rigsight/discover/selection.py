@@ -17,6 +17,7 @@ import numpy as np
 from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
 from rigsight.discover.regression import STRONG, information_criterion, sparse_path
 from rigsight.discover.support_starts import PlaceRegression
+from rigsight.effects.placed import kind_of
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats
@@ -28,6 +29,10 @@ _WORTH = 0.02
 """Share of the regression's residual power that a term must explain to be polished, unless it is the best candidate."""
 _ROUNDS = 4
 """Rounds in which terms are added; rounds in which terms are only removed end by themselves."""
+_BESIDE = 2
+"""Equations that are extended beside the best, if terms act at several joints."""
+_NEAR = 1.5
+"""Factor of the smallest held-out error up to which they are."""
 _RELEASED = 0.98
 """Factor by which a released special value (an exponent of 1) must lower the held-out error to be kept."""
 
@@ -129,10 +134,13 @@ def select(
     best = _fewest(pool, cost)
     # A term that another one has made unnecessary is removed, even if that one was added later.
     for number in range(_ROUNDS + _MOST_TERMS):
-        shorter = _simpler(bench, best.support)
-        longer: list[Support] = []
+        shorter, longer = _simpler(bench, best.support), list[Support]()
         if number < _ROUNDS and len(best.support) < _MOST_TERMS and not at_floor(best):
-            bench = about(bench, best.fit)
+            *others, own = _to_extend(bench, pool, best)
+            for trial in others:
+                bench = about(bench, trial.fit)
+                pool += tried([trial.support | {name} for name in next_terms(bench, trial.support)])
+            bench = about(bench, own.fit)
             longer = [best.support | {name} for name in next_terms(bench, best.support)]
         pool += tried([*shorter, *longer])
         # A fit that stopped too early from the values of the regression may continue from those of the longer equation.
@@ -167,12 +175,30 @@ def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float]) -> Trial:
     return min(close, key=lambda t: (t.n_free, len(t.fit.structure.states), cost(t)))
 
 
+def _to_extend(bench: Bench, pool: Sequence[Trial], best: Trial) -> list[Trial]:
+    """Return the trials whose equations get a further term, the best last.
+
+    With terms at several joints, a wrong term that imitates two right ones at once can be better than either of them alone.
+    """
+    if len(bench.places) < 2:
+        return [best]
+    as_long = {trial.support: trial for trial in pool if len(trial.support) == len(best.support)}
+    ordered = sorted(as_long.values(), key=lambda trial: -trial.error_over_noise)
+    near = [t for t in ordered if t.error_over_noise < _NEAR * best.error_over_noise and t is not best]
+    return [*near[-_BESIDE:], best]
+
+
 def proposals(bench: Bench) -> list[Support]:
     """Return the supports that the regressions propose for polishing, short ones first."""
     costs = {support: cost for place in bench.places for support, cost in _proposed_at(bench, place).items()}
     # Short ones first: if one term reaches the noise floor, two need not be tried.
     found = sorted(costs, key=lambda support: costs[support])[:_SEEDS]
-    return sorted(found, key=lambda support: (len(support), costs[support]))
+    # The same terms at the other joints: a force at one joint moves those beside it in nearly the same way.
+    kinds = {kind_of(name) for support in found for name in support}
+    offered = [name for place in bench.places[1:] and bench.places for name in place.offered]
+    further = [frozenset({name}) for name in offered if kind_of(name) in kinds]
+    found += [support for support in further if support not in found]
+    return sorted(found, key=lambda support: (len(support), costs.get(support, math.inf)))
 
 
 def _proposed_at(bench: Bench, place: PlaceRegression) -> dict[Support, float]:
