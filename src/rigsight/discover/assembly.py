@@ -12,7 +12,7 @@ import sympy as sp
 from rigsight.discover.bench import Trial
 from rigsight.discover.ensembles import Examined
 from rigsight.discover.regression import STRONG, RegressionData, strength
-from rigsight.discover.result import Alternative, Coefficient, Discovery, JointForce, Run, Term
+from rigsight.discover.result import RULED_OUT, Alternative, Coefficient, Discovery, JointForce, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
 from rigsight.discover.terms.monomials import known_terms
 from rigsight.effects import Effect
@@ -20,7 +20,6 @@ from rigsight.effects.placed import AT, kind_of
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats, Record
 from rigsight.records.signals import same_signal
-from rigsight.rigs import Rig
 from rigsight.simulate import Structure
 from rigsight.simulate.model import Model
 from rigsight.simulate.printing.notation import latex_equation, text_equation
@@ -73,8 +72,6 @@ _ZERO = 3.0
 _VAGUE = 0.05
 _FLOOR = 1.5
 """Held-out error in noise floors above which an effect is still missing."""
-_RULED_OUT = 3.0
-"""Factor over the smallest error of all joints above which a force at a joint is not the cause."""
 _NOISY = 0.1
 """Noise floor, relative to the motion, from which it may mask terms."""
 _MOST_NAMED = 3
@@ -184,12 +181,13 @@ def warnings_of(
 def _ruled_out(joints: Sequence[JointForce], own_joints: Collection[str | None]) -> list[str]:
     """Return a warning about joints at which a force alone cannot explain the sensors; empty if terms act at several."""
     least = min((joint.error_over_noise for joint in joints), default=0.0)
-    found = [joint.joint for joint in joints if joint.error_over_noise > _RULED_OUT * least]
+    found = [joint.joint for joint in joints if joint.error_over_noise > RULED_OUT * least]
     if not found or len(own_joints) > 1:
         return []
+    first = joints[0]
     return [
-        f"No force at {' or '.join(found)} alone explains the readings of all sensors; a force at {joints[0].joint} explains them "
-        f"up to {joints[0].error_over_noise:.2g} noise floors."
+        f"No force at {' or '.join(found)} alone explains the readings of all sensors; a force at {first.joint} explains them up "
+        f"to {first.error_over_noise:.2g} noise floors."
     ]
 
 
@@ -257,7 +255,7 @@ def _one_amplitude(selection: Selection, chosen: Trial) -> str:
 def assembled(data: RegressionData, method: str, form: str, found: Found) -> Discovery:
     """Return the result of a discovery: equations, terms with their doubts, alternatives, free runs, model."""
     rig, selection, final, judged = data.rig, found.selection, found.final, found.judged
-    terms, force = _terms(rig, found), found.examined.force
+    terms, force = _terms(found), found.examined.force
     error, floor = _relative(data, found)
     likeliest = next(iter(next_terms(selection.bench, found.chosen.support)), "")
     text, latex = equations(final.structure, held_numbers(final))
@@ -314,7 +312,7 @@ def coefficients_of(fit: FitResult) -> dict[str, Coefficient]:
     return {name: Coefficient(fit.values[name], fit.standard_errors[name], units[name]) for name in fit.free}
 
 
-def _terms(rig: Rig, found: Found) -> tuple[Term, ...]:
+def _terms(found: Found) -> tuple[Term, ...]:
     structure, coefficients = found.final.structure, coefficients_of(found.final)
     inclusion, rigs_own = found.examined.inclusion, found.selection.bench.own_terms
     terms = []

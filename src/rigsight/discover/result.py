@@ -13,6 +13,8 @@ from rigsight.records import Record
 from rigsight.records.record import Floats
 
 SCHEMA_VERSION = 1
+RULED_OUT = 3.0
+"""Factor over the smallest sensor residual (RMS) of all joints above which a force at a joint alone is not the cause."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +100,7 @@ class JointTerm:
     """A term of the law of a missing force."""
 
     effect: Effect  # at its joint
-    # By name: fitted for a term of the equation, else of the regression, which states no standard errors.
-    coefficients: Mapping[str, Coefficient]
+    coefficients: Mapping[str, Coefficient]  # its parameters by their own names
     inclusion: float | None  # as of `Term`; None if the term did not compete
 
     @property
@@ -127,7 +128,11 @@ class JointTerm:
 
 @dataclass(frozen=True, eq=False)
 class JointForce:
-    """The force missing at one joint: beside the terms at other joints for a joint of the equation, else if it acts there alone."""
+    """The force missing at one joint.
+
+    At a joint with terms of the equation that beside its other terms, at any other joint the force if all that is missing acted
+    there alone.
+    """
 
     joint: str  # its name
     x_unit: str  # of its motion
@@ -138,7 +143,7 @@ class JointForce:
     # Remaining sensor residual, RMS in units of the noise floors; far above 1, a force at this joint alone is not the cause.
     error_over_noise: float
     standard_error: float  # RMS of that of the force
-    terms: tuple[JointTerm, ...]  # its law; empty if no term describes the force
+    terms: tuple[JointTerm, ...]  # its law: the terms of the equation that act there
     share_of_force: float  # of the force's mean square that they explain
     # Of the best equation with terms at this joint alone, as the BIC of an alternative; None if there is none.
     criterion: float | None
@@ -147,11 +152,12 @@ class JointForce:
     def sentence(self) -> str:
         """The finding in words."""
         if not self.terms:
-            return f"No function of the motion of {self.joint} describes the force missing there."
+            remainder = f"{self.error_over_noise:.3g} times the noise floor"
+            return f"No term acts at {self.joint}: a force there alone would leave {remainder}."
         reported = " and ".join(term.text for term in self.terms)
         return (
-            f"The force missing at {self.joint} is best described by {reported}, which explains {self.share_of_force:.0%} (x and v "
-            f"of the joint)."
+            f"The force missing at {self.joint} is best described by {reported}, which explains {self.share_of_force:.0%} (x and "
+            f"v of the joint)."
         )
 
     def to_json(self) -> dict[str, Any]:

@@ -94,7 +94,8 @@ def select(
 ) -> Selection:
     """Search for the support with the lowest held-out criterion: seeds from the regression, then steps of one term.
 
-    Before terms are added to an equation, also to that without any, `about` may return a bench with the regression of what this equation lacks.
+    Before terms are added to an equation, also to that without any, `about` may return a bench with the regression of what this
+    equation lacks.
     """
 
     def tried(supports: Sequence[Support]) -> list[Trial]:

@@ -7,7 +7,7 @@ estimated anew, so that terms at several joints are found one after the other.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -17,19 +17,14 @@ from rigsight.discover.bench import Bench
 from rigsight.discover.ensembles import Examined, inclusion, most_likely
 from rigsight.discover.joints.missing_force import MissingForce, missing_forces
 from rigsight.discover.regression import RegressionData
-from rigsight.discover.result import Coefficient, ForceTrace, JointForce, JointTerm
+from rigsight.discover.result import RULED_OUT, Coefficient, ForceTrace, JointForce, JointTerm
 from rigsight.discover.selection import Selection, criterion
-from rigsight.discover.support_starts import PlaceRegression
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, swallowed_by_offsets, without_offsets
 from rigsight.records.record import Record
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
-
-RULED_OUT = 3.0
-"""Factor over the smallest sensor residual (RMS) of all joints above which a force at a joint alone is not the cause."""
-_WORTH = 0.5
-"""Share of a missing force that a term must explain to be reported as its law, at a joint without a term of the equation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,59 +108,46 @@ class EachJoint:
             again = replace(
                 bench, candidates={**bench.candidates, **{c.name: c for c in library}}, places=[place]
             )
-            drawn = {}
-            # Elsewhere the force would be a law only if the equation were wrong.
+            # Elsewhere a term would explain the force only if the equation were wrong.
             if joint.name in own_joints or not own_joints:
-                drawn = inclusion(again, place, most_likely(again, place, selection, final), rng)
-            included |= drawn
-            joints.append(_joint_force(again, place, force, selection, final, drawn))
+                included |= inclusion(again, place, most_likely(again, place, selection, final), rng)
+            joints.append(_joint_force(bench.rig, force, selection, final, included))
         joints.sort(key=lambda own: (own.joint not in own_joints, own.error_over_noise))
         return Examined(included, joints=tuple(joints))
 
 
 def _joint_force(
-    bench: Bench,
-    place: PlaceRegression,
-    force: MissingForce,
-    selection: Selection,
-    final: FitResult,
-    drawn: dict[str, float],
+    rig: Rig, force: MissingForce, selection: Selection, final: FitResult, included: Mapping[str, float]
 ) -> JointForce:
-    rig, motion = bench.rig, force.motion
-    name, structure = motion.joint.name, final.structure
-    law: list[tuple[Effect, dict[str, float], dict[str, float]]] = [
-        (
-            effect,
-            structure.values_of(effect, {**dict(structure.fixed), **final.values}),
-            {
-                p.name: final.standard_errors.get(structure.parameter_name(effect, p.name), math.nan)
-                for p in effect.parameters
-            },
-        )
+    motion, structure, name = force.motion, final.structure, force.motion.joint.name
+    law = {
+        effect: structure.values_of(effect, {**dict(structure.fixed), **final.values})
         for effect in structure.effects
         if effect.at == name
-    ] or _regressed_law(bench, place)
+    }
     units = rig.units_at(name)
     traces, n_measured = [], 0
     for i, record in enumerate(motion.records):
-        along = [force.along(effect, own, i) for effect, own, _ in law]
+        along = sum((force.along(e, own, i) for e, own in law.items()), start=np.zeros(record.n_samples))
         n_measured += sum(record.n_samples for signal in rig.outputs if signal.name in record)
-        traces.append(
-            ForceTrace(
-                record.name,
-                record.t,
-                motion.displacement[i],
-                motion.velocity[i],
-                motion.force[i],
-                motion.error[i],
-                np.sum(along, axis=0) if along else np.zeros(record.n_samples),
-            )
-        )
+        signals = (motion.displacement[i], motion.velocity[i], motion.force[i], motion.error[i])
+        traces.append(ForceTrace(record.name, record.t, *signals, along))
     whole = sum(float(np.sum(trace.force**2)) for trace in traces)
     rest = sum(float(np.sum((trace.force - trace.law) ** 2)) for trace in traces)
     linear = next(trial.fit for trial in selection.trials if not trial.support)
     square = motion.remainder / n_measured
     there = [t for t in selection.trials if t.support and all(e.at == name for e in t.fit.structure.effects)]
+    terms = []
+    for effect, own in law.items():
+        errors = {
+            p.name: final.standard_errors.get(structure.parameter_name(effect, p.name), math.nan)
+            for p in effect.parameters
+        }
+        coefficients = {
+            p.name: Coefficient(own[p.name], errors[p.name], rig.with_unit(p, name).unit)
+            for p in effect.parameters
+        }
+        terms.append(JointTerm(effect, coefficients, included.get(effect.name)))
     return JointForce(
         joint=name,
         x_unit=units["x"],
@@ -174,32 +156,7 @@ def _joint_force(
         share=max(0.0, 1.0 - square * linear.n_samples / linear.cost),
         error_over_noise=math.sqrt(square),
         standard_error=float(np.sqrt(np.mean(np.concatenate(motion.error) ** 2))),
-        terms=tuple(
-            JointTerm(
-                effect,
-                {
-                    p.name: Coefficient(own[p.name], std.get(p.name, math.nan), rig.with_unit(p, name).unit)
-                    for p in effect.parameters
-                },
-                drawn.get(effect.name),
-            )
-            for effect, own, std in law
-        ),
+        terms=tuple(terms),
         share_of_force=max(0.0, 1.0 - rest / whole) if law and whole > 0.0 else 0.0,
         criterion=criterion(there[0], selection.independent) if there else None,
     )
-
-
-def _regressed_law(
-    bench: Bench, place: PlaceRegression
-) -> list[tuple[Effect, dict[str, float], dict[str, float]]]:
-    """Return the term that explains most of a missing force with its parameters; nothing if none explains much."""
-    shares = {n: place.projected.explained(bench.candidates[n].column[:, None])[1] for n in place.offered}
-    best = max(shares, key=lambda name: shares[name], default="")
-    if not best or shares[best] < _WORTH:
-        return []
-    structure = compose(bench.rig, [bench.candidates[best].effect])
-    start = replace(bench, places=(place,), about=None).starts.regressed(structure, frozenset({best}))
-    effect = bench.candidates[best].effect
-    own = {p.name: start[structure.parameter_name(effect, p.name)] for p in effect.parameters}
-    return [(effect, own, {})]

@@ -98,7 +98,7 @@ class FollowedMotion:
 def with_unknown_forces(
     rig: Rig, effects: Sequence[Effect], joints: Sequence[str], fitted: Sequence[str]
 ) -> tuple[MotionEquations, tuple[tuple[int, int], ...]]:
-    """Return the equations of a rig with effects and an unknown force at each of some joints, and where these are in the state."""
+    """Return the equations with effects and an unknown force at each of some joints, and the indices of these in the state."""
     forces = [placed(UNKNOWN_FORCE, joint) for joint in joints]
     structure = compose(rig, [*effects, *forces])
     return MotionEquations(structure, fitted), tuple(force_states(structure, force) for force in forces)

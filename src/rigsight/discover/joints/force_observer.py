@@ -1,8 +1,8 @@
 """Motion and unknown force that agree best with the sensors: Kalman filter and smoother about a reference motion.
 
 The unknown force is a state of the structure, an integrated random walk. Many cases (joints, records, intensities of the walk)
-are filtered side by side. Changes of parameters pass through the same smoother as further columns, because it is linear: they show
-how the estimated motion and force would change with each parameter.
+are filtered side by side. Changes of parameters pass through the same smoother as further columns, because it is linear: they
+show how the estimated motion and force would change with each parameter.
 
 References
 ----------

@@ -47,7 +47,7 @@ class JointMotion:
     velocity: tuple[Floats, ...]
     force: tuple[Floats, ...]  # the unknown force that resists it
     error: tuple[Floats, ...]  # its standard error
-    # What a unit too much of each fitted parameter adds to the force, shape (n_samples, n_parameters); empty if there are none.
+    # What a unit too much of each fitted parameter adds to the force, shape (n_samples, n_parameters).
     by_parameter: tuple[Floats, ...]
     remainder: float  # weighted sum of squares of the sensor residuals of this motion
 
@@ -87,7 +87,8 @@ def joint_motions(
     for joint, one in zip(joints, alone, strict=True):
         one.jumps = list(_resting(joint, one, records))
     improved(alone, records, floors, DECADES)
-    changes = force_by_parameter(alone, records, floors) if fitted else [[] for _ in joints]
+    nothing = [np.zeros((record.n_samples, 0)) for record in records]
+    changes = force_by_parameter(alone, records, floors) if fitted else [nothing for _ in joints]
     return tuple(
         _found(joint, one, records, floors, change)
         for joint, one, change in zip(joints, alone, changes, strict=True)

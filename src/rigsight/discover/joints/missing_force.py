@@ -125,13 +125,13 @@ def _regressed(found: JointMotion, threads: IdleThreads) -> Regressed:
     x, v, force = (typical_size(own) for own in (found.displacement, found.velocity, found.force))
     scales = {"x": x, "time": x / v, "force": force, "drive": force}
     rows = rows_of(motions, scales["time"])
+    targets = [rows.of(motion.measured, motion.dt) for motion in motions]
     base = np.concatenate(
         [
-            np.column_stack([rows.of(column, motion.dt) for column in own.T])
-            for own, motion in zip(found.by_parameter, motions, strict=True)
+            np.column_stack([np.zeros((target.size, 0)), *(rows.of(column, motion.dt) for column in own.T)])
+            for own, motion, target in zip(found.by_parameter, motions, targets, strict=True)
         ]
     )
-    targets = [rows.of(motion.measured, motion.dt) for motion in motions]
     independent = sum(
         target.size * rows.independent_share(0, motion.dt)
         for target, motion in zip(targets, motions, strict=True)
