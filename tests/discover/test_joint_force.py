@@ -121,7 +121,8 @@ def test_a_missing_force_is_found_in_free_motion(tmp_path: Path) -> None:
         still = Record(f"from {begin}", DT, {"angle": np.zeros(T.size)}, {"angle": "rad"})
         run = simulate(structure, {**values, "c_2": 2e-3}, still, np.array([begin, 0.0]))
         records.append(run.with_signals(angle=run["angle"] + rng.normal(scale=1e-4, size=T.size)))
-    (force,) = missing_forces(rig, records, values, {"angle": 1e-4}, ("I", "s", "d")).values()
+    # Free motion determines all parameters only up to a common factor: the inertia is held.
+    (force,) = missing_forces(rig, records, values, {"angle": 1e-4}, ("s", "d")).values()
     assert error_over_noise(force) < 1.3
     shares = shares_at(force, rig)
     assert shares["quadratic_damping@pivot"][0] > 0.9 * max(share for share, _ in shares.values())
