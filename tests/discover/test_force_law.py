@@ -10,10 +10,10 @@ import sympy as sp
 
 from rigsight.discover.bench import Bench
 from rigsight.discover.ensembles import ForceLaw, force_equation
+from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.motion import Motion, Rows
 from rigsight.discover.one_motion import regressed_force
 from rigsight.discover.regression import Projected, Regressed
-from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.effects.symbols import deflection_rate
 from rigsight.identify import FitResult

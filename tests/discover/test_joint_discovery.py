@@ -120,7 +120,7 @@ def test_responses_that_cannot_be_regressed_are_told(
     def singular(*_: object) -> None:
         raise np.linalg.LinAlgError("Singular matrix")
 
-    monkeypatch.setattr("rigsight.discover.joints.each_joint.joint_motions", singular)
+    monkeypatch.setattr("rigsight.discover.each_joint.joint_motions", singular)
     data = campaign(drive_train, {**TRAIN, "k_t": 0.05, "c_2": DAMPING})
     with pytest.raises(
         SimulationError, match=r"missing forces of drive_train cannot be found .*Singular matrix"

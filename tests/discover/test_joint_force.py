@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigsight.discover.joints.each_joint import MissingForce, missing_forces
+from rigsight.discover.each_joint import MissingForce, missing_forces
 from rigsight.effects import effect_named, placed
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, read_rig_file

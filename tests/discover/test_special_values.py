@@ -11,11 +11,11 @@ import pytest
 
 from rigsight.discover.assembly import doubts
 from rigsight.discover.bench import Attempt, Bench, Trial
+from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
 from rigsight.discover.result import Coefficient
 from rigsight.discover.selection import select
 from rigsight.discover.support_starts import PlaceRegression
-from rigsight.discover.terms.library import Candidate
 from rigsight.effects import effect_named
 from rigsight.identify import FitResult
 from rigsight.rigs import AXIS

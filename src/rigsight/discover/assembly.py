@@ -11,10 +11,10 @@ import sympy as sp
 
 from rigsight.discover.bench import Trial
 from rigsight.discover.ensembles import Examined
+from rigsight.discover.monomials import known_terms
 from rigsight.discover.regression import STRONG, RegressionData, strength
 from rigsight.discover.result import RULED_OUT, Alternative, Coefficient, Discovery, JointForce, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
-from rigsight.discover.terms.monomials import known_terms
 from rigsight.effects import Effect
 from rigsight.effects.placed import AT, kind_of
 from rigsight.identify import FitResult

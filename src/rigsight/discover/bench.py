@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
 from rigsight.discover.support_starts import PlaceRegression, SupportStarts
-from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, free_names
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig

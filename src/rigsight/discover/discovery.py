@@ -11,7 +11,7 @@ import numpy as np
 
 from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
-from rigsight.discover.joints.each_joint import EachJoint
+from rigsight.discover.each_joint import EachJoint
 from rigsight.discover.one_motion import OneMotion
 from rigsight.discover.regression import STRONG, RegressionData, split
 from rigsight.discover.result import Discovery

@@ -18,12 +18,12 @@ import numpy as np
 import sympy as sp
 
 from rigsight.discover.bench import Bench
+from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.motion import Motion, Rows
 from rigsight.discover.regression import Projected, inclusion_probabilities
 from rigsight.discover.result import JointForce
 from rigsight.discover.selection import Selection, proposals
 from rigsight.discover.support_starts import PlaceRegression
-from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative

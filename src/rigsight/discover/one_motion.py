@@ -18,12 +18,12 @@ from rigsight.discover.ensembles import (
     inclusion,
     most_likely,
 )
+from rigsight.discover.hysteresis import is_loop
+from rigsight.discover.library import Candidate, along, candidates, distinct, offered_effects
 from rigsight.discover.motion import motion_of
 from rigsight.discover.regression import Regressed, RegressionData, own_regression, own_terms
 from rigsight.discover.selection import Selection
 from rigsight.discover.support_starts import PlaceRegression, values_of_one_motion
-from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import Candidate, along, candidates, distinct, offered_effects
 from rigsight.effects import Place
 from rigsight.identify import FitResult, GreyBoxFit, swallowed_by_offsets, without_offsets
 from rigsight.records.record import Record

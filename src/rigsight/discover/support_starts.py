@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
+from rigsight.discover.hysteresis import is_loop
+from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
-from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats
 from rigsight.rigs import Rig, evaluated

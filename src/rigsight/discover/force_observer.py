@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.joints.linearized_motion import LinearizedMotion
+from rigsight.discover.linearized_motion import LinearizedMotion
 from rigsight.records.record import Floats
 
 _EVENED = 64

@@ -17,14 +17,14 @@ import numpy as np
 
 from rigsight.discover.bench import Bench
 from rigsight.discover.ensembles import Examined, inclusion, most_likely
-from rigsight.discover.joints.joint_motion import JointMotion, joint_motions
+from rigsight.discover.joint_motion import JointMotion, joint_motions
+from rigsight.discover.library import Candidate, candidates, distinct, offered_effects
+from rigsight.discover.monomials import LINEAR
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected, Regressed, RegressionData, rows_of
 from rigsight.discover.result import RULED_OUT, Coefficient, ForceTrace, JointForce, JointTerm
 from rigsight.discover.selection import Selection, criterion
 from rigsight.discover.support_starts import PlaceRegression
-from rigsight.discover.terms.library import Candidate, candidates, distinct, offered_effects
-from rigsight.discover.terms.monomials import LINEAR
 from rigsight.effects import Effect, Place, placed
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, IdleThreads, swallowed_by_offsets, without_offsets

@@ -15,8 +15,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.discover.joints.force_observer import Cases, Gains, cases_of, gains_of, smoothed, squares
-from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionEquations
+from rigsight.discover.force_observer import Cases, Gains, cases_of, gains_of, smoothed, squares
+from rigsight.discover.linearized_motion import LinearizedMotion, MotionEquations
 from rigsight.effects import Effect, placed
 from rigsight.effects.effect import Energy, GainTrend, Place, Signature, State
 from rigsight.records.record import Floats, Record

@@ -17,10 +17,10 @@ import numpy as np
 import sympy as sp
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
+from rigsight.discover.hysteresis import best_loop, is_loop
+from rigsight.discover.monomials import MONOMIALS
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected, Regressed, alike
-from rigsight.discover.terms.hysteresis import best_loop, is_loop
-from rigsight.discover.terms.monomials import MONOMIALS
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Place
