@@ -65,7 +65,7 @@ def test_another_declaration_is_regressed_without_new_code() -> None:
     force += np.random.default_rng(0).normal(scale=1e-3 * np.std(force), size=force.size)
     record = Record(name="run", dt=dt, signals={"u": x}, units={})
     motion = Motion(record, x, v, np.gradient(v, dt), x, x)
-    found = force_equation(law, [motion], Rows.weak(0.1), [force], {"n": 1.0}, np.random.default_rng(0))
+    found = force_equation(law, [motion], Rows(0.1), [force], {"n": 1.0}, np.random.default_rng(0))
     shown = {name for name, share in found.inclusion.items() if share > 0.9}
     assert shown == {"x'", "|x'| F^3"}
     assert found.coefficients["x'"] == pytest.approx(stiffness, rel=0.02)
@@ -89,6 +89,6 @@ def test_springs_act_about_the_rest_that_was_fitted(monkeypatch: pytest.MonkeyPa
         projected = Projected(np.ones((4, 1)), np.ones(4), 4.0)
         bench = Bench(AXIS, (), (), {**values, "x_off": rest}, {}, {}, frozenset())
         motion = Motion(Record("run", 1e-3, {"u": u}, {}), x - rest, v, acceleration, u, x - rest)
-        regressed = Regressed([motion], Rows.weak(0.1), projected, {}, driven=True)
+        regressed = Regressed([motion], Rows(0.1), projected, {}, driven=True)
         regressed_force(bench, fit, regressed, np.random.default_rng(0))
     np.testing.assert_allclose(seen[0], seen[1], rtol=1e-9)

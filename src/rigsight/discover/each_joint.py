@@ -242,15 +242,12 @@ def _joint_force(
     rig: Rig, force: MissingForce, selection: Selection, final: FitResult, included: Mapping[str, float]
 ) -> JointForce:
     motion, structure, name = force.motion, final.structure, force.motion.joint.name
-    law = {
-        effect: structure.values_of(effect, {**dict(structure.fixed), **final.values})
-        for effect in structure.effects
-        if effect.at == name
-    }
+    numbers = {**dict(structure.fixed), **final.values}
+    law = [(e, structure.values_of(e, numbers)) for e in structure.effects if e.at == name]
     units = rig.units_at(name)
     traces, n_measured = [], 0
     for i, record in enumerate(motion.records):
-        along = sum((force.along(e, own, i) for e, own in law.items()), start=np.zeros(record.n_samples))
+        along = sum((force.along(e, own, i) for e, own in law), start=np.zeros(record.n_samples))
         n_measured += sum(record.n_samples for signal in rig.outputs if signal.name in record)
         signals = (motion.displacement[i], motion.velocity[i], motion.force[i], motion.error[i])
         traces.append(ForceTrace(record.name, record.t, *signals, along))
@@ -260,7 +257,7 @@ def _joint_force(
     square = motion.remainder / n_measured
     there = [t for t in selection.trials if t.support and all(e.at == name for e in t.fit.structure.effects)]
     terms = []
-    for effect, own in law.items():
+    for effect, own in law:
         errors = {
             p.name: final.standard_errors.get(structure.parameter_name(effect, p.name), math.nan)
             for p in effect.parameters

@@ -100,13 +100,6 @@ def _filters_drive(effect: Effect) -> bool:
 
 def candidates(effects: Sequence[Effect], regressed: Regressed) -> list[Candidate]:
     """Return one candidate per effect, at the nonlinear parameters that explain most of the residual of the rig's own terms."""
-    plain = [effect for effect in effects if _is_plain(effect)]
-    found = []
-    for effect in plain:
-        (parameter,) = effect.parameters
-        shape = _slope(effect, parameter)
-        column = regressed.column(along(shape, {}, motion) for motion in regressed.motions)
-        found.append(Candidate(effect, {}, {parameter.name: 1.0}, column))
 
     def at_best_values(effect: Effect) -> Candidate | None:
         if not is_loop(effect):
@@ -114,9 +107,10 @@ def candidates(effects: Sequence[Effect], regressed: Regressed) -> list[Candidat
         loop = best_loop(effect, regressed)
         return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
 
-    others = [effect for effect in effects if effect not in plain]
-    fitted = regressed.threads.side_by_side(at_best_values, others)
-    return found + [best for best in fitted if best is not None]
+    # Of terms that the records do not distinguish the first one counts: a torque with one coefficient comes before others.
+    ordered = sorted(effects, key=lambda effect: not _is_plain(effect))
+    fitted = regressed.threads.side_by_side(at_best_values, ordered)
+    return [best for best in fitted if best is not None]
 
 
 def _best_inner(effect: Effect, regressed: Regressed) -> Candidate | None:

@@ -246,8 +246,8 @@ def strength(rig: Rig, record: Record) -> float:
 def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> Rows:
     """Return the form of the rows: windows for a rig whose angular frequency is ``1 / time``, or single points."""
     if pointwise:
-        return Rows.pointwise(max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
-    return Rows.weak(_WINDOW * 2.0 * np.pi * time)
+        return Rows(None, max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
+    return Rows(_WINDOW * 2.0 * np.pi * time)
 
 
 def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], rows: Rows) -> Projected:
