@@ -105,7 +105,7 @@ def missing_forces(
     effects: Sequence[Effect] = (),
     threads: IdleThreads | None = None,
 ) -> dict[str, MissingForce]:
-    """Return the force missing at each joint alone, by its name.
+    """Return the force missing at each joint alone, by its name; not at one at which it runs away.
 
     The values are constants and parameters of the rig and of the effects, the noise is the floor of each output, and the fitted
     parameters are those whose influence is projected out.
@@ -116,12 +116,16 @@ def missing_forces(
         raise SimulationError(
             f"The missing forces of {rig.name} cannot be found from its responses linearized about these records ({error})."
         ) from error
-    return {
+    found = {
         motion.joint.name: MissingForce(
             motion, _regressed(motion, threads or IdleThreads()), dict(values), tuple(fitted)
         )
         for motion in motions
+        if math.isfinite(motion.remainder)
     }
+    if not found:
+        raise SimulationError(f"The equations of {rig.name} cannot be linearized near these records.")
+    return found
 
 
 def _regressed(found: JointMotion, threads: IdleThreads) -> Regressed:
@@ -225,6 +229,8 @@ class EachJoint:
             key = tuple(effect.name for effect in others)
             if key not in found:
                 found[key] = self._forces(bench, records, final, others, final.free)
+            if joint.name not in found[key]:
+                continue
             force = found[key][joint.name]
             place, library, _ = force.place(bench.rig, represented)
             again = replace(
