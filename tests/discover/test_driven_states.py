@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from rigsight.discover.library import is_filter, offered_effects, states_along
 from rigsight.discover.motion import Motion
-from rigsight.discover.terms.library import is_filter, offered_effects, states_along
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.effect import State
 from rigsight.effects.symbols import u

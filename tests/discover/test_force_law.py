@@ -9,10 +9,11 @@ import pytest
 import sympy as sp
 
 from rigsight.discover.bench import Bench
-from rigsight.discover.ensembles import ForceLaw, force_equation, regressed_force
+from rigsight.discover.ensembles import ForceLaw, force_equation
+from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.motion import Motion, Rows
+from rigsight.discover.one_motion import regressed_force
 from rigsight.discover.regression import Projected, Regressed
-from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.effects.symbols import deflection_rate
 from rigsight.identify import FitResult
@@ -64,7 +65,7 @@ def test_another_declaration_is_regressed_without_new_code() -> None:
     force += np.random.default_rng(0).normal(scale=1e-3 * np.std(force), size=force.size)
     record = Record(name="run", dt=dt, signals={"u": x}, units={})
     motion = Motion(record, x, v, np.gradient(v, dt), x, x)
-    found = force_equation(law, [motion], Rows.weak(0.1), [force], {"n": 1.0}, np.random.default_rng(0))
+    found = force_equation(law, [motion], Rows(0.1), [force], {"n": 1.0}, np.random.default_rng(0))
     shown = {name for name, share in found.inclusion.items() if share > 0.9}
     assert shown == {"x'", "|x'| F^3"}
     assert found.coefficients["x'"] == pytest.approx(stiffness, rel=0.02)
@@ -78,7 +79,7 @@ def test_springs_act_about_the_rest_that_was_fitted(monkeypatch: pytest.MonkeyPa
     def kept(_law: ForceLaw, _motions: object, _rows: object, forces: list[np.ndarray], *_: object) -> None:
         seen.extend(forces)
 
-    monkeypatch.setattr("rigsight.discover.ensembles.force_equation", kept)
+    monkeypatch.setattr("rigsight.discover.one_motion.force_equation", kept)
     structure = compose(AXIS, [BOUC_WEN, effect_named("cubic_stiffness")])
     values = {"gain": 0.8, "m": 0.5, "d": 1.5, "k": 120.0, "x_off": 2e-3, "force_off": 0.0}
     values |= {"k_3": 4e5, "a": 0.25, "A": 1.0, "beta": 1200.0, "gamma": 500.0, "n": 1.0}
@@ -86,8 +87,8 @@ def test_springs_act_about_the_rest_that_was_fitted(monkeypatch: pytest.MonkeyPa
     x, v, acceleration, u = np.random.default_rng(0).normal(scale=5e-3, size=(4, 50))
     for rest in (0.0, 2e-3):
         projected = Projected(np.ones((4, 1)), np.ones(4), 4.0)
-        bench = Bench(AXIS, (), (), {**values, "x_off": rest}, {}, {}, frozenset(), {}, projected)
+        bench = Bench(AXIS, (), (), {**values, "x_off": rest}, {}, {}, frozenset())
         motion = Motion(Record("run", 1e-3, {"u": u}, {}), x - rest, v, acceleration, u, x - rest)
-        regressed = Regressed([motion], Rows.weak(0.1), projected, {}, driven=True)
+        regressed = Regressed([motion], Rows(0.1), projected, {}, driven=True)
         regressed_force(bench, fit, regressed, np.random.default_rng(0))
     np.testing.assert_allclose(seen[0], seen[1], rtol=1e-9)

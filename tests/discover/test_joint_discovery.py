@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery, RegressionData, discover
-from rigsight.effects import effect_named, placed
+from rigsight.effects import effect_named, kind_of, placed
 from rigsight.errors import InputError, SimulationError
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
@@ -29,8 +29,13 @@ Z_MAX = 4.5
 """Standard errors by which an estimate may be off: one in 10^5 by chance."""
 
 
-def campaign(rig: Rig, values: Mapping[str, float]) -> RegressionData:
-    structure = compose(rig, [placed(effect_named("quadratic_damping"), "motor_bearing")])
+DRAG = ("quadratic_damping@motor_bearing",)
+
+
+def campaign(rig: Rig, values: Mapping[str, float], effects: Sequence[str] = DRAG) -> RegressionData:
+    structure = compose(
+        rig, [placed(effect_named(kind_of(name)), name.partition("@")[2]) for name in effects]
+    )
     rng = np.random.default_rng(0)
     runs = []
     for i, (amplitude, role) in enumerate(((0.8, "estimation"), (1.5, "estimation"), (1.1, "validation"))):
@@ -85,13 +90,37 @@ def test_results_say_where(found: Discovery) -> None:
     assert "Missing at motor bearing" in svg_text(discovery_figure(found), "discovery.svg")
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effects", "values"),
+    [
+        (("cubic_stiffness@load_bearing", *DRAG), {"c_2": DAMPING, "k_3": 0.3}),
+        (
+            ("bouc_wen_hysteresis@load_bearing",),
+            {"k_l": 1.0, "a": 0.3, "A": 1.0, "beta": 2.0, "gamma": 1.0, "n": 1.0},
+        ),
+    ],
+    ids=["at two joints", "with memory"],
+)
+def test_further_laws_are_found_at_their_joints(
+    drive_train: Rig, effects: tuple[str, ...], values: dict[str, float]
+) -> None:
+    values = {**TRAIN, "k_t": 0.05, **values}
+    found = discover(campaign(drive_train, values, effects))
+    assert {f"{term.name}@{term.where}" for term in found.kept} == {*effects}
+    assert found.held_out_error < 1.1
+    for term in found.kept:
+        for name, coefficient in term.coefficients.items():
+            assert abs(coefficient.value - values[name]) < Z_MAX * coefficient.std, name
+
+
 def test_responses_that_cannot_be_regressed_are_told(
     drive_train: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def singular(*_: object) -> None:
         raise np.linalg.LinAlgError("Singular matrix")
 
-    monkeypatch.setattr("rigsight.discover.joints.joint_discovery.missing_forces", singular)
+    monkeypatch.setattr("rigsight.discover.each_joint.joint_motions", singular)
     data = campaign(drive_train, {**TRAIN, "k_t": 0.05, "c_2": DAMPING})
     with pytest.raises(
         SimulationError, match=r"missing forces of drive_train cannot be found .*Singular matrix"

@@ -1,4 +1,4 @@
-"""Is a missing force traced to the joint where it acts, with its law, on rigs of several joints and sensors?"""
+"""Does the regression of the force missing at each joint point to the joint where it acts, and to its law?"""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigsight.discover import missing_forces
+from rigsight.discover.each_joint import MissingForce, missing_forces
 from rigsight.effects import effect_named, placed
-from rigsight.errors import InputError
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, read_rig_file
 from rigsight.simulate import compose, simulate
@@ -21,6 +20,7 @@ DT, SECONDS = 5e-3, 4.0
 T = DT * np.arange(round(SECONDS / DT))
 TRAIN = {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
 RELATIVE_NOISE = 1e-3
+FITTED = tuple(name for name in TRAIN if name != "k_t")
 
 
 def sweep(amplitude: float, phase: float) -> np.ndarray:
@@ -65,27 +65,36 @@ def test_law_and_place_of_a_missing_force_are_found(
     drive_train: Rig, effect: str, parameter: str, value: float
 ) -> None:
     records, noise = measured(drive_train, effect, {**TRAIN, parameter: value}, (0.8, 1.5))
-    first, *others = missing_forces(drive_train, records, disturbed(TRAIN), noise)
-    (term,) = first.law.terms
-    assert term.effect.name == effect
-    assert term.values[parameter] == pytest.approx(value, rel=0.03)
-    assert first.share > 0.99
-    assert first.error_over_noise < 1.2
-    assert all(other.criterion > first.criterion for other in others)
-    assert first.parameters["J_l"] == pytest.approx(TRAIN["J_l"], rel=0.01)
+    # The parameters are off: what this adds to the forces is projected out.
+    found = missing_forces(drive_train, records, disturbed(TRAIN), noise, FITTED)
+    shares = {name: own for force in found.values() for name, own in shares_at(force, drive_train).items()}
+    best = max(shares, key=lambda name: shares[name][0])
+    assert best == effect
+    share, coefficient = shares[best]
+    assert share > 0.9
+    assert coefficient == pytest.approx(value, rel=0.1)
 
 
-@pytest.mark.slow
+def shares_at(force: MissingForce, rig: Rig) -> dict[str, tuple[float, float]]:
+    """Return the share of a missing force that each term explains, and its coefficient, by the name of the term."""
+    place, library, _ = force.place(rig, ())
+    explained = {c.name: place.projected.explained(c.column[:, None]) for c in library}
+    return {name: (share, float(weights[0])) for name, (weights, share) in explained.items()}
+
+
+def error_over_noise(force: MissingForce) -> float:
+    n_measured = sum(
+        r.n_samples * len(force.motion.followed.equations.structure.outputs) for r in force.motion.records
+    )
+    return float(np.sqrt(force.motion.remainder / n_measured))
+
+
 def test_a_joint_that_cannot_explain_all_sensors_contradicts_them(drive_train: Rig) -> None:
     values = {**TRAIN, "c_2": 1e-4}
     records, noise = measured(drive_train, "quadratic_damping@motor_bearing", values, (0.8, 1.5))
-    errors = {f.joint: f.error_over_noise for f in missing_forces(drive_train, records, TRAIN, noise)}
+    found = missing_forces(drive_train, records, TRAIN, noise, ())
+    errors = {name: error_over_noise(force) for name, force in found.items()}
     assert errors["motor_bearing"] < 1.2 < errors["shaft"]
-
-
-def test_without_records_nothing_is_traced(drive_train: Rig) -> None:
-    with pytest.raises(InputError, match="there is none"):
-        missing_forces(drive_train, [], TRAIN, {"motor_angle": 1.0, "load_angle": 1.0})
 
 
 PENDULUM = """
@@ -112,6 +121,8 @@ def test_a_missing_force_is_found_in_free_motion(tmp_path: Path) -> None:
         still = Record(f"from {begin}", DT, {"angle": np.zeros(T.size)}, {"angle": "rad"})
         run = simulate(structure, {**values, "c_2": 2e-3}, still, np.array([begin, 0.0]))
         records.append(run.with_signals(angle=run["angle"] + rng.normal(scale=1e-4, size=T.size)))
-    (force,) = missing_forces(rig, records, values, {"angle": 1e-4})
-    assert force.error_over_noise < 1.3
-    assert force.share > 0.9
+    # Free motion determines all parameters only up to a common factor: the inertia is held.
+    (force,) = missing_forces(rig, records, values, {"angle": 1e-4}, ("s", "d")).values()
+    assert error_over_noise(force) < 1.3
+    shares = shares_at(force, rig)
+    assert shares["quadratic_damping@pivot"][0] > 0.9 * max(share for share, _ in shares.values())

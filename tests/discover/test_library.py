@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rigsight.discover import RegressionData
+from rigsight.discover.library import candidates
 from rigsight.discover.motion import motion_of
 from rigsight.discover.regression import Regressed
-from rigsight.discover.terms.library import candidates
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
 

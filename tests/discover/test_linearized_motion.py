@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 
-from rigsight.discover.joints.linearized_motion import MotionEquations
+from rigsight.discover.linearized_motion import MotionEquations
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, simulate

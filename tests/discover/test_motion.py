@@ -32,7 +32,7 @@ def test_the_missing_force_is_seen_through_the_noise(noise: float, make_data: Ma
 def test_windows_give_the_derivatives_of_a_sine() -> None:
     dt, omega = 1e-3, 12.0
     t = dt * np.arange(4000)
-    rows = Rows.weak(0.05)
+    rows = Rows(0.05)
     own = windows(0.05, dt)
     middle = t[own.weights.shape[1] // 2 :][: t.size - own.weights.shape[1] + 1][:: own.step]
     # A window averages the sine; value and rate are averaged alike.

@@ -11,10 +11,11 @@ import pytest
 
 from rigsight.discover.assembly import doubts
 from rigsight.discover.bench import Attempt, Bench, Trial
+from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
 from rigsight.discover.result import Coefficient
 from rigsight.discover.selection import select
-from rigsight.discover.terms.library import Candidate
+from rigsight.discover.support_starts import PlaceRegression
 from rigsight.effects import effect_named
 from rigsight.identify import FitResult
 from rigsight.rigs import AXIS
@@ -28,8 +29,7 @@ def bench() -> Bench:
     """Return a bench of two terms, both with an exponent n."""
     column = np.zeros(10)
     library = {effect.name: Candidate(effect, {}, {}, column) for effect in (LOOP, POWER_LAW)}
-    projected = Projected(np.ones((10, 1)), column, 10.0)
-    return Bench(AXIS, (), (), {}, {}, {}, frozenset(), library, projected)
+    return Bench(AXIS, (), (), {}, {}, {}, frozenset(), library)
 
 
 @pytest.mark.parametrize("support", [{LOOP.name}, {LOOP.name, POWER_LAW.name}])
@@ -51,14 +51,15 @@ def test_the_search_releases_exponents_of_one_name(bench: Bench, monkeypatch: py
             free = tuple(self.free_parameters(structure))
             fit = FitResult(structure, True, "", {}, {}, (), 1.0, 1, 1, free, np.eye(len(free)), ())
             error = 5.0 - len(attempt.support) - 0.5 * len(attempt.release)
-            self.trials[attempt.key] = Trial(attempt.support, fit, error, rng.standard_normal(300))
+            self.trials[attempt.key] = Trial(attempt.support, fit, error, rng.standard_normal((300, 1)))
         return [self.trials[attempt.key] for attempt in attempts]
 
     monkeypatch.setattr(Bench, "trials_of", fitted)
     monkeypatch.setattr(Bench, "shortened", lambda *_: [])
     library = {c.effect.name: replace(c, column=rng.standard_normal(100)) for c in bench.candidates.values()}
     regression = Projected(np.ones((100, 1)), rng.standard_normal(100), 100.0)
-    best = select(replace(bench, candidates=library, projected=regression), lambda _: None).best
+    place = PlaceRegression(regression, tuple(library), lambda _: ({}, 1.0), longest=2)
+    best = select(replace(bench, candidates=library, places=[place]), lambda _: None).best
     assert best.support == {LOOP.name, POWER_LAW.name}
     assert best.fit.structure.fixed == ()
 

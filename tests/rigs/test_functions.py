@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rigsight.discover.joints.linearized_motion import MotionEquations
+from rigsight.discover.linearized_motion import MotionEquations
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 from rigsight.export.fixed_step import internal_step

@@ -59,7 +59,7 @@ def _quick() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("rigsight.discover.regression.N_ENSEMBLE", 2)
         patch.setattr(
-            "rigsight.discover.discovery.offered_effects", lambda *_: [effect_named("cubic_stiffness")]
+            "rigsight.discover.one_motion.offered_effects", lambda *_: [effect_named("cubic_stiffness")]
         )
         yield
 

@@ -2,11 +2,10 @@
 
 from rigsight.discover.discovery import METHODS as METHODS
 from rigsight.discover.discovery import discover as discover
-from rigsight.discover.joints.joint_force import JointForce as JointForce
-from rigsight.discover.joints.joint_force import missing_forces as missing_forces
-from rigsight.discover.joints.joint_motion import JointMotion as JointMotion
-from rigsight.discover.joints.joint_motion import joint_motions as joint_motions
+from rigsight.discover.joint_motion import JointMotion as JointMotion
+from rigsight.discover.joint_motion import joint_motions as joint_motions
+from rigsight.discover.monomials import MONOMIALS as MONOMIALS
+from rigsight.discover.monomials import known_terms as known_terms
 from rigsight.discover.regression import RegressionData as RegressionData
 from rigsight.discover.result import Discovery as Discovery
-from rigsight.discover.terms.monomials import MONOMIALS as MONOMIALS
-from rigsight.discover.terms.monomials import known_terms as known_terms
+from rigsight.discover.result import JointForce as JointForce

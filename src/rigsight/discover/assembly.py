@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from rigsight.discover.bench import Bench, Trial
-from rigsight.discover.ensembles import ForceEquation
-from rigsight.discover.regression import STRONG, RegressionData
-from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
+from rigsight.discover.bench import Trial
+from rigsight.discover.ensembles import Examined
+from rigsight.discover.monomials import known_terms
+from rigsight.discover.regression import STRONG, RegressionData, strength
+from rigsight.discover.result import RULED_OUT, Alternative, Coefficient, Discovery, JointForce, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
 from rigsight.effects import Effect
+from rigsight.effects.placed import AT, kind_of
 from rigsight.identify import FitResult
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.records.signals import same_signal
 from rigsight.simulate import Structure
 from rigsight.simulate.model import Model
@@ -91,8 +92,7 @@ class Found:
     chosen: Trial
     judged: Trial
     final: FitResult
-    inclusion: Mapping[str, float]
-    force: ForceEquation | None
+    examined: Examined
     same: Mapping[str, list[str]]
     held: str
 
@@ -121,13 +121,13 @@ def warnings_of(
     data: RegressionData, stages: Found, terms: Sequence[Term], floor: float, likeliest: str
 ) -> tuple[str, ...]:
     """Return the warnings for the user, one sentence each."""
-    selection, chosen, force = stages.selection, stages.chosen, stages.force
+    selection, chosen, force = stages.selection, stages.chosen, stages.examined.force
     found = [note for note in (stages.how, stages.held) if note]
-    source = data.rig.inputs[0].name
-    sizes = [float(np.std(record[source])) for record in stages.estimation]
+    sizes = [strength(data.rig, record) for record in stages.estimation]
     if max(sizes) < 1.2 * min(sizes):
         found.append(_one_amplitude(selection, chosen))
-    found += _same_input(source, stages.estimation, stages.held_out)
+    sources = [signal.name for signal in data.rig.inputs]
+    found += _same_input(sources, stages.estimation, stages.held_out) if sources else []
     best = criterion(chosen, selection.independent)
     rivals = [
         trial
@@ -156,7 +156,11 @@ def warnings_of(
             f"less: every omitted term is in doubt. Regression would select {likeliest} next, which proves nothing at this noise "
             f"level."
         )
-    found += still_missing(stages.judged.error_over_noise)
+    found += _still_missing(stages.judged.error_over_noise)
+    found += _ruled_out(stages.examined.joints, {effect.at for effect in stages.final.structure.effects})
+    unknown = [name for name, c in coefficients_of(stages.final).items() if not math.isfinite(c.std)]
+    if unknown and data.rig.mechanism.joints[1:]:
+        found.append(f"These records do not determine {', '.join(unknown)}.")
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
     if force is not None:
         fitted = {p.name for p in force.law.effect.parameters if p.fitted}
@@ -174,7 +178,20 @@ def warnings_of(
     return tuple(found)
 
 
-def still_missing(error_over_noise: float) -> list[str]:
+def _ruled_out(joints: Sequence[JointForce], own_joints: Collection[str | None]) -> list[str]:
+    """Return a warning about joints at which a force alone cannot explain the sensors; empty if terms act at several."""
+    least = min((joint.error_over_noise for joint in joints), default=0.0)
+    found = [joint.joint for joint in joints if joint.error_over_noise > RULED_OUT * least]
+    if not found or len(own_joints) > 1:
+        return []
+    first = joints[0]
+    return [
+        f"No force at {' or '.join(found)} alone explains the readings of all sensors; a force at {first.joint} explains them up "
+        f"to {first.error_over_noise:.2g} noise floors."
+    ]
+
+
+def _still_missing(error_over_noise: float) -> list[str]:
     """Return a warning about an error that the noise does not explain; empty if it does."""
     if error_over_noise <= _FLOOR:
         return []
@@ -184,14 +201,16 @@ def still_missing(error_over_noise: float) -> list[str]:
     ]
 
 
-def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Record]) -> list[str]:
+def _same_input(
+    sources: Sequence[str], estimation: Sequence[Record], held_out: Sequence[Record]
+) -> list[str]:
     """Return a warning about held-out records that have the same input as a fitted one."""
     twins = {
         record.name: fitted.name
         for record in held_out
         for fitted in estimation
         if math.isclose(record.dt, fitted.dt, rel_tol=_SAME_RATE)
-        and same_signal(record[source], fitted[source])
+        and all(same_signal(record[source], fitted[source]) for source in sources)
     }
     if not twins:
         return []
@@ -233,51 +252,58 @@ def _one_amplitude(selection: Selection, chosen: Trial) -> str:
     )
 
 
-def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, found: Found) -> Discovery:
+def assembled(data: RegressionData, method: str, form: str, found: Found) -> Discovery:
     """Return the result of a discovery: equations, terms with their doubts, alternatives, free runs, model."""
-    selection, output, error = found.selection, data.rig.outputs[0].name, found.judged.error_over_noise
-    terms = _terms(bench, found)
-    measured = np.concatenate([record[output] for record in found.held_out])
-    size = float(np.std(measured)) or 1.0
-    floor = data.noise[output] / size
-    likeliest = next(iter(next_terms(bench, found.chosen.support)), "")
-    return discovery_of(
-        data,
-        found.final,
-        (found.estimation, found.held_out),
-        method=method,
-        form="pointwise" if pointwise else "weak",
-        terms=terms,
-        alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
-        force_equation={} if found.force is None else dict(found.force.inclusion),
-        held_out_error=error,
-        held_out_nrmse=error * data.noise[output] / size,
-        noise_floor=floor,
-        independent=selection.independent,
-        runs=_runs(bench, found, output),
-        warnings=warnings_of(data, found, terms, floor, likeliest),
-    )
-
-
-def discovery_of(
-    data: RegressionData, final: FitResult, records: tuple[Sequence[Record], Sequence[Record]], **further: Any
-) -> Discovery:
-    """Return a discovery with all that its last fit and the fitted and the held-out records say, and further fields."""
-    rig, structure = data.rig, final.structure
-    text, latex = equations(structure, held_numbers(final))
+    rig, selection, final, judged = data.rig, found.selection, found.final, found.judged
+    terms, force = _terms(found), found.examined.force
+    error, floor = _relative(data, found)
+    likeliest = next(iter(next_terms(selection.bench, found.chosen.support)), "")
+    text, latex = equations(final.structure, held_numbers(final))
     own = {p.name for p in rig.parameters}
     return Discovery(
         title=data.campaign.title,
         rig=rig.name,
+        method=method,
+        form=form,
         equations=text,
         latex=latex,
         rig_parameters={name: c for name, c in coefficients_of(final).items() if name in own},
-        held_out=tuple(record.name for record in records[1]),
+        terms=terms,
+        alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
+        force_equation={} if force is None else dict(force.inclusion),
+        held_out=tuple(record.name for record in found.held_out),
+        held_out_error=judged.error_over_noise,
+        held_out_nrmse=error,
+        noise_floor=floor,
+        independent=selection.independent,
+        runs=_runs(data, found),
         output=rig.outputs[0].name,
         unit=rig.outputs[0].unit,
-        model=Model.of(structure, final.values, records[0][0].hold).to_json(),
-        **further,
+        model=Model.of(final.structure, final.values, found.estimation[0].hold).to_json(),
+        warnings=warnings_of(data, found, terms, floor, likeliest),
+        joints=found.examined.joints,
     )
+
+
+def _relative(data: RegressionData, found: Found) -> tuple[float, float]:
+    """Return held-out error and noise floor relative to the standard deviation of each output, RMS over the scored outputs."""
+    errors, floors = [], []
+    for column, name, floor in _scored(data, found):
+        spread = float(np.std(np.concatenate([r[name] for r in found.held_out if name in r]))) or 1.0
+        shown = column[np.isfinite(column)]
+        errors.append(float(np.sqrt(np.mean(shown**2))) * floor / spread)
+        floors.append(floor / spread)
+    return math.hypot(*errors) / math.sqrt(len(errors)), math.hypot(*floors) / math.sqrt(len(floors))
+
+
+def _scored(data: RegressionData, found: Found) -> list[tuple[Floats, str, float]]:
+    """Return the outputs with held-out errors: these in units of the noise floor, the name and the noise floor."""
+    columns = zip(found.judged.residuals.T, found.judged.fit.structure.rig.outputs, strict=True)
+    return [
+        (column, signal.name, data.noise[signal.name])
+        for column, signal in columns
+        if np.any(np.isfinite(column))
+    ]
 
 
 def coefficients_of(fit: FitResult) -> dict[str, Coefficient]:
@@ -286,25 +312,24 @@ def coefficients_of(fit: FitResult) -> dict[str, Coefficient]:
     return {name: Coefficient(fit.values[name], fit.standard_errors[name], units[name]) for name in fit.free}
 
 
-def _terms(bench: Bench, found: Found) -> tuple[Term, ...]:
+def _terms(found: Found) -> tuple[Term, ...]:
     structure, coefficients = found.final.structure, coefficients_of(found.final)
-    kept = {effect.name for effect in structure.effects}
+    inclusion, rigs_own = found.examined.inclusion, found.selection.bench.own_terms
     terms = []
-    for name in bench.own_terms:
+    for name in rigs_own:
         stays = name in coefficients
         own = {name: coefficients[name]} if stays else {}
-        terms.append(Term(name, "The rig's own.", stays, found.inclusion.get(name, 0.0), own))
+        terms.append(Term(name, "The rig's own.", stays, inclusion.get(name, 0.0), own))
     for effect in structure.effects:
         names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
         own = {name: coefficients[name] for name in names if name in coefficients}
-        terms.append(
-            Term(
-                effect.name, effect.summary, True, found.inclusion.get(effect.name, 0.0), own,
-                doubts(effect, own, found.inclusion.get(effect.name, 0.0), found.same.get(effect.name, [])),
-            )
-        )  # fmt: skip
-    rest = sorted(set(found.inclusion) - kept - set(bench.own_terms), key=lambda n: (-found.inclusion[n], n))
-    terms += [Term(n, bench.candidates[n].effect.summary, False, found.inclusion[n], {}) for n in rest]
+        share = inclusion.get(effect.name, 0.0)
+        doubt = doubts(effect, own, share, found.same.get(effect.name, []))
+        terms.append(Term(kind_of(effect.name), effect.summary, True, share, own, doubt, effect.at or ""))
+    known, kept = known_terms(), {*structure.effect_names, *rigs_own}
+    for name in sorted(set(inclusion) - kept, key=lambda n: (-inclusion[n], n)):
+        kind, _, place = name.partition(AT)
+        terms.append(Term(kind, known[kind].summary, False, inclusion[name], {}, where=place))
     return tuple(terms)
 
 
@@ -314,19 +339,14 @@ def _alternative(trial: Trial, selection: Selection) -> Alternative:
     return Alternative(tuple(sorted(trial.support)), trial.n_free, trial.error_over_noise, aic, bic)
 
 
-def _runs(bench: Bench, found: Found, output: str) -> tuple[Run, ...]:
-    """Return the free runs of the chosen model on the held-out records."""
-    ends = np.cumsum([record.n_samples for record in found.held_out])
-    parts = np.split(found.judged.residuals * bench.noise[output], ends[:-1])
+def _runs(data: RegressionData, found: Found) -> tuple[Run, ...]:
+    """Return the free runs of the chosen model on the held-out records, one for each scored output."""
+    ends = np.cumsum([record.n_samples for record in found.held_out])[:-1]
+    units = {signal.name: signal.unit for signal in data.rig.outputs}
+    errors = {name: np.split(column * floor, ends) for column, name, floor in _scored(data, found)}
     return tuple(
-        Run(
-            record.name,
-            record.role,
-            record.t,
-            record[output],
-            record[output] - error,
-            output,
-            bench.rig.outputs[0].unit,
-        )
-        for record, error in zip(found.held_out, parts, strict=True)
+        Run(r.name, r.role, r.t, r[name], r[name] - parts[i], name, units[name])
+        for i, r in enumerate(found.held_out)
+        for name, parts in errors.items()
+        if name in r
     )

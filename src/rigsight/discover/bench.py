@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
-from rigsight.discover.support_starts import SupportStarts
-from rigsight.discover.terms.library import Candidate
+from rigsight.discover.support_starts import PlaceRegression, SupportStarts
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, free_names
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
@@ -38,15 +38,21 @@ class Trial:
 
     support: Support  # names of the effects
     fit: FitResult  # output-error fit to the estimation records
-    error_over_noise: float  # RMS of the first output's held-out free-run error in units of the noise floor
-    # Held-out errors of the first output in units of the noise floor, all records one after the other; empty
-    # if a rough score was sufficient.
+    error_over_noise: float  # RMS of the held-out free-run error in units of the noise floors
+    # Held-out errors in units of the noise floors, all records one after the other, shape (n_samples, n_outputs); NaN
+    # where nothing was measured, empty if a rough score was sufficient.
     residuals: Floats
 
     @property
     def n_free(self) -> int:
         """Number of fitted parameters."""
         return len(self.fit.free)
+
+    @property
+    def shown(self) -> list[Floats]:
+        """Held-out errors of each output that was measured."""
+        columns = [column[np.isfinite(column)] for column in self.residuals.T]
+        return [column for column in columns if column.size]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,17 +95,18 @@ class _RoughTrial:
 class Bench:
     """Data and settings with which every support is polished and scored."""
 
-    rig: Rig  # the rig, reduced to its first output
-    # Records to fit and records to score, of the first output alone.
+    rig: Rig  # of one motion: the rig without what follows the motion
+    # Records to fit and records to score, of one motion with the first output alone.
     estimation: tuple[Record, ...]
     held_out: tuple[Record, ...]
-    values: Mapping[str, float]  # constants, and linear parameters as start values
+    values: Mapping[str, float]  # constants, and parameters without any term as start values
     # Size of each base quantity, noise floor of each output.
     scales: Mapping[str, float]
     noise: Mapping[str, float]
     held: frozenset[str]  # parameters of the rig that are not fitted
-    candidates: Mapping[str, Candidate]  # the library, by name
-    projected: Projected  # the regression
+    candidates: Mapping[str, Candidate] = field(default_factory=dict)  # the library, by name
+    places: Sequence[PlaceRegression] = ()  # the regression at each joint, or on the only motion
+    about: FitResult | None = None  # the equation whose residual is regressed; None for that without any term
     # Columns of the rig's own terms that compete (full form), by parameter.
     own_terms: Mapping[str, Floats] = field(default_factory=dict)
     # Threads that fit supports, and the records of a fit, in parallel.
@@ -110,21 +117,18 @@ class Bench:
     @property
     def starts(self) -> SupportStarts:
         """Start values of the fit of a support."""
-        return SupportStarts(self.rig, self.values, self.candidates, self.projected)
+        return SupportStarts(self.rig, self.values, self.candidates, self.places, self.about)
 
-    @property
-    def sparse(self) -> Projected:
-        """The regression without the competing terms among the columns that are projected out."""
+    def sparse(self, projected: Projected) -> Projected:
+        """Return a regression without the competing terms among the columns that are projected out."""
         if not self.own_terms:
-            return self.projected
+            return projected
         kept = [
             i
-            for i in range(self.projected.base.shape[1])
-            if not any(
-                np.array_equal(self.projected.base[:, i], column) for column in self.own_terms.values()
-            )
+            for i in range(projected.base.shape[1])
+            if not any(np.array_equal(projected.base[:, i], column) for column in self.own_terms.values())
         ]
-        return replace(self.projected, base=self.projected.base[:, kept])
+        return replace(projected, base=projected.base[:, kept])
 
     def column(self, name: str) -> Floats:
         """Return the column of a term, one of the library or of the rig's own."""
@@ -289,6 +293,7 @@ class Bench:
         score = trial.problem.fit(trial.fit.values, [], trial.score.initial_states, tolerance=tolerance)
         if not score.residuals:
             return Trial(trial.support, trial.fit, float("inf"), np.zeros(0))
-        output = self.rig.outputs[0].name
-        errors = np.concatenate([r[:, 0] for r in score.residuals]) / self.noise[output]
-        return Trial(trial.support, trial.fit, float(np.sqrt(np.mean(errors**2))), errors)
+        floors = [self.noise.get(signal.name, 1.0) for signal in trial.fit.structure.rig.outputs]
+        errors = np.concatenate(score.residuals) / floors
+        shown = errors[np.isfinite(errors)]
+        return Trial(trial.support, trial.fit, float(np.sqrt(np.mean(shown**2))), errors)

@@ -11,15 +11,11 @@ import numpy as np
 
 from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
-from rigsight.discover.ensembles import inclusion, regressed_force
-from rigsight.discover.joints.joint_discovery import discover_at_joints
-from rigsight.discover.motion import motion_of
-from rigsight.discover.regression import STRONG, Projected, Regressed, RegressionData, alike, own_terms, split
+from rigsight.discover.each_joint import EachJoint
+from rigsight.discover.one_motion import OneMotion
+from rigsight.discover.regression import STRONG, RegressionData, split
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import Selection, criterion, select
-from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import Candidate, candidates, offered_effects
-from rigsight.effects import Place
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import (
     FitResult,
@@ -28,16 +24,13 @@ from rigsight.identify import (
     characteristic_scales,
     linear_start,
     swallowed_by_offsets,
-    without_offsets,
 )
 from rigsight.records.record import Record
-from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, special_values
 
 Method = Literal["full", "discrepancy"]
 METHODS: tuple[Method, ...] = ("discrepancy", "full")
-_SAME_COLUMN = 0.999
 _FINAL_EVALUATIONS = 150
 _CLEARLY_OFF = 3.0
 """Standard errors from its special value at which an exponent is released."""
@@ -63,46 +56,34 @@ def discover(
             f"The rig '{data.rig.name}' has no joint, so no force is missing in it. Use 'rigsight diagnose', which tries effects "
             "of its sensors."
         )
-    if not data.rig.has_one_motion:
-        if method != "discrepancy" or pointwise:
-            raise InputError(
-                f"The rig '{data.rig.name}' has several joints: missing forces are found by regression on its responses, in the "
-                f"discrepancy form. The full form and point-wise rows are available only for rigs with one motion."
-            )
-        return discover_at_joints(data, seed, progress, n_jobs)
+    one_motion = data.rig.has_one_motion
+    if not one_motion and (method != "discrepancy" or pointwise):
+        raise InputError(
+            f"The rig '{data.rig.name}' has several joints: missing forces are found by regression on its responses, in the "
+            f"discrepancy form. The full form and point-wise rows are available only for rigs with one motion."
+        )
     say = progress or (lambda _: None)
     threads = IdleThreads(n_jobs)
     rng = np.random.default_rng(seed)
     estimation, held_out, how = split(data)
     values = _linear_values(data, estimation)
-    scales = characteristic_scales(data.rig, estimation, values)
-    output = data.rig.outputs[0].name
-    # Outputs that do not affect the motion would otherwise be simulated in every fit.
-    alone = tuple(_without_downstream(data.rig, record) for record in estimation)
-    swallowed, centered = _offsets_found(data, alone, values, scales, _held(data))
-    motions = threads.results(
-        lambda index: motion_of(data.rig, centered[index], values, data.noise[output]),
-        [record.n_samples for record in estimation],
-    )
-    say("motion smoothed")
-    regressed = Regressed.of(data.rig, data.has_stiffness, motions, scales, pointwise, threads)
-    projected = regressed.projected
-    library, same = _distinct(_library(data, regressed), projected)
-    say("library")
     bench = Bench(
-        rig=data.rig.motion_alone(),
-        estimation=alone,
+        rig=data.rig.motion_alone() if one_motion else data.rig,
+        # Outputs that do not affect the motion would otherwise be simulated in every fit.
+        estimation=tuple(_without_downstream(data.rig, record) for record in estimation),
         held_out=tuple(_without_downstream(data.rig, record) for record in held_out),
         values=values,
-        scales=scales,
+        scales=characteristic_scales(data.rig, estimation, values),
         noise=data.noise,
-        held=_held(data) | swallowed,
-        candidates={candidate.name: candidate for candidate in library},
-        projected=projected,
-        own_terms=own_terms(data.rig, data.has_stiffness, projected) if method == "full" else {},
+        held=_held(data),
         threads=threads,
     )
-    selection = select(bench, say)
+    front = (
+        OneMotion.of(data, bench, method == "full", pointwise) if one_motion else EachJoint.of(data, bench)
+    )
+    say("library")
+    selection = select(front.begun, say, front.about)
+    bench = selection.bench
     chosen = _without_damper(bench, selection, say)
     final, held = _polished(data, bench, chosen)
     # A record that was set aside is used in the final fit too: it is unseen only for the selection of the equation.
@@ -113,11 +94,10 @@ def discover(
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     say("polished")
-    included = inclusion(data, bench, selection, final, regressed, rng)
-    force = regressed_force(bench, final, regressed, rng)
+    examined = front.examined(bench, selection, final, rng)
     say("ensembles")
-    found = Found(estimation, held_out, how, selection, chosen, judged, final, included, force, same, held)
-    return assembled(data, method, pointwise, bench, found)
+    found = Found(estimation, held_out, how, selection, chosen, judged, final, examined, front.same, held)
+    return assembled(data, method, "pointwise" if pointwise else front.form, found)
 
 
 def _linear_values(data: RegressionData, estimation: Sequence[Record]) -> dict[str, float]:
@@ -130,6 +110,8 @@ def _linear_values(data: RegressionData, estimation: Sequence[Record]) -> dict[s
 
 def _held(data: RegressionData) -> frozenset[str]:
     """Return parameters held during selection: those without effect on the motion, and constant force or rest position."""
+    if not data.rig.has_one_motion:
+        return frozenset({p.name for p in data.rig.parameters if not p.fitted} | {*data.held})
     motion = data.rig.motion
     held = {*data.rig.downstream_parameters, *data.held}
     if data.rig.is_driven:
@@ -141,64 +123,20 @@ def _held(data: RegressionData) -> frozenset[str]:
     return frozenset(held)
 
 
-def _offsets_found(
-    data: RegressionData,
-    records: Sequence[Record],
-    values: Mapping[str, float],
-    scales: Mapping[str, float],
-    held: frozenset[str],
-) -> tuple[frozenset[str], Sequence[Record]]:
-    """Return the parameters that the records' offsets can replace, and the records without the offsets of a first fit."""
-    if not any(record.free_offsets for record in records):
-        return frozenset(), records
-    structure = compose(data.rig.motion_alone())
-    asked = [p.name for p in data.rig.parameters if p.name in structure.names and p.name not in held]
-    known = {name: values[name] for name in structure.names}
-    swallowed = frozenset(swallowed_by_offsets(structure, records, scales, data.noise, known, asked))
-    free = [name for name in asked if name not in swallowed]
-    fit = GreyBoxFit(structure, records, scales, data.noise).fit(known, free, finish=False)
-    return swallowed, without_offsets(records, fit)
-
-
 def _without_downstream(rig: Rig, record: Record) -> Record:
     """Return a record without the outputs that do not affect the motion."""
+    if not rig.has_one_motion:
+        return record
     keep = {rig.inputs[0].name, rig.outputs[0].name}
     return replace(record, signals={name: s for name, s in record.signals.items() if name in keep})
-
-
-def _library(data: RegressionData, regressed: Regressed) -> list[Candidate]:
-    effects = offered_effects(data.rig, data.has_stiffness)
-    if all(is_constant(motion.u) for motion in regressed.motions):
-        effects = [effect for effect in effects if effect.place is not Place.ACTUATOR]
-    found = candidates(effects, regressed)
-    return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
-
-
-def _distinct(
-    library: Sequence[Candidate], projected: Projected
-) -> tuple[list[Candidate], dict[str, list[str]]]:
-    """Leave out terms that these records do not distinguish from an earlier one; return the rest, and the terms each replaces."""
-    if not library:
-        return [], {}
-    columns = np.column_stack([candidate.column for candidate in library])
-    stands_for: dict[str, list[str]] = {}
-    dropped: set[int] = set()
-    for i, j, _ in alike(projected, columns, _SAME_COLUMN):
-        # A loop may degenerate to friction or damping, but not vice versa: the simpler term represents it.
-        loops = [is_loop(library[k].effect) for k in (i, j)]
-        first, second = (j, i) if loops == [True, False] else (i, j)
-        if first not in dropped and second not in dropped:
-            dropped.add(second)
-            stands_for.setdefault(library[first].name, []).append(library[second].name)
-    return [candidate for i, candidate in enumerate(library) if i not in dropped], stands_for
 
 
 def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], None]) -> Trial:
     """In the full form, leave out the rig's own damper if the held-out error does not rise significantly without it."""
     chosen = selection.best
-    damping = bench.rig.motion.damping.name
-    if damping not in bench.own_terms:
+    if not bench.own_terms:
         return chosen
+    damping = bench.rig.motion.damping.name
     special = {(e.name, own) for e in chosen.fit.structure.effects for own in e.special_cases}
     without = bench.trial(
         Attempt(
@@ -223,7 +161,7 @@ def _polished(data: RegressionData, bench: Bench, chosen: Trial) -> tuple[FitRes
     rig = data.rig
     free = set(chosen.fit.free)
     measured = {name for record in records for name in record.signals}
-    if any(symbol.name in measured for symbol in rig.downstream):
+    if rig.has_one_motion and any(symbol.name in measured for symbol in rig.downstream):
         start = {p: bench.values[p] for p in compose(rig).names}
         free |= rig.downstream_parameters
         free -= set(

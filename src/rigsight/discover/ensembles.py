@@ -11,31 +11,24 @@ noise levels at which the loop itself is still found.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from rigsight.discover.bench import Bench
+from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.motion import Motion, Rows
-from rigsight.discover.regression import (
-    Projected,
-    Regressed,
-    RegressionData,
-    inclusion_probabilities,
-    own_regression,
-    own_terms,
-)
+from rigsight.discover.regression import Projected, inclusion_probabilities
+from rigsight.discover.result import JointForce
 from rigsight.discover.selection import Selection, proposals
-from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import along, candidates
+from rigsight.discover.support_starts import PlaceRegression
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats
-from rigsight.rigs import evaluated
 from rigsight.simulate.printing.notation import TermPrinter
 
 _FORCE = sp.Symbol("F", real=True)
@@ -136,105 +129,46 @@ def _name(term: sp.Expr) -> str:
 
 
 _ENSEMBLE_TERMS = 6
-_SAME_REST = 1e-5
-"""Shift of the rest position, in units of the motion, below which the columns do not change."""
 
 
-def inclusion(
-    data: RegressionData,
-    bench: Bench,
-    selection: Selection,
-    final: FitResult,
-    regressed: Regressed,
-    rng: np.random.Generator,
-) -> dict[str, float]:
-    """Return the inclusion probability of the most likely terms, and of the rig's own in the full form.
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """What the regression says of the final equations."""
 
-    The columns are computed about the rest position of the polished equation: about any other, a cubic spring has a quadratic
-    part.
-    """
+    inclusion: Mapping[str, float]  # inclusion probability of the most likely terms, by name
+    force: ForceEquation | None = None  # of the hysteretic force
+    joints: tuple[JointForce, ...] = ()  # the force missing at each joint of several
+
+
+def most_likely(bench: Bench, place: PlaceRegression, selection: Selection, final: FitResult) -> list[str]:
+    """Return the names of the terms at a place that compete in an ensemble: the kept ones, and the best others."""
     polished = [name for trial in selection.trials for name in sorted(trial.support)]
     proposed = [name for support in proposals(bench) for name in sorted(support)]
-    shares = {n: bench.projected.explained(c.column[:, None])[1] for n, c in bench.candidates.items()}
+    shares = {n: place.projected.explained(bench.candidates[n].column[:, None])[1] for n in place.offered}
     ranked = sorted(shares, key=lambda name: -shares[name])
     kept = set(final.structure.effect_names)
     # An effect that contains a selected one as a special case explains the same, and would only split its share of the draws.
-    offered_terms = [
+    names = [
         name
         for name in dict.fromkeys((*polished, *proposed, *ranked))
-        if name in kept or not kept & _ancestors(bench, name)
+        if name in shares and (name in kept or not kept & _ancestors(bench, name))
     ]
-    names = offered_terms[:_ENSEMBLE_TERMS]
-    shift = _rest_shift(bench, final)
-    if abs(shift) < _SAME_REST * bench.scales["x"]:
-        shift = 0.0
-    library = [bench.candidates[name] for name in names]
-    if shift:
-        moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in regressed.motions]
-        projected = own_regression(data.rig, data.has_stiffness, moved, regressed.rows)
-        # The columns of loops do not depend on the rest position.
-        loops = [candidate for candidate in library if is_loop(candidate.effect)]
-        effects = [candidate.effect for candidate in library if not is_loop(candidate.effect)]
-        library = loops + candidates(effects, replace(regressed, motions=moved, projected=projected))
-    else:
-        projected = bench.projected
-    own_columns = own_terms(data.rig, data.has_stiffness, projected) if bench.own_terms else {}
-    again = replace(
-        bench,
-        candidates={candidate.name: candidate for candidate in library},
-        projected=projected,
-        own_terms=own_columns,
-    )
-    offered = [*own_columns, *again.candidates]
+    return names[:_ENSEMBLE_TERMS]
+
+
+def inclusion(
+    bench: Bench, place: PlaceRegression, names: Sequence[str], rng: np.random.Generator
+) -> dict[str, float]:
+    """Return the inclusion probability of terms at a place, and of the rig's own in the full form."""
+    offered = [*bench.own_terms, *names]
     if not offered:
         return {}
-    columns = np.column_stack([again.column(name) for name in offered])
-    found = inclusion_probabilities(again.sparse, columns, rng)
+    columns = np.column_stack([bench.column(name) for name in offered])
+    found = inclusion_probabilities(bench.sparse(place.projected), columns, rng)
     return dict(zip(offered, map(float, found), strict=True))
-
-
-def regressed_force(
-    bench: Bench, final: FitResult, regressed: Regressed, rng: np.random.Generator
-) -> ForceEquation | None:
-    """Regress the equation of the hysteretic force, the residual of the polished model's other forces along the motion."""
-    rig, values = bench.rig, {**dict(final.structure.fixed), **final.values}
-    laws = [law for law in map(ForceLaw.of, final.structure.effects) if law is not None]
-    if not laws or not rig.is_driven:
-        return None
-    law = laws[0]
-    others = [effect for effect in final.structure.effects if effect is not law.effect]
-    if any(effect.torque is None for effect in others):
-        return None
-    motion = rig.motion
-    gain, bias, inertia, damping, stiffness = (
-        evaluated(part, values)
-        for part in (motion.drive_gain, motion.bias, motion.inertia, motion.damping, motion.stiffness)
-    )
-    own_values = final.structure.values_of(law.effect, values)
-    assert law.effect.post_yield_stiffness_ratio is not None
-    without_memory = own_values[law.effect.post_yield_stiffness_ratio] * stiffness
-    # Springs act about the polished rest position, not about the one about which the motion was smoothed.
-    shift = _rest_shift(bench, final)
-    moved = [replace(own, x=own.x - shift) for own in regressed.motions]
-    forces = []
-    for own in moved:
-        force = gain * own.u + bias - inertia * own.acceleration
-        force -= damping * own.v + without_memory * own.x
-        for effect in others:
-            force -= along(effect.torque, final.structure.values_of(effect, values), own)
-        forces.append(force)
-    return force_equation(law, moved, regressed.rows, forces, own_values, rng)
 
 
 def _ancestors(bench: Bench, name: str) -> set[str]:
     """Return the effects that are special or limiting cases of a term, and recursively their special cases."""
     parents = [parent for parent in bench.candidates[name].effect.parents if parent in bench.candidates]
     return set(parents).union(*(_ancestors(bench, parent) for parent in parents))
-
-
-def _rest_shift(bench: Bench, final: FitResult) -> float:
-    """Return the distance of the polished rest position from the one about which the motion was smoothed."""
-    motion = bench.rig.motion
-    if not bench.rig.is_driven:
-        return 0.0
-    return sum(final.values[s.name] - bench.values[s.name] for s in motion.rest.free_symbols)

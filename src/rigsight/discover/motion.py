@@ -179,16 +179,6 @@ class Rows:
     width: float | None  # width of the windows [s]; None for point-wise rows
     step: int = 1  # samples from row to row of point-wise rows
 
-    @classmethod
-    def weak(cls, width: float) -> Rows:
-        """Make windows of `width` [s]."""
-        return cls(width)
-
-    @classmethod
-    def pointwise(cls, step: int = 1) -> Rows:
-        """Make a row of every `step`-th sample."""
-        return cls(None, step)
-
     def of(self, signal: Floats, dt: float) -> Floats:
         """Return the rows of a signal of shape (n_samples,)."""
         return signal[:: self.step] if self.width is None else windows(self.width, dt).against(signal, 0)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -222,12 +222,7 @@ def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...],
     if validation:
         return estimation, validation, ""
     if len(estimation) > 1:
-        names = [signal.name for signal in data.rig.inputs or data.rig.outputs]
-
-        def strength(record: Record) -> float:
-            return float(np.sqrt(sum(np.var(record[name]) for name in names if name in record)))
-
-        middle = sorted(estimation, key=strength)[len(estimation) // 2]
+        middle = sorted(estimation, key=partial(strength, data.rig))[len(estimation) // 2]
         rest = tuple(record for record in estimation if record is not middle)
         return (
             rest,
@@ -242,11 +237,17 @@ def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...],
     )
 
 
+def strength(rig: Rig, record: Record) -> float:
+    """Return the size of the inputs of a record, or of the outputs of a rig without inputs."""
+    names = [signal.name for signal in rig.inputs or rig.outputs]
+    return float(np.sqrt(sum(np.var(record[name]) for name in names if name in record)))
+
+
 def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> Rows:
     """Return the form of the rows: windows for a rig whose angular frequency is ``1 / time``, or single points."""
     if pointwise:
-        return Rows.pointwise(max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
-    return Rows.weak(_WINDOW * 2.0 * np.pi * time)
+        return Rows(None, max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
+    return Rows(_WINDOW * 2.0 * np.pi * time)
 
 
 def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], rows: Rows) -> Projected:

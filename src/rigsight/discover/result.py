@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from rigsight.discover.joints.joint_force import JointForce
+from rigsight.effects import Effect, kind_of
 from rigsight.json_data import json_data
 from rigsight.records import Record
 from rigsight.records.record import Floats
 
 SCHEMA_VERSION = 1
+RULED_OUT = 3.0
+"""Factor over the smallest sensor residual (RMS) of all joints above which a force at a joint alone is not the cause."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,98 @@ class Run:
     simulated: Floats
     output: str
     unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class ForceTrace:
+    """The missing force of a joint along one record, shape (n_samples,) each."""
+
+    record: str
+    t: Floats  # time [s]
+    displacement: Floats  # of the joint from its rest, as its velocity
+    velocity: Floats
+    force: Floats  # resists the joint
+    standard_error: Floats
+    law: Floats  # the force according to the law
+
+
+@dataclass(frozen=True, eq=False)
+class JointTerm:
+    """A term of the law of a missing force."""
+
+    effect: Effect  # at its joint
+    coefficients: Mapping[str, Coefficient]  # its parameters by their own names
+    inclusion: float | None  # as of `Term`; None if the term did not compete
+
+    @property
+    def text(self) -> str:
+        """The term in words, with its parameter values."""
+        kind = kind_of(self.effect.name).replace("_", " ")
+        numbers = ", ".join(f"{name} = {c.value:.3g} {c.unit}" for name, c in self.coefficients.items())
+        if self.effect.torque is None:
+            return f"that of {kind} ({numbers})"
+        shape = str(self.effect.torque).replace("**", "^").replace("*", " ")
+        return f"{shape} ({kind}: {numbers})"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of a file."""
+        return {
+            "name": kind_of(self.effect.name),
+            "where": self.effect.at,
+            "coefficients": {
+                name: {"value": c.value, "std": c.std if math.isfinite(c.std) else None, "unit": c.unit}
+                for name, c in self.coefficients.items()
+            },
+            "inclusion_probability": self.inclusion,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class JointForce:
+    """The force missing at one joint.
+
+    At a joint with terms of the equation that beside its other terms, at any other joint the force if all that is missing acted
+    there alone.
+    """
+
+    joint: str  # its name
+    x_unit: str  # of its motion
+    unit: str  # of the force
+    traces: tuple[ForceTrace, ...]  # force and motion, per record
+    # Share of the weighted square of the free-run errors without any term that the force explains; all sensors together.
+    share: float
+    # Remaining sensor residual, RMS in units of the noise floors; far above 1, a force at this joint alone is not the cause.
+    error_over_noise: float
+    standard_error: float  # RMS of that of the force
+    terms: tuple[JointTerm, ...]  # its law: the terms of the equation that act there
+    share_of_force: float  # of the force's mean square that they explain
+    # Of the best equation with terms at this joint alone, as the BIC of an alternative; None if there is none.
+    criterion: float | None
+
+    @property
+    def sentence(self) -> str:
+        """The finding in words."""
+        if not self.terms:
+            remainder = f"{self.error_over_noise:.3g} times the noise floor"
+            return f"No term acts at {self.joint}: a force there alone would leave {remainder}."
+        reported = " and ".join(term.text for term in self.terms)
+        return (
+            f"The force missing at {self.joint} is best described by {reported}, which explains {self.share_of_force:.0%} (x and "
+            f"v of the joint)."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of a file, without the traces."""
+        return {
+            "where": self.joint,
+            "share": self.share,
+            "error_in_noise_floors": self.error_over_noise,
+            "standard_error": {"value": self.standard_error, "unit": self.unit},
+            "criterion": self.criterion,
+            "terms": [term.to_json() for term in self.terms],
+            "share_of_force": self.share_of_force,
+            "sentence": self.sentence,
+        }
 
 
 @dataclass(frozen=True, eq=False)

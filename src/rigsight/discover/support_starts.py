@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 
+from rigsight.discover.hysteresis import is_loop
+from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
-from rigsight.discover.terms.hysteresis import is_loop
-from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats
 from rigsight.rigs import Rig, evaluated
+from rigsight.rigs.rig import joint_of
 from rigsight.simulate import Structure, carried_over
 
 _SMALL = 1e-3
@@ -20,28 +22,47 @@ _SMALL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
+class PlaceRegression:
+    """What is regressed at a joint of a rig, or on the only motion of a rig."""
+
+    projected: Projected
+    offered: tuple[str, ...]  # names of the terms that have a column
+    # The rig's parameters from the coefficients of its own terms, and the force per unit of the other coefficients.
+    rig_values: Callable[[Floats], tuple[dict[str, float], float]]
+    longest: int  # number of terms that are proposed together at most
+
+
+@dataclass(frozen=True, eq=False)
 class SupportStarts:
     """Start values of supports."""
 
     rig: Rig
-    values: Mapping[str, float]  # constants, and linear parameters
+    values: Mapping[str, float]  # constants and parameters without any term
     candidates: Mapping[str, Candidate]  # the library, by name
-    projected: Projected  # the regression
+    places: Sequence[PlaceRegression]
+    about: FitResult | None  # the equation whose residual is regressed; None for that without any term
 
     def regressed(self, structure: Structure, support: frozenset[str]) -> dict[str, float]:
         """Return the values of the regression for a support, in SI."""
-        chosen = [self.candidates[name] for name in sorted(support)]
-        columns = (
-            np.column_stack([c.column for c in chosen])
-            if chosen
-            else np.zeros((self.projected.target.size, 0))
-        )
-        solution, _ = self.projected.solved(columns)
-        values, force = _rig_values(self.rig, self.values, solution[: self.projected.base.shape[1]])
-        for candidate, coefficient in zip(
-            chosen, solution[self.projected.base.shape[1] :] * force, strict=True
-        ):
-            values |= self._effect_values(structure, candidate, float(coefficient), values)
+        values = dict(self.values)
+        for place in self.places:
+            chosen = [self.candidates[name] for name in sorted(support & {*place.offered})]
+            # Beside other joints a joint without a term says nothing about the rig.
+            if not chosen and len(self.places) > 1:
+                continue
+            columns = [candidate.column for candidate in chosen]
+            solution, _ = place.projected.solved(
+                np.column_stack([np.zeros((place.projected.target.size, 0)), *columns])
+            )
+            n_own = place.projected.base.shape[1]
+            own, force = place.rig_values(solution[:n_own])
+            values |= own
+            for candidate, coefficient in zip(chosen, solution[n_own:] * force, strict=True):
+                values |= self._effect_values(structure, candidate, float(coefficient), values)
+        if self.about is not None:
+            known = {effect.name for effect in self.about.structure.effects}
+            carried = carried_over(self.about.values, self.about.structure, structure)
+            values |= carried if support <= known else {n: v for n, v in carried.items() if n not in values}
         return _within_bounds(structure, values)
 
     def extended(self, structure: Structure, support: frozenset[str], shorter: FitResult) -> dict[str, float]:
@@ -53,8 +74,9 @@ class SupportStarts:
         values = self.regressed(structure, support)
         carried = carried_over(shorter.values, shorter.structure, structure)
         added = [effect for effect in structure.effects if effect not in shorter.structure.effects]
-        if any(is_loop(effect) for effect in added):
-            carried.pop(self.rig.motion.stiffness.name)
+        for effect in added:
+            if is_loop(effect):
+                carried.pop(str(joint_of(self.rig, effect).stiffness), None)
         for effect in added:
             for parameter in effect.parameters:
                 if parameter.name in self.candidates[effect.name].linear and parameter.null is not None:
@@ -71,10 +93,11 @@ class SupportStarts:
         found: dict[str, float] = {}
         if is_loop(effect):
             assert effect.post_yield_stiffness_ratio is not None
-            stiffness = self.rig.motion.stiffness.name
-            without = max(values[stiffness], _SMALL * coefficient)
+            stiffness = joint_of(self.rig, effect).stiffness
+            without = max(evaluated(stiffness, values), _SMALL * coefficient)
             total = without + max(coefficient, _SMALL * without)
-            found[stiffness] = total
+            # A stiffness that is no parameter of its own is left to the fit.
+            found |= {stiffness.name: total} if isinstance(stiffness, sp.Symbol) else {}
             own[effect.post_yield_stiffness_ratio] = without / total
         for parameter in effect.parameters:
             if parameter.name in candidate.linear and parameter.lower == 0.0:
@@ -94,7 +117,9 @@ def _within_bounds(structure: Structure, values: Mapping[str, float]) -> dict[st
     }
 
 
-def _rig_values(rig: Rig, known: Mapping[str, float], base: Floats) -> tuple[dict[str, float], float]:
+def values_of_one_motion(
+    rig: Rig, known: Mapping[str, float], base: Floats
+) -> tuple[dict[str, float], float]:
     """Return the rig's parameters from the coefficients of its own terms, and the force per unit of the other coefficients."""
     values = dict(known)
     motion = rig.motion

@@ -66,7 +66,7 @@ def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
     motions = ((x, joint.x_unit, "x"), (v, "1/s" if joint.x_unit == "1" else f"{joint.x_unit}/s", "v"))
     for ax, (motion, motion_unit, symbol) in zip(axes, motions, strict=True):
         scale, shown_unit = shown_in(motion_unit, motion)
-        drawn = [(force, MEASURED, "missing"), (law, WITH_EFFECT, "law")][: 2 if joint.law.terms else 1]
+        drawn = [(force, MEASURED, "missing"), (law, WITH_EFFECT, "law")][: 2 if joint.terms else 1]
         for values, color, label in drawn:
             ax.plot(
                 scale * motion[some], factor * values[some], ".", color=color, markersize=1.0, label=label

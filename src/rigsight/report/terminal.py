@@ -185,7 +185,7 @@ def _term(term: Term) -> str:
 
 
 def _joint(joint: JointForce) -> str:
-    law = " and ".join(term.text for term in joint.law.terms) or "not a function of the motion"
+    law = " and ".join(term.text for term in joint.terms) or "no term acts there"
     explained = f"explains {100 * joint.share:.4g} % of the sensor errors"
     return f"{explained}, leaves {joint.error_over_noise:.3g} x floor: {law}"
 

@@ -1,9 +1,8 @@
 """Motion and unknown force that agree best with the sensors: Kalman filter and smoother about a reference motion.
 
 The unknown force is a state of the structure, an integrated random walk. Many cases (joints, records, intensities of the walk)
-are filtered side by side. Other possible causes (a changed parameter, a force with a known time history) pass through the same
-filter as further columns: these are then whitened, and ordinary least squares on them is the maximum likelihood estimate with the
-unknown force marginalized.
+are filtered side by side. Changes of parameters pass through the same smoother as further columns, because it is linear: they
+show how the estimated motion and force would change with each parameter.
 
 References
 ----------
@@ -13,19 +12,14 @@ states; P. de Jong, Ann. Stat. 19 (1991) 1073, for the further columns.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.joints.linearized_motion import LinearizedMotion
+from rigsight.discover.linearized_motion import LinearizedMotion
 from rigsight.records.record import Floats
-
-Rows = Callable[[int, int, Floats], None]
-"""Called with sample, sensor and whitened rows, shape (n_cases, n_intensities, n_columns)."""
-AtSample = Callable[[int], Floats]
-"""Columns of one sample: shape (n_cases, n_states, n_columns) or (n_cases, n_outputs, n_columns)."""
 
 _EVENED = 64
 """Samples after which the covariance is made symmetric again, which rounding errors disturb."""
@@ -46,18 +40,11 @@ class Cases:
     drive: Floats
     # Direct part of each column in the readings, shape (n_samples, n_cases, n_outputs, n_columns).
     data: Floats
-    measured: NDArray[np.bool_]  # true where a sensor was read, shape (n_samples, n_cases, n_outputs)
     start: Floats  # covariance of the first state, shape (n_cases, n_states, n_states)
     # Covariance that an intensity of one adds from sample to sample, shape (n_cases, n_states, n_states).
     walk: Floats
-    # Directions in which the state may jump after some samples, shape (n_samples - 1, n_cases, n_states, n_directions).
-    jump: Floats
+    jump: Floats  # directions in which the state may jump after some samples, shape (n_states, n_directions)
     jumps: NDArray[np.bool_]  # true for the samples after which it may, shape (n_samples, n_cases)
-
-    @property
-    def n_measured(self) -> NDArray[np.int_]:
-        """Number of measured values of each case, shape (n_cases,)."""
-        return np.asarray(np.count_nonzero(self.measured, axis=(0, 2)))
 
 
 def cases_of(
@@ -67,7 +54,6 @@ def cases_of(
     forces: Sequence[tuple[int, int]],
     breadth: float,
     jumps: Sequence[NDArray[np.bool_] | None],
-    lasting: bool,
 ) -> Cases:
     """Bring linearized motions into one form; the first column is the measured residual, the others are the parameters."""
     longest = max(motion.residual.shape[0] for motion in motions)
@@ -77,13 +63,11 @@ def cases_of(
     seen = np.zeros((longest, n_cases, n_outputs, n))
     drive = np.zeros((longest - 1, n_cases, n, n_columns))
     data = np.zeros((longest, n_cases, n_outputs, n_columns))
-    measured = np.zeros((longest, n_cases, n_outputs), dtype=bool)
     walk = np.zeros((n_cases, n, n))
     leaps = np.zeros((longest, n_cases), dtype=bool)
     for case, (motion, size, own_jumps) in enumerate(zip(motions, sizes, jumps, strict=True)):
         count = motion.residual.shape[0]
         known = np.isfinite(motion.residual)
-        measured[:count, case] = known
         transition[: count - 1, case] = motion.transition * (size[None, :] / size[:, None])
         seen[:count, case] = np.where(known[:, :, None], motion.seen * size / noise[:, None], 0.0)
         drive[: count - 1, case, :, 0] = motion.defect / size
@@ -100,13 +84,8 @@ def cases_of(
             unit = np.array([size[force], size[rate]])
             walk[case][np.ix_([force, rate], [force, rate])] = own * size[rate] ** 2 / np.outer(unit, unit)
     start = np.tile(breadth**2 * np.eye(n), (n_cases, 1, 1))
-    own_forces = [force for force, _ in forces]
-    if lasting:
-        jump = np.tile(np.eye(n)[:, own_forces], (longest - 1, n_cases, 1, 1))
-    else:
-        jump = transition[..., own_forces].copy()
-        jump[:, :, np.ravel(forces)] = 0.0
-    return Cases(transition, seen, drive, data, measured, start, walk, jump, leaps)
+    jump = np.eye(n)[:, [force for force, _ in forces]]
+    return Cases(transition, seen, drive, data, start, walk, jump, leaps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,49 +127,54 @@ def gains_of(cases: Cases, intensities: Floats, keep: bool = False) -> Gains:
             step = cases.transition[k][:, None]
             spread = step @ spread @ np.swapaxes(step, -1, -2) + walk
             if np.any(cases.jumps[k]):
-                ways = cases.jump[k] * cases.jumps[k][:, None, None]
+                ways = cases.jump * cases.jumps[k][:, None, None]
                 spread = spread + (ways @ np.swapaxes(ways, -1, -2))[:, None]
             if k % _EVENED == 0:
                 spread = 0.5 * (spread + np.swapaxes(spread, -1, -2))
     return Gains(gain, variance, predicted)
 
 
-def whitened(cases: Cases, gains: Gains, drive: AtSample, data: AtSample, tell: Rows) -> None:
-    """Pass columns through the filter."""
+def squares(cases: Cases, gains: Gains) -> Floats:
+    """Return the sum of squares of the whitened prediction errors of the residual, shape (n_cases, n_intensities)."""
     n_samples, n_cases, n_outputs, n = cases.seen.shape
     with np.errstate(invalid="ignore"):
         root = np.sqrt(gains.variance)
-    state = np.zeros((n_cases, gains.variance.shape[2], n, data(0).shape[2]))
+    total = np.zeros(gains.variance.shape[1:3])
+    state = np.zeros((n_cases, gains.variance.shape[2], n, 1))
     for k in range(n_samples):
-        shown = data(k)
         for i in range(n_outputs):
             row = cases.seen[k, :, None, i, None, :]
-            error = shown[:, None, i, :] - (row @ state)[..., 0, :]
-            tell(k, i, error / root[k, :, :, i, None])
+            error = cases.data[k, :, None, i, :1] - (row @ state)[..., 0, :]
+            total += (error[..., 0] / root[k, :, :, i]) ** 2
             state = state + gains.gain[k, :, :, i, :, None] * error[..., None, :]
         if k < n_samples - 1:
-            state = cases.transition[k][:, None] @ state + drive(k)[:, None]
+            state = cases.transition[k][:, None] @ state + cases.drive[k, :, None, :, :1]
+    return total
 
 
-def smoothed(cases: Cases, gains: Gains, drive: Floats, data: Floats) -> tuple[Floats, Floats]:
-    """Smooth one column of each case, for gains of a single intensity.
+def smoothed(
+    cases: Cases, gains: Gains, columns: slice, states: slice = slice(None)
+) -> tuple[Floats, Floats]:
+    """Smooth some columns of each case, for gains of a single intensity.
 
-    Return the states estimated from a whole record as deviations from the reference, and their standard errors, in units of the
-    sizes, shape (n_samples, n_cases, n_states) each.
+    Return some states estimated from a whole record as deviations from the reference, shape (n_samples, n_cases, n_states,
+    n_columns), and the standard errors of all, shape (n_samples, n_cases, n_states), in units of the sizes.
     """
+    drive, data = cases.drive[..., columns], cases.data[..., columns]
     n_samples, n_cases, n_outputs, n = cases.seen.shape
-    before = np.zeros((n_samples, n_cases, n))
-    errors = np.zeros((n_samples, n_cases, n_outputs))
-    state = np.zeros((n_cases, n))
+    n_columns = data.shape[3]
+    deviation = np.zeros((n_samples, n_cases, np.arange(n)[states].size, n_columns))
+    errors = np.zeros((n_samples, n_cases, n_outputs, n_columns))
+    state = np.zeros((n_cases, n, n_columns))
     for k in range(n_samples):
-        before[k] = state
+        deviation[k] = state[:, states]
         for i in range(n_outputs):
-            errors[k, :, i] = data[k, :, i] - np.sum(cases.seen[k, :, i] * state, axis=-1)
-            state = state + gains.gain[k, :, 0, i] * errors[k, :, i, None]
+            errors[k, :, i] = data[k, :, i] - np.sum(cases.seen[k, :, i, :, None] * state, axis=-2)
+            state = state + gains.gain[k, :, 0, i, :, None] * errors[k, :, i, None, :]
         if k < n_samples - 1:
-            state = (cases.transition[k] @ state[..., None])[..., 0] + drive[k]
-    deviation, error = np.zeros_like(before), np.zeros_like(before)
-    adjoint, spread = np.zeros((n_cases, n, 1)), np.zeros((n_cases, n, n))
+            state = cases.transition[k] @ state + drive[k]
+    error = np.zeros((n_samples, n_cases, n))
+    adjoint, spread = np.zeros((n_cases, n, n_columns)), np.zeros((n_cases, n, n))
     identity = np.eye(n)
     for k in range(n_samples - 1, -1, -1):
         if k < n_samples - 1:
@@ -201,9 +185,9 @@ def smoothed(cases: Cases, gains: Gains, drive: Floats, data: Floats) -> tuple[F
             kept = identity - gains.gain[k, :, 0, i, :, None] * np.swapaxes(row, -1, -2)
             back = np.swapaxes(kept, -1, -2)
             weight = 1.0 / gains.variance[k, :, 0, i]
-            adjoint = back @ adjoint - row * (weight * errors[k, :, i])[:, None, None]
+            adjoint = back @ adjoint - row * (weight[:, None] * errors[k, :, i])[:, None, :]
             spread = back @ spread @ kept + row * np.swapaxes(row, -1, -2) * weight[:, None, None]
         known = gains.predicted[k, :, 0]
-        deviation[k] = before[k] - (known @ adjoint)[..., 0]
+        deviation[k] -= (known @ adjoint)[:, states]
         error[k] = np.sqrt(np.maximum(np.einsum("cii->ci", known - known @ spread @ known), 0.0))
     return deviation, error

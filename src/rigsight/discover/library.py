@@ -17,10 +17,10 @@ import numpy as np
 import sympy as sp
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
+from rigsight.discover.hysteresis import best_loop, is_loop
+from rigsight.discover.monomials import MONOMIALS
 from rigsight.discover.motion import Motion
-from rigsight.discover.regression import Projected, Regressed
-from rigsight.discover.terms.hysteresis import best_loop, is_loop
-from rigsight.discover.terms.monomials import MONOMIALS
+from rigsight.discover.regression import Projected, Regressed, alike
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Place
@@ -37,6 +37,7 @@ Filter = tuple[sp.Matrix, sp.Matrix]
 
 
 _GRID = 10
+_SAME_COLUMN = 0.999
 _LEAST_SHARE = 0.02
 _MOST_SHARE = 3.0
 
@@ -99,13 +100,6 @@ def _filters_drive(effect: Effect) -> bool:
 
 def candidates(effects: Sequence[Effect], regressed: Regressed) -> list[Candidate]:
     """Return one candidate per effect, at the nonlinear parameters that explain most of the residual of the rig's own terms."""
-    plain = [effect for effect in effects if _is_plain(effect)]
-    found = []
-    for effect in plain:
-        (parameter,) = effect.parameters
-        shape = _slope(effect, parameter)
-        column = regressed.column(along(shape, {}, motion) for motion in regressed.motions)
-        found.append(Candidate(effect, {}, {parameter.name: 1.0}, column))
 
     def at_best_values(effect: Effect) -> Candidate | None:
         if not is_loop(effect):
@@ -113,9 +107,10 @@ def candidates(effects: Sequence[Effect], regressed: Regressed) -> list[Candidat
         loop = best_loop(effect, regressed)
         return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
 
-    others = [effect for effect in effects if effect not in plain]
-    fitted = regressed.threads.side_by_side(at_best_values, others)
-    return found + [best for best in fitted if best is not None]
+    # Of terms that the records do not distinguish the first one counts: a torque with one coefficient comes before others.
+    ordered = sorted(effects, key=lambda effect: not _is_plain(effect))
+    fitted = regressed.threads.side_by_side(at_best_values, ordered)
+    return [best for best in fitted if best is not None]
 
 
 def _best_inner(effect: Effect, regressed: Regressed) -> Candidate | None:
@@ -127,6 +122,25 @@ def _best_inner(effect: Effect, regressed: Regressed) -> Candidate | None:
         if share > highest:
             best, highest = candidate, share
     return best
+
+
+def distinct(
+    library: Sequence[Candidate], projected: Projected
+) -> tuple[list[Candidate], dict[str, list[str]]]:
+    """Leave out terms that these records do not distinguish from an earlier one; return the rest, and the terms each replaces."""
+    if not library:
+        return [], {}
+    columns = np.column_stack([candidate.column for candidate in library])
+    stands_for: dict[str, list[str]] = {}
+    dropped: set[int] = set()
+    for i, j, _ in alike(projected, columns, _SAME_COLUMN):
+        # A loop may degenerate to friction or damping, but not vice versa: the simpler term represents it.
+        loops = [is_loop(library[k].effect) for k in (i, j)]
+        first, second = (j, i) if loops == [True, False] else (i, j)
+        if first not in dropped and second not in dropped:
+            dropped.add(second)
+            stands_for.setdefault(library[first].name, []).append(library[second].name)
+    return [candidate for i, candidate in enumerate(library) if i not in dropped], stands_for
 
 
 def mixed(signals: TermSignals, parts: Floats, projected: Projected) -> tuple[Candidate, float]:
