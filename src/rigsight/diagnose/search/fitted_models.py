@@ -127,8 +127,8 @@ def _singles(
     """Return where was searched, and every effect by itself."""
     search = search_places(context, reidentified, context.offered(worth.alone))
     say("suspects")
-    first = [e for e in context.offered(worth.alone) if e in search.effects or e in worth.named]
-    others = [effect for effect in search.others if effect not in first]
+    first = [e for e in context.offered(worth.alone) if _comes_first(e, search, worth)]
+    others = [effect for effect in (*search.effects, *search.others) if effect not in first]
     if prepare is not None:
         prepare([context.simplest((effect,)) for effect in first])
     singles = fit_candidates(context, reidentified, first, say, worth=worth)
@@ -141,6 +141,15 @@ def _singles(
             prepare([context.simplest((effect,)) for effect in others])
         singles = fit_candidates(context, reidentified, others, say, singles, worth)
     return search, singles
+
+
+def _comes_first(effect: Effect, search: Search, worth: WorthFitting) -> bool:
+    """Return True for an effect that the motion names, or that explains nearly as much in the screening as the best one."""
+    if not worth.is_shown:
+        return effect in search.effects or effect in worth.named
+    # What the motion does not judge has to explain enough itself, not only another effect at its place.
+    share = search.shares.get(effect.name, search.most)
+    return effect in worth.named or share >= VERDICT.larger_part * search.most
 
 
 def _larger_part_closed(reidentified: FittedModel) -> float:

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.policy import SEARCH
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.pushes.probes import (
     PUSH_SIZE,
     STIFFNESS,
@@ -71,6 +71,20 @@ class Response:
     column: Floats
 
 
+@dataclass(frozen=True)
+class _Push:
+    """A force, drive signal or reading of the form that an effect has at one of its starts."""
+
+    own: Mapping[str, float]  # values of the effect's own parameters
+    signals: Sequence[Floats]  # along each record
+    factor: float  # by which it explains most
+    explained: float  # squared residual that it explains then, to first order
+
+    def values_of(self, effect: Effect) -> dict[str, float]:
+        """Return the values of the effect's own parameters at that size."""
+        return scaled(effect, self.own, self.factor) or _fitted_values(effect, self.own)
+
+
 class Shortlist:
     """The re-identified equations along the records, and their responses to pushes at every place.
 
@@ -102,8 +116,21 @@ class Shortlist:
         _ = self._responses.remainder, self._responses.motions
 
     def suspects(self, effects: Sequence[Effect]) -> list[Suspect]:
-        """Return the share that each effect explains, in their order."""
-        return list(self._context.threads.side_by_side(self._suspect, list(effects)))
+        """Return the share that each effect explains, in their order.
+
+        To first order; for those near the best, pushes are fitted.
+        """
+        pushes = list(self._context.threads.side_by_side(self._pushes, list(effects)))
+        whole = max(float(self._responses.remainder @ self._responses.remainder), np.finfo(np.float64).tiny)
+        shares = [max((push.explained for push in own), default=0.0) / whole for own in pushes]
+        enough = VERDICT.larger_part * max(shares, default=0.0)
+
+        def one(i: int) -> Suspect:
+            if shares[i] >= enough:
+                return self._suspect(effects[i], pushes[i])
+            return Suspect(effects[i], shares[i], pushes[i][0].values_of(effects[i]) if pushes[i] else {})
+
+        return list(self._context.threads.side_by_side(one, range(len(effects))))
 
     @property
     def remainder(self) -> Floats:
@@ -149,16 +176,22 @@ class Shortlist:
         columns = [self._responses.to_push(place, signals, _SMALL) for _, signals in formed]
         return formed, self._responses.without_free(np.column_stack(columns)) if columns else np.zeros((1, 0))
 
-    def _suspect(self, effect: Effect) -> Suspect:
-        place = self._context.rig.acts_at(effect)
+    def _pushes(self, effect: Effect) -> list[_Push]:
+        """Return the pushes of an effect that explain most of the residual to first order, best first."""
         formed, columns = self._pushed_columns(effect)
         size = np.einsum("ij,ij->j", columns, columns)
         usable = np.flatnonzero(np.isfinite(size) & (size > 0.0))
         along = {int(i): float(columns[:, i] @ self._responses.remainder) for i in usable}
-        best = sorted(along, key=lambda i: -(along[i] ** 2) / size[i])[: SEARCH.fitted_pushes]
-        found = [(*self._fitted_share(place, formed[i][1], along[i] / size[i]), formed[i][0]) for i in best]
-        share, factor, own = max(found, key=lambda one: one[0], default=(0.0, 0.0, {}))
-        return Suspect(effect, share, scaled(effect, own, factor) or _fitted_values(effect, own))
+        found = [_Push(*formed[i], along[i] / size[i], along[i] ** 2 / size[i]) for i in along]
+        return sorted(found, key=lambda push: -push.explained)[: SEARCH.fitted_pushes]
+
+    def _suspect(self, effect: Effect, pushes: Sequence[_Push]) -> Suspect:
+        place = self._context.rig.acts_at(effect)
+        found = [(*self._fitted_share(place, push.signals, push.factor), push) for push in pushes]
+        if not found:
+            return Suspect(effect, 0.0)
+        share, factor, push = max(found, key=lambda one: one[0])
+        return Suspect(effect, share, replace(push, factor=factor).values_of(effect))
 
     def _fitted_share(self, place: str, signals: Sequence[Floats], push_size: float) -> tuple[float, float]:
         """Return the reduction of the cost when a push of this form, the parameters and the initial states are fitted.
