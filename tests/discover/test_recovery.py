@@ -195,8 +195,8 @@ def test_equations_that_cannot_be_simulated_are_told(
 def test_a_chosen_equation_whose_score_stayed_rough_is_scored(
     make_data: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def rough(bench: Bench, progress: Callable[[str], None]) -> Selection:
-        selection = select(bench, progress)
+    def rough(bench: Bench, progress: Callable[[str], None], about: Callable[..., Bench]) -> Selection:
+        selection = select(bench, progress, about)
         return replace(selection, best=replace(selection.best, residuals=np.zeros(0)))
 
     monkeypatch.setattr("rigsight.discover.discovery.select", rough)
