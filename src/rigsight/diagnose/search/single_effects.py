@@ -77,8 +77,8 @@ def fit_candidates(
         return scored
 
     models = list(context.threads.side_by_side(one, looks))
-    is_global = worth is not None and worth.is_shown
-    refined = in_lowest_basins(context, refine(context, [*known, *models]), is_global)
+    known_optima = worth.starts_at_optimum if worth is not None else None
+    refined = in_lowest_basins(context, refine(context, [*known, *models]), known_optima)
     return without_repeated_equations(context, ordered_by_inclusion(context, reidentified, refined))
 
 
@@ -96,7 +96,9 @@ def _looks(
 
     def one(parents: Mapping[str, FitResult], effect: Effect) -> FirstLook:
         own = [worth.starts[effect.name]] if effect.name in worth.starts else []
-        return look_at(context, (effect,), reidentified.fit, parents, own, declared=not worth.is_shown)
+        return look_at(
+            context, (effect,), reidentified.fit, parents, own, declared=not worth.starts_at_optimum(effect)
+        )
 
     while waiting:
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]

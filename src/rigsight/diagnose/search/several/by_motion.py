@@ -59,9 +59,12 @@ class NamedByMotion:
         competing = refine(self.context, [finished(self.context, model), *forms, *models, *parts])
         return [
             found
-            for found in in_lowest_basins(self.context, competing, is_global=True)
+            for found in in_lowest_basins(self.context, competing, self._starts_at_optimum)
             if len(found.effects) > 1
         ]
+
+    def _starts_at_optimum(self, effect: Effect) -> bool:
+        return effect.name in self.proposal.starts and not effect.states
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
         """Yield a model with each further cause that lowers its error, one after the other."""
