@@ -11,14 +11,13 @@ W. H. Press et al., *Numerical Recipes* (Cambridge 2007), section 15.6, for diff
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import LOOK_ACCURACY
-from rigsight.effects import Effect
 from rigsight.identify import FitResult
 from rigsight.simulate import carried_over
 
@@ -30,13 +29,13 @@ _SEED = 0
 def in_lowest_basins(
     context: FitContext,
     models: Sequence[FittedModel],
-    is_at_optimum: Callable[[Effect], bool] | None = None,
+    is_wide: bool = True,
 ) -> list[FittedModel]:
     """Return the models, the best of them in the lowest minimum that was found.
 
     Each also starts from the parameters that it has in common with the best one, and the best one from those of the next, because
     neither the mass of the rig nor an effect that both have depends on the others. Nothing else is tried if a model explains the
-    records, or where `is_at_optimum` is true of the starts of all its effects.
+    records, or unless `is_wide`.
     """
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     ranked = sorted(usable, key=lambda model: model.error_over_noise)
@@ -47,8 +46,7 @@ def in_lowest_basins(
     nearest = ranked[: SEARCH.basin_models]
 
     def lowest(own: FittedModel) -> FittedModel:
-        at_optimum = is_at_optimum is not None and all(map(is_at_optimum, own.effects))
-        starts = [] if is_explained or at_optimum else _starts(own)
+        starts = _starts(own) if is_wide and not is_explained else []
         others = nearest[1:2] if own is leader else [leader]
         return in_lowest_basin(context, own, [*starts, *(values_in(other, own) for other in others)])
 

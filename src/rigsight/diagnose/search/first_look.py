@@ -60,12 +60,8 @@ def look_at(
     further: Sequence[Mapping[str, float]] = (),
     hold: frozenset[str] = frozenset(),
     substeps: Sequence[int] | None = None,
-    declared: bool = True,
 ) -> FirstLook:
-    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect.
-
-    `further` are own values of that effect to start from, too; instead of the declared ones where `declared` is False.
-    """
+    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect."""
     structure = context.simplest(effects, base.structure)
     known = context.constant_forces_beside(structure.effects)
     moved = {*context.free_parameters(structure), *base.free} - {*hold, *known}
@@ -74,8 +70,7 @@ def look_at(
     if context.given and context.leaves_numbers_open(base):
         from_given = replace(base, values={**base.values, **context.given})
         starts += start_values(context, structure, effects[-1], from_given, {})
-    known_starts = [{**starts[0], **with_own_values(structure, effects[-1], base, own)} for own in further]
-    starts = [*starts, *known_starts] if declared or not known_starts else known_starts
+    starts += [{**starts[0], **with_own_values(structure, effects[-1], base, own)} for own in further]
     starts = [{**start, **known} for start in starts]
     nearest = _looked(context, structure, free, starts, substeps)
     if not np.isfinite(nearest[0].cost) and context.start:

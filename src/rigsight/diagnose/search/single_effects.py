@@ -77,9 +77,16 @@ def fit_candidates(
         return scored
 
     models = list(context.threads.side_by_side(one, looks))
-    known_optima = worth.starts_at_optimum if worth is not None else None
-    refined = in_lowest_basins(context, refine(context, [*known, *models]), known_optima)
+    refined = refine(context, [*known, *models])
+    refined = in_lowest_basins(context, refined, is_wide=not _is_inexact(refined, reidentified, worth))
     return without_repeated_equations(context, ordered_by_inclusion(context, reidentified, refined))
+
+
+def _is_inexact(models: Sequence[FittedModel], reidentified: FittedModel, worth: WorthFitting | None) -> bool:
+    """Return True where the motion shows the cause and no law comes within its own error: the lowest basin is chance there."""
+    best = min((model.error_over_noise for model in models), default=float("inf"))
+    largest = max(VERDICT.most_remainder, SEARCH.law_error * reidentified.error_over_noise)
+    return worth is not None and worth.is_shown and best > largest
 
 
 def _looks(
@@ -96,9 +103,7 @@ def _looks(
 
     def one(parents: Mapping[str, FitResult], effect: Effect) -> FirstLook:
         own = [worth.starts[effect.name]] if effect.name in worth.starts else []
-        return look_at(
-            context, (effect,), reidentified.fit, parents, own, declared=not worth.starts_at_optimum(effect)
-        )
+        return look_at(context, (effect,), reidentified.fit, parents, own)
 
     while waiting:
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]

@@ -23,10 +23,6 @@ class WorthFitting:
     # Own parameters of effects by their names, with which they explain most of the missing force along the motion.
     starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
-    def starts_at_optimum(self, effect: Effect) -> bool:
-        """Return True if the start along the motion needs no others; a memory has more shapes than a grid."""
-        return self.is_shown and effect.name in self.starts and not effect.states
-
 
 def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]) -> WorthFitting:
     """Return the effects of families that the proposal took or that explain nearly as much, and those that it does not judge.

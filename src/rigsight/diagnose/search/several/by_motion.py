@@ -43,7 +43,8 @@ class NamedByMotion:
         """Return the models of several effects and their parts."""
         models = list(self._grown(self.singles[0]))
         for size in (2, 3):
-            models += self.together.fitted(size, VERDICT.larger_part)
+            sets = self.together.fitted(size, VERDICT.larger_part)
+            models += [one for one in sets if self._is_worth(one, self.singles[0])]
         if not models:
             return []
         model = min(models, key=lambda one: one.error_over_noise)
@@ -59,12 +60,9 @@ class NamedByMotion:
         competing = refine(self.context, [finished(self.context, model), *forms, *models, *parts])
         return [
             found
-            for found in in_lowest_basins(self.context, competing, self._starts_at_optimum)
+            for found in in_lowest_basins(self.context, competing, is_wide=False)
             if len(found.effects) > 1
         ]
-
-    def _starts_at_optimum(self, effect: Effect) -> bool:
-        return effect.name in self.proposal.starts and not effect.states
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
         """Yield a model with each further cause that lowers its error, one after the other."""
