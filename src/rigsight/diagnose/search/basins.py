@@ -26,16 +26,12 @@ _SEED = 0
 """Starts are the same for equal models: a diagnosis depends on its records alone."""
 
 
-def in_lowest_basins(
-    context: FitContext,
-    models: Sequence[FittedModel],
-    is_wide: bool = True,
-) -> list[FittedModel]:
+def in_lowest_basins(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
     """Return the models, the best of them in the lowest minimum that was found.
 
     Each also starts from the parameters that it has in common with the best one, and the best one from those of the next, because
-    neither the mass of the rig nor an effect that both have depends on the others. Nothing else is tried if a model explains the
-    records, or unless `is_wide`.
+    neither the mass of the rig nor an effect that both have depends on the others. If a model explains the records,
+    nothing else is tried.
     """
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     ranked = sorted(usable, key=lambda model: model.error_over_noise)
@@ -46,7 +42,7 @@ def in_lowest_basins(
     nearest = ranked[: SEARCH.basin_models]
 
     def lowest(own: FittedModel) -> FittedModel:
-        starts = _starts(own) if is_wide and not is_explained else []
+        starts = [] if is_explained else _starts(own)
         others = nearest[1:2] if own is leader else [leader]
         return in_lowest_basin(context, own, [*starts, *(values_in(other, own) for other in others)])
 

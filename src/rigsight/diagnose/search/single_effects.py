@@ -77,16 +77,8 @@ def fit_candidates(
         return scored
 
     models = list(context.threads.side_by_side(one, looks))
-    refined = refine(context, [*known, *models])
-    refined = in_lowest_basins(context, refined, is_wide=not _is_inexact(refined, reidentified, worth))
+    refined = in_lowest_basins(context, refine(context, [*known, *models]))
     return without_repeated_equations(context, ordered_by_inclusion(context, reidentified, refined))
-
-
-def _is_inexact(models: Sequence[FittedModel], reidentified: FittedModel, worth: WorthFitting | None) -> bool:
-    """Return True where the motion shows the cause and no law comes within its own error: the lowest basin is chance there."""
-    best = min((model.error_over_noise for model in models), default=float("inf"))
-    largest = max(VERDICT.most_remainder, SEARCH.law_error * reidentified.error_over_noise)
-    return worth is not None and worth.is_shown and best > largest
 
 
 def _looks(

@@ -58,11 +58,7 @@ class NamedByMotion:
         pairs = zip(model.effects, parts, strict=True)
         forms = [form for effect, part in pairs for form in self._other_forms(model, effect, part)]
         competing = refine(self.context, [finished(self.context, model), *forms, *models, *parts])
-        return [
-            found
-            for found in in_lowest_basins(self.context, competing, is_wide=False)
-            if len(found.effects) > 1
-        ]
+        return [found for found in in_lowest_basins(self.context, competing) if len(found.effects) > 1]
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
         """Yield a model with each further cause that lowers its error, one after the other."""
