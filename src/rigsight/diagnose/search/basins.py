@@ -30,8 +30,8 @@ def in_lowest_basins(context: FitContext, models: Sequence[FittedModel]) -> list
     """Return the models, the best of them in the lowest minimum that was found.
 
     Each also starts from the parameters that it has in common with the best one, and the best one from those of the next, because
-    neither the mass of the rig nor an effect that both have depends on the others. If a model explains the records,
-    nothing else is tried.
+    neither the mass of the rig nor an effect that both have depends on the others. If a model explains the records, nothing else
+    is tried.
     """
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     ranked = sorted(usable, key=lambda model: model.error_over_noise)
