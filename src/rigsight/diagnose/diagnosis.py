@@ -10,9 +10,9 @@ import numpy as np
 
 from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.diagnose.advise import advise
+from rigsight.diagnose.data_quality.oversampling import at_useful_rate
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, candidates_on
-from rigsight.diagnose.fitting.oversampling import at_useful_rate
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.quantify import budget_intervals, effect_shares

@@ -2,34 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
+from rigsight.diagnose.data_quality.checks import sensor_faults
+from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.policy import SEARCH
-from rigsight.records import Record
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats, Record
 
 
 def at_useful_rate(campaign: Campaign) -> Campaign:
     """Return the campaign with means of n samples, with a note; unchanged where it is not oversampled or has few samples.
 
     A reading becomes the mean of the samples around it, a held input the mean of those until the next one: noise falls as if
-    every sample were used, and nothing above the new rate folds down.
+    every sample were used, and nothing above the new rate folds down. Unchanged too where means would hide what the samples
+    show: a fault of a sensor, or repeated periods and rest from which the noise is known.
     """
     n = _samples_to_mean(campaign)
-    if n < 2:
+    if n < 2 or any(sensor_faults(campaign.rig, record) for record in campaign.records):
         return campaign
     inputs = {signal.name for signal in campaign.rig.inputs}
     records = tuple(_coarser(record, n, inputs) for record in campaign.records)
+    if _known_from(campaign, campaign.records) != _known_from(campaign, records):
+        return campaign
     note = (
         f"Nearly all motion lies below {_band_of(campaign) / campaign.records[0].dt:.2g} Hz, the records are sampled at "
         f"{1.0 / campaign.records[0].dt:.4g} Hz: means of {n} samples are compared."
     )
     return replace(campaign, records=records, notes=(*campaign.notes, note))
+
+
+def _known_from(campaign: Campaign, records: Sequence[Record]) -> list[tuple[str, int]]:
+    """Return the method by which the noise of each output is known, and from how many stretches."""
+    return [(floor.method, len(floor.stretches)) for floor in noise_floors(campaign.rig, records)]
 
 
 def _samples_to_mean(campaign: Campaign) -> int:
@@ -49,10 +57,13 @@ def _band_of(campaign: Campaign) -> float:
     return max([least, *(_end_of_band([record[name] for record in records]) for name in names)])
 
 
-def _end_of_band(signals: list[Floats]) -> float:
+def _end_of_band(signals: Sequence[Floats]) -> float:
     """Return the frequency below which nearly all power of signals lies, in cycles per sample."""
     longest = max(signal.size for signal in signals)
-    power = sum(np.abs(np.fft.rfft((s - np.mean(s)) * np.hanning(s.size), 2 * longest)) ** 2 for s in signals)
+    power = np.zeros(longest + 1)
+    for signal in signals:
+        tapered = (signal - np.mean(signal)) * np.hanning(signal.size)
+        power += np.abs(np.fft.rfft(tapered, 2 * longest)) ** 2
     below = np.cumsum(power)
     if not below[-1] > 0.0:
         return 0.0
