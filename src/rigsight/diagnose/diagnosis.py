@@ -10,7 +10,6 @@ import numpy as np
 
 from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.diagnose.advise import advise
-from rigsight.diagnose.data_quality.oversampling import at_useful_rate
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, candidates_on
 from rigsight.diagnose.fitting.preparation import Prepare
@@ -85,7 +84,7 @@ def diagnose(
     say = progress or (lambda _: None)
     if not campaign.estimation:
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
-    campaign = at_useful_rate(with_weighed_spring(campaign))
+    campaign = with_weighed_spring(campaign)
     effects = candidates_on(campaign.rig, effects, campaign.modelled)
     scored_on = "validation" if campaign.validation else "estimation"
     rng = np.random.default_rng(seed)

@@ -366,19 +366,3 @@ class SearchNumbers:
         "budget",
         "Number of causes that the motion does not name, such as delays, that are added to those that it names.",
     )
-    samples_per_period: float = number(
-        40.0,
-        "budget",
-        "Samples per period of the fastest motion that are kept where there are many: between two of them an input is held and "
-        "friction turns.",
-    )
-    power_in_band: float = number(
-        0.999,
-        "convention",
-        "Share of the power of every reading below the frequency of the fastest motion.",
-    )
-    useful_samples: int = number(
-        10_000,
-        "budget",
-        "Samples of all records to fit together up to which all are used.",
-    )
