@@ -94,7 +94,7 @@ def examine(
     context, before, reidentified = models.alone.context, models.alone.before, models.alone.reidentified
     checks = models.checks
     vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)
-    ranking, imitations = _ranked(models, alone.worth.beside, vector, allowed, rng)
+    ranking, imitations = _ranked(models, alone.effects, vector, allowed, rng)
     is_usable = bool(ranking.order) and bool(ranking.order[0].residuals) and ranking.probabilities[0] > 0.0
     best, tied = (ranking.order[0], ranking.tied) if is_usable else (reidentified, ())
     judgement = judge(

@@ -42,7 +42,8 @@ class SingleModels:
     search: Search  # where and for which effects was searched
     # What the motion says of the missing force before any fit; None where the sensors do not show the motion.
     proposal: Proposal | None
-    worth: WorthFitting  # candidates for the main cause and for further ones
+    effects: tuple[Effect, ...]  # all candidates
+    worth: WorthFitting  # those that may be the main cause
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,9 @@ def single_models(
     before = _before(campaign, context, reidentified)
     if campaign.given:
         say("given simulation")
-    return SingleModels(windowing, context, before, reidentified, singles, search, proposal, worth)
+    return SingleModels(
+        windowing, context, before, reidentified, singles, search, proposal, tuple(effects), worth
+    )
 
 
 def _from_numbers(
@@ -131,7 +134,7 @@ def _singles(
     others = [effect for effect in (*search.effects, *search.others) if effect not in first]
     if prepare is not None:
         prepare([context.simplest((effect,)) for effect in first])
-    singles = fit_candidates(context, reidentified, first, say, worth=worth)
+    singles = fit_candidates(context, reidentified, first, say, along_motion=worth.starts)
     best = min((model.error_over_noise for model in singles), default=np.inf)
     # What the motion rules out need not be fitted for a remainder that no law reaches.
     enough = _larger_part_closed(reidentified) if worth.is_shown else VERDICT.at_floor
@@ -139,7 +142,7 @@ def _singles(
         # A right model must not be lost because places or effects were ranked wrongly.
         if prepare is not None:
             prepare([context.simplest((effect,)) for effect in others])
-        singles = fit_candidates(context, reidentified, others, say, singles, worth)
+        singles = fit_candidates(context, reidentified, others, say, singles, worth.starts)
     return search, singles
 
 
@@ -183,7 +186,8 @@ def with_several_effects(
         context,
         models.reidentified,
         models.singles,
-        models.worth,
+        models.effects,
+        models.worth.is_shown,
         models.proposal,
         forms,
         checks,
@@ -191,9 +195,7 @@ def with_several_effects(
         prepare,
     )
     named = {effect.name for model in found for effect in model.effects}
-    unfitted = [
-        e for e in models.worth.beside if e.name in named - {model.names[0] for model in models.singles}
-    ]
+    unfitted = [e for e in models.effects if e.name in named - {model.names[0] for model in models.singles}]
     if unfitted:
         # The parts of a set compete with it, and tell the share of each.
         parts = fit_candidates(context, models.reidentified, unfitted, say, models.singles)

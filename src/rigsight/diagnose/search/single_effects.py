@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from rigsight.diagnose.search.first_look import (
 from rigsight.diagnose.search.nested_models import at_least_as_good, ordered_by_inclusion
 from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.starts import restart_values
-from rigsight.diagnose.search.worth_fitting import WorthFitting
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, FitResult, off_bounds
 from rigsight.simulate import Structure
@@ -58,11 +58,14 @@ def fit_candidates(
     effects: Iterable[Effect],
     progress: Callable[[str], None] | None = None,
     known: Sequence[FittedModel] = (),
-    worth: WorthFitting | None = None,
+    along_motion: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
 ) -> list[FittedModel]:
-    """Return every effect alone, fitted and scored, with those that were before."""
+    """Return every effect alone, fitted and scored, with those that were before.
+
+    `along_motion` are values of the effects' own parameters that explain the missing force along the motion: one more start.
+    """
     before = {model.effects[0].name: model.fit for model in known if np.isfinite(model.fit.cost)}
-    looks = _looks(context, reidentified, context.offered(effects), worth or WorthFitting(), before)
+    looks = _looks(context, reidentified, context.offered(effects), along_motion, before)
     wide = {look.newest: look for look in widened(context, looks)}
     costs = [*(look.cost for look in wide.values()), *(fit.cost for fit in before.values())]
     lowest = min(costs, default=float("inf"))
@@ -85,7 +88,7 @@ def _looks(
     context: FitContext,
     reidentified: FittedModel,
     effects: Sequence[Effect],
-    worth: WorthFitting,
+    along_motion: Mapping[str, Mapping[str, float]],
     known: Mapping[str, FitResult],
 ) -> list[FirstLook]:
     """Look at every effect; those that start from a simpler one, if it is not known, come after it."""
@@ -94,7 +97,7 @@ def _looks(
     waiting = list(effects)
 
     def one(parents: Mapping[str, FitResult], effect: Effect) -> FirstLook:
-        own = [worth.starts[effect.name]] if effect.name in worth.starts else []
+        own = [along_motion[effect.name]] if effect.name in along_motion else []
         return look_at(context, (effect,), reidentified.fit, parents, own)
 
     while waiting:

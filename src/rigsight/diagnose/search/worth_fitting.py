@@ -1,4 +1,4 @@
-"""Which effects are worth a fit, alone and beside another, after what the motion says of the missing force?"""
+"""Which effects are worth a fit as the main cause, after what the motion says of the missing force?"""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class WorthFitting:
-    """The effects that are fitted."""
+    """The effects that are fitted alone; all candidates are tried as a further cause."""
 
     alone: tuple[Effect, ...] = ()
-    beside: tuple[Effect, ...] = ()  # all candidates: those that are tried as a further cause
     named: tuple[Effect, ...] = ()  # of those alone the ones of families that the motion names
     # Whether the motion shows every force that matters: a family that it rules out is not the main cause.
     is_shown: bool = False
@@ -31,8 +30,8 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     enough to exclude others.
     """
     if proposal is None or not proposal.alone:
-        return WorthFitting(tuple(effects), tuple(effects))
-    everything = WorthFitting(tuple(effects), tuple(effects), starts=proposal.starts)
+        return WorthFitting(tuple(effects))
+    everything = WorthFitting(tuple(effects), starts=proposal.starts)
     most = proposal.alone[0].share
     if most < max(SEARCH.decisive_force, proposal.by_chance):
         return everything
@@ -41,4 +40,4 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     named = tuple(e for e in effects if e.name in proposal.judged and (e.family, rig.where(e)) in near)
     kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
     is_shown = proposal.noise is not None and proposal.noise < SEARCH.noise_of_force
-    return WorthFitting(kept, tuple(effects), named, is_shown, proposal.starts)
+    return WorthFitting(kept, named, is_shown, proposal.starts)

@@ -17,7 +17,6 @@ from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.stepwise import Stepwise, each_once, refit_singles, several_effects
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
-from rigsight.diagnose.search.worth_fitting import WorthFitting
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
 from rigsight.identify import characteristic_scales
@@ -218,7 +217,8 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
         None,
         scored((), error_over_noise=40.0),
         [alone],
-        WorthFitting(),
+        [],
+        False,
         None,
         None,
         SimpleNamespace(is_adequate=lambda _: adequate),
@@ -257,7 +257,8 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
         None,
         scored((), error_over_noise=40.0),
         [scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))],
-        WorthFitting(),
+        [],
+        False,
         None,
         None,
         SimpleNamespace(is_adequate=lambda _: adequate),
@@ -269,9 +270,8 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
 
 def test_a_residual_of_the_size_of_a_law_error_asks_for_no_second_effect(scored) -> None:
     single = scored(("cubic_stiffness",), error_over_noise=1.9, residuals=np.ones(8))
-    shown = WorthFitting(is_shown=True)
     kept = several_effects(
-        None, scored((), error_over_noise=40.0), [single], shown, None, None, None, False, None
+        None, scored((), error_over_noise=40.0), [single], [], True, None, None, None, False, None
     )
     assert kept == []
 

@@ -9,20 +9,20 @@ needless are dropped, and other forms of each family are tried in their place.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.basins import in_lowest_basins
-from rigsight.diagnose.search.first_look import FirstLook
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
+from rigsight.diagnose.search.several.parts import fitted_from, part_of
 from rigsight.diagnose.search.several.together import Together
-from rigsight.diagnose.search.single_effects import finished, followed, refine
+from rigsight.diagnose.search.single_effects import finished, refine
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal
-from rigsight.simulate import carried_over
 
 Key = tuple[Family, str]
 """A family and the place at which it acts."""
@@ -90,31 +90,14 @@ class NamedByMotion:
         structure = self.context.simplest((*model.effects, effect), model.fit.structure)
         declared = next(start_values(self.context, structure, effect, model.fit, {}))
         values = {**declared, **with_own_values(structure, effect, model.fit, own)}
-        return self._fitted(
-            (*model.effects, effect),
-            replace(model, fit=replace(model.fit, structure=structure, values=values)),
-        )
+        return fitted_from(self.context, model, (*model.effects, effect), structure, values)
 
     def _parts(self, model: FittedModel) -> list[FittedModel]:
         """Return a model without each of its effects, fitted from where the others are in it."""
-
-        def without(left_out: Effect) -> FittedModel:
-            kept = tuple(effect for effect in model.effects if effect is not left_out)
-            structure = self.context.simplest(kept, model.fit.structure)
-            values = {
-                **carried_over(model.fit.values, model.fit.structure, structure),
-                **dict(structure.fixed),
-            }
-            return self._fitted(
-                kept, replace(model, fit=replace(model.fit, structure=structure, values=values))
-            )
-
-        return list(self.context.threads.side_by_side(without, model.effects))
-
-    def _fitted(self, effects: tuple[Effect, ...], start: FittedModel) -> FittedModel:
-        free = tuple(self.context.free_parameters(start.fit.structure))
-        look = FirstLook(effects, start.fit.structure, free, (start.fit,), float("inf"))
-        return followed(self.context, look, promising=True, finish=False)
+        kept = [
+            tuple(other for other in model.effects if other is not left_out) for left_out in model.effects
+        ]
+        return list(self.context.threads.side_by_side(partial(part_of, self.context, model), kept))
 
     def _other_forms(self, model: FittedModel, replaced: Effect, part: FittedModel) -> list[FittedModel]:
         """Return a model with other effects of the family of one at its place; the part is the model without it."""

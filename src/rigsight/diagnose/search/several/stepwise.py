@@ -16,6 +16,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -29,9 +30,9 @@ from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.several.by_motion import NamedByMotion
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
+from rigsight.diagnose.search.several.parts import part_of, reduced
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, followed, refine
-from rigsight.diagnose.search.worth_fitting import WorthFitting
 from rigsight.effects import Effect
 from rigsight.inverse import Proposal
 from rigsight.simulate import carried_over
@@ -153,8 +154,7 @@ class Stepwise:
     def _without(self, model: FittedModel, left_out: Effect) -> FittedModel:
         """Return a model without one of its effects, at the values that it has: the residual is what that effect explains."""
         kept = tuple(effect for effect in model.effects if effect is not left_out)
-        structure = self.context.simplest(kept, model.fit.structure)
-        values = {**carried_over(model.fit.values, model.fit.structure, structure), **dict(structure.fixed)}
+        structure, values = reduced(self.context, model, kept)
         fit = self.context.problem(structure, self.context.estimation, LOOK_ACCURACY).fit(values, [])
         free = tuple(self.context.free_parameters(structure))
         errors = {name: model.fit.standard_errors.get(name, 0.0) for name in free}
@@ -162,23 +162,12 @@ class Stepwise:
 
     def with_parts(self, model: FittedModel, known: Sequence[FittedModel]) -> list[FittedModel]:
         """Return the known models with the parts of one, of two effects and more, fitted from where they are in it."""
-
-        def part(effects: tuple[Effect, ...]) -> FittedModel:
-            structure = self.context.simplest(effects, model.fit.structure)
-            values = {
-                **carried_over(model.fit.values, model.fit.structure, structure),
-                **dict(structure.fixed),
-            }
-            start, free = replace(model.fit, values=values), tuple(self.context.free_parameters(structure))
-            look = FirstLook(effects, structure, free, (start,), float("inf"))
-            return followed(self.context, look, promising=True, finish=False)
-
         sets = [
             effects
             for size in range(2, len(model.effects))
             for effects in itertools.combinations(model.effects, size)
         ]
-        parts = list(self.context.threads.side_by_side(part, sets))
+        parts = list(self.context.threads.side_by_side(partial(part_of, self.context, model), sets))
         return each_once([*known, *refine(self.context, parts)])
 
     def _best_converged(self, models: Sequence[FittedModel]) -> list[FittedModel]:
@@ -204,7 +193,8 @@ def several_effects(
     context: FitContext,
     reidentified: FittedModel,
     singles: Sequence[FittedModel],
-    worth: WorthFitting,
+    effects: Sequence[Effect],
+    is_shown: bool,
     proposal: Proposal | None,
     forms: OtherForms,
     checks: Checks,
@@ -213,6 +203,7 @@ def several_effects(
 ) -> list[FittedModel]:
     """Return models of several effects if a single effect does not explain everything.
 
+    `is_shown` is True where the motion shows every force that matters.
     Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
     bound. Where errors of laws are larger than noise, a residual of the size of the error of one law asks for no second one.
     """
@@ -223,11 +214,11 @@ def several_effects(
     if not usable:
         return []
     best = usable[0]
-    together = Together(context, reidentified, worth.beside, prepare)
-    if worth.is_shown and best.error_over_noise <= SEARCH.law_error * reidentified.error_over_noise:
+    together = Together(context, reidentified, effects, prepare)
+    if is_shown and best.error_over_noise <= SEARCH.law_error * reidentified.error_over_noise:
         return []
-    if worth.is_shown and proposal is not None:
-        named = NamedByMotion(context, usable, proposal, worth.beside, together, prepare).found()
+    if is_shown and proposal is not None:
+        named = NamedByMotion(context, usable, proposal, effects, together, prepare).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
     is_excused = lower_bound and best.error_over_noise <= VERDICT.at_lower_bound
     if is_excused and checks.is_adequate(best):
@@ -235,7 +226,7 @@ def several_effects(
     # A floor is known to a few percent. Within these, the residual of the best effect is tested for being noise.
     is_near = not lower_bound and VERDICT.exact < best.error_over_noise <= VERDICT.at_floor
     at_floor = VERDICT.exact if is_near and not checks.is_adequate(best) else VERDICT.at_floor
-    search = Stepwise(context, usable, worth.beside, forms, together, prepare)
+    search = Stepwise(context, usable, effects, forms, together, prepare)
     found = search.found(at_floor, None if lower_bound else checks)
     return [model for model in found if not is_excused or model.error_over_noise <= VERDICT.at_floor]
 

@@ -45,6 +45,7 @@ class Together:
         self._reidentified = reidentified
         self._effects = effects
         self._prepare = prepare
+        self._sets: dict[int, list[EffectSet]] = {}
 
     def fitted(self, size: int, least_share: float = 0.0) -> list[FittedModel]:
         """Return models of so many effects that explain most together in the screening, fitted and scored.
@@ -53,9 +54,11 @@ class Together:
         """
         context = self._context
         found: dict[frozenset[str], list[EffectSet]] = {}
-        smaller, larger = (best_sets(self._responses, self._lineup.remainder, n) for n in (size - 1, size))
-        if not (smaller and larger) or self._left(larger) > (1.0 - least_share) * self._left(smaller):
-            return []
+        larger = self._best_sets(size)
+        if least_share > 0.0 and larger:
+            smaller = self._best_sets(size - 1)
+            if not smaller or self._left(larger) > (1.0 - least_share) * self._left(smaller):
+                return []
         for effect_set in larger:
             if len(found) < SEARCH.joint_sets or effect_set.names in found:
                 found.setdefault(effect_set.names, []).append(effect_set)
@@ -79,6 +82,11 @@ class Together:
 
         models = context.threads.side_by_side(follow, promising[: SEARCH.most_followed])
         return [model for model in models if np.isfinite(model.error_over_noise)]
+
+    def _best_sets(self, size: int) -> list[EffectSet]:
+        if size not in self._sets:
+            self._sets[size] = best_sets(self._responses, self._lineup.remainder, size)
+        return self._sets[size]
 
     def _left(self, sets: Sequence[EffectSet]) -> float:
         """Return the squared residual above the noise that the best of sets leaves, to first order."""
