@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
+import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -119,6 +122,74 @@ def write_json(path: Path, rows: Rows, units: Units) -> None:
     )
 
 
+def _write_joint_states(bag: Any, rows: Rows, store: Any, serialize: Any) -> None:
+    types = store.types
+    topic = bag.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
+    names = [name for name in rows if name != "t"]
+    for index, time in enumerate(rows["t"]):
+        stamp = types["builtin_interfaces/msg/Time"](1_700_000_000 + int(time), round(1e9 * (time % 1.0)))
+        head = {"stamp": stamp, "frame_id": ""}
+        if "seq" in types["std_msgs/msg/Header"].__dataclass_fields__:
+            head["seq"] = index
+        message = types["sensor_msgs/msg/JointState"](
+            header=types["std_msgs/msg/Header"](**head),
+            name=names,
+            position=np.array([rows[name][index] for name in names], dtype=np.float64),
+            velocity=np.zeros(0),
+            effort=np.zeros(0),
+        )
+        # Received a little later than stamped, and never evenly.
+        received = 1_700_000_000_001_000_000 + round(1e9 * time) + (index * 7919) % 500_000
+        bag.write(topic, received, serialize(message, "sensor_msgs/msg/JointState"))
+
+
+def write_rosbag1(path: Path, rows: Rows, units: Units) -> None:
+    rosbag1, typesys = pytest.importorskip("rosbags.rosbag1"), pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
+    path.unlink(missing_ok=True)
+    with rosbag1.Writer(path) as bag:
+        _write_joint_states(bag, rows, store, store.serialize_ros1)
+
+
+def _write_rosbag2(path: Path, rows: Rows, plugin: str) -> None:
+    rosbag2, typesys = pytest.importorskip("rosbags.rosbag2"), pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    with TemporaryDirectory() as folder:
+        bag_path = Path(folder) / "bag"
+        with rosbag2.Writer(bag_path, version=9, storage_plugin=rosbag2.StoragePlugin[plugin]) as bag:
+            _write_joint_states(bag, rows, store, store.serialize_cdr)
+        (written,) = bag_path.glob("bag.*")
+        shutil.move(written, path)
+
+
+def write_mcap(path: Path, rows: Rows, units: Units) -> None:
+    _write_rosbag2(path, rows, "MCAP")
+
+
+def write_rosbag2(path: Path, rows: Rows, units: Units) -> None:
+    _write_rosbag2(path, rows, "SQLITE3")
+
+
+def write_ulog(path: Path, rows: Rows, units: Units) -> None:
+    """As https://docs.px4.io/main/en/dev_log/ulog_file_format.html describes it."""
+    names = [name for name in rows if name != "t"]
+
+    def record(kind: bytes, content: bytes) -> bytes:
+        return struct.pack("<HB", len(content), kind[0]) + content
+
+    fields = "".join(f"double {name};" for name in names)
+    parts = [
+        b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0),
+        record(b"B", bytes(40)),
+        record(b"F", f"bench:uint64_t timestamp;{fields}".encode()),
+        record(b"A", struct.pack("<BH", 0, 0) + b"bench"),
+    ]
+    for index, time in enumerate(rows["t"]):
+        numbers = struct.pack(f"<{len(names)}d", *(rows[name][index] for name in names))
+        parts.append(record(b"D", struct.pack("<HQ", 0, round(1e6 * time)) + numbers))
+    path.write_bytes(b"".join(parts))
+
+
 FORMATS: dict[str, tuple[str, Write]] = {
     "MATLAB 5": (".mat", write_matlab),
     "MATLAB 7": (".mat", write_matlab_packed),
@@ -129,6 +200,10 @@ FORMATS: dict[str, tuple[str, Write]] = {
     "Parquet": (".parquet", write_parquet),
     "UFF": (".uff", write_uff),
     "JSON": (".json", write_json),
+    "ROS 1 bag": (".bag", write_rosbag1),
+    "ROS 2 bag": (".db3", write_rosbag2),
+    "MCAP": (".mcap", write_mcap),
+    "ULog": (".ulg", write_ulog),
 }
 """Name -> suffix and writer; delimited text is left out."""
 

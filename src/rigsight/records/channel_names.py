@@ -26,6 +26,17 @@ _SYMBOLS = ("t", "u", "psi", "y", "x", "reference", "force")
 """Of built-in rigs: too short or too common for a channel that has them among other words."""
 _IN_PART = 0.9
 """Below what a unit that fits makes clear: a word that is shared is a hint, no more."""
+_QUANTITIES = {
+    "angle": ("position", "pos", "q"),
+    "slide": ("position", "pos", "q"),
+    "speed": ("velocity", "vel", "qd", "dq"),
+    "velocity": ("speed", "vel", "qd", "dq"),
+    "torque": ("effort", "tau", "current"),
+    "force": ("effort", "current"),
+    "ctrl": ("effort", "command", "commands", "action", "tau", "current"),
+}
+"""What a log of a robot calls the quantities of its joints."""
+_FILLERS = frozenset({"motor", "joint", "actuator", "servo"})
 # A last word without brackets is a unit only if it can hardly be anything else: x_a is no length of years.
 _UNITS_BEHIND = frozenset({
     "s", "ms", "us", "µs", "A", "mA", "V", "mV", "N", "kN", "mN", "Nm", "kNm",
@@ -66,8 +77,13 @@ def closeness(name: str, signal: str) -> float:
     if signal in _SYMBOLS:
         return by_other_names
     # A name from a rig file: its words may be in another order or among others.
-    own = set(asked.split())
-    shared = own & set(words.split())
+    own = set(asked.split()) - _FILLERS or set(asked.split())
+    inside = set(words.split())
+    shared = own & inside
+    if shared and "/" in bare:
+        # A log of a robot has a group for each quantity, and in it the joints: position/elbow.
+        inside |= set(_words(bare.split("/")[-2]).split())
+        shared = {word for word in own if inside & {word, *_QUANTITIES.get(word, ())}}
     by_words = 2.0 if own and shared == own else _IN_PART * len(shared) / max(1, len(own))
     return max(by_words, by_other_names)
 

@@ -65,17 +65,16 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
     known = file_format(path)
     if known is None:
         raise InputError(f"{path.name} is not a measurement file of a known format.")
-    name = known.name
     check_largest(path, known.largest)
     with contextlib.ExitStack() as stack:
         stack.enter_context(_silence())
-        with _reported(path, name):
+        with _reported(path, known):
             file = stack.enter_context(_reader(known.key)(path))
             check_count(path.name, len(file.channels))
             check_total(path.name, sum(channel.n_samples for channel in file.channels))
             distinct = with_distinct_names(file.channels)
-        channels = tuple(_guarded(path, name, channel) for channel in distinct)
-        yield replace(file, channels=channels, format=name)
+        channels = tuple(_guarded(path, known, channel) for channel in distinct)
+        yield replace(file, channels=channels, format=known.name)
 
 
 def _reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
@@ -85,13 +84,13 @@ def _reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
     return contextlib.contextmanager(reader_of(kind))
 
 
-def _guarded(path: Path, name: str, channel: Channel) -> Channel:
+def _guarded(path: Path, known: Format, channel: Channel) -> Channel:
     """Return the channel with its reading checked: before for size, after for what came."""
 
     def guarded(load: Load, n_samples: int, what: str, stored: Stored = AS_STORED) -> Load:
         def checked() -> np.ndarray:
             check_size(path.name, channel.name, n_samples)
-            with _reported(path, name):
+            with _reported(path, known):
                 samples = np.asarray(load())
                 if samples.dtype.kind not in "fiub" or samples.ndim != 1:
                     raise ValueError(f"{what} is of type {samples.dtype}, shape {samples.shape}")
@@ -112,16 +111,16 @@ def _guarded(path: Path, name: str, channel: Channel) -> Channel:
 
 
 @contextlib.contextmanager
-def _reported(path: Path, name: str) -> Iterator[None]:
+def _reported(path: Path, known: Format) -> Iterator[None]:
     """Turn whatever a library raises over a damaged file into one message."""
     try:
         yield
     except InputError:
         raise
-    except ImportError as error:
+    except ImportError:
         raise InputError(
-            f"{path.name} is a {name} file; reading it needs the package {error.name or 'that reads it'}: "
-            'pip install "rigsight[formats]".'
+            f"{path.name} is a {known.name} file; reading it needs the package {known.package}: "
+            f'pip install "rigsight[{known.extra}]".'
         ) from None
     except MemoryError as error:
         raise InputError(
@@ -132,7 +131,7 @@ def _reported(path: Path, name: str) -> Iterator[None]:
         reported = str(error) if isinstance(error, ReadingError) else f"{type(error).__name__}: {error}"
         reason = " ".join(reported.split())[:200].removesuffix(":")
         raise InputError(
-            f"{path.name} cannot be read as {name}: the file is truncated or damaged ({reason}). {MEND}"
+            f"{path.name} cannot be read as {known.name}: the file is truncated or damaged ({reason}). {MEND}"
         ) from None
 
 

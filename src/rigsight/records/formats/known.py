@@ -41,6 +41,7 @@ class Format:
     isolated: bool = False
     advice: str = ""  # sentence for a file with one of the suffixes and other content
     largest: int = LARGEST_FILE  # bytes that are read of a file
+    extra: str = "formats"  # extra of rigsight that installs the package
 
     def recognizes(self, head: bytes) -> bool:
         """Return True for the first `HEAD` bytes of a file of this format."""
@@ -63,6 +64,13 @@ FORMATS = (
     Format("mdf", "MDF4", (".mf4", ".mdf"), _begins(rb"MDF     |UnFinMF "), "asammdf", isolated=True),
     Format("tdms", "TDMS", (".tdms",), _begins(rb"TDS[mh]"), "nptdms"),
     Format("parquet", "Parquet", (".parquet",), _begins(rb"PAR1"), "pyarrow", isolated=True),
+    # Bags hold images as well, which are passed over.
+    Format(
+        "bag", "ROS bag", (".bag", ".mcap", ".db3"), _begins(rb"#ROSBAG V2\.0|\x89MCAP0\r\n|SQLite format 3\x00"), "rosbags",
+        extra="logs", largest=200_000_000_000,
+        advice="Bags of ROS before 1.2 are not read: convert it with rosbag fix.",
+    ),
+    Format("ulog", "ULog", (".ulg",), _begins(rb"ULog\x01\x12\x35"), "pyulog", extra="logs"),
     # pyuff holds every number of a text dataset as an object, thirty times the file.
     Format(
         "uff", "UFF", (".uff", ".unv"), _begins(rb"[\r\n]*    -1\s*[\r\n]\s*\d"), "pyuff",

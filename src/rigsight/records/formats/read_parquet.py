@@ -1,8 +1,16 @@
-"""Which channels does a Parquet file hold?"""
+"""Which channels does a Parquet file hold, also one of a LeRobot data set?
+
+References
+----------
+R. Cadene et al., *LeRobot: State-of-the-art machine learning for real-world robotics* (2024), data sets of version 2 and 3: a
+column of lists is a feature such as ``observation.state``, and ``meta/info.json`` above the file names its numbers.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.records.formats.channel import (
+    MOST_COLUMNS,
     Channel,
     ChannelFile,
     Load,
     Refused,
+    as_stamps,
     check_count,
     listed,
     stored_by,
@@ -21,6 +31,12 @@ from rigsight.records.formats.channel import (
     unit_of,
 )
 from rigsight.records.stamps import earliest, seconds_since
+
+_STAMPS, _EPISODE = "timestamp", "episode_index"
+_PAUSE = 10.0
+"""Between the episodes of one file [s]: each is a record of its own."""
+_DEEPEST = 4
+"""Folders above a file in which the description of its data set is looked for: data/chunk-000/file.parquet."""
 
 
 def open_parquet(path: Path) -> Iterator[ChannelFile]:
@@ -30,10 +46,10 @@ def open_parquet(path: Path) -> Iterator[ChannelFile]:
 
     with ParquetFile(path) as file:
         check_count(path.name, len(file.schema_arrow))
-        yield listed(path.name, _parts(file))
+        yield listed(path.name, _parts(file, _names_of_features(path)))
 
 
-def _parts(file: Any) -> Iterator[Channel | Refused]:
+def _parts(file: Any, features: Mapping[str, Sequence[str]]) -> Iterator[Channel | Refused]:
     from pyarrow import types
 
     schema, n_rows = file.schema_arrow, file.metadata.num_rows
@@ -44,6 +60,8 @@ def _parts(file: Any) -> Iterator[Channel | Refused]:
         is_time = types.is_timestamp(kind) or types.is_duration(kind)
         if schema.names.count(name) > 1:
             yield Refused(name, "occurs twice in the file")
+        elif _is_list(kind) and n_rows > 1:
+            yield from _of_lists(file, name, n_rows, features.get(name, ()))
         elif not (types.is_integer(kind) or types.is_floating(kind) or is_time):
             yield Refused(name, f"is of type {kind}, not numbers")
         elif reason := too_short(n_rows):
@@ -54,7 +72,54 @@ def _parts(file: Any) -> Iterator[Channel | Refused]:
             }
             own = origin if types.is_timestamp(kind) else None
             unit, load = "s" if is_time else unit_of(said), _load(file, name, own, is_time=is_time)
+            if name == _STAMPS and _EPISODE in schema.names and types.is_floating(kind):
+                load = partial(_one_after_another, file)
             yield Channel(name, n_rows, load, unit, stored=stored_by(said), origin=own)
+
+
+def _is_list(kind: Any) -> bool:
+    from pyarrow import types
+
+    is_list = types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
+    return is_list and (types.is_integer(kind.value_type) or types.is_floating(kind.value_type))
+
+
+def _of_lists(file: Any, name: str, n_rows: int, labels: Sequence[str]) -> Iterator[Channel | Refused]:
+    """Yield the channels of a column of lists, one for each number in a list."""
+    (first,) = [next(file.iter_batches(batch_size=1, columns=[name]))]
+    n_numbers = len(first.column(0)[0].as_py() or ())
+    if not 0 < n_numbers <= MOST_COLUMNS:
+        yield Refused(name, f"holds lists of {n_numbers} numbers, not signals side by side")
+        return
+
+    def samples(index: int) -> NDArray[Any]:
+        from pyarrow import compute
+
+        column = file.read(columns=[name]).column(name)
+        if set(compute.unique(compute.list_value_length(column)).to_pylist()) != {n_numbers}:
+            raise ValueError(f"the lists of '{name}' differ in length")
+        return np.asarray(compute.list_element(column, index).to_numpy())
+
+    own = labels if len(labels) == n_numbers else [str(index) for index in range(n_numbers)]
+    for index, label in enumerate(own):
+        yield Channel(f"{name}/{label}", n_rows, partial(samples, index))
+
+
+def _names_of_features(path: Path) -> dict[str, list[str]]:
+    """Return the names of the numbers of each feature, from the description of a data set above a file; empty without one."""
+    for folder in path.resolve().parents[:_DEEPEST]:
+        try:
+            described = json.loads((folder / "meta" / "info.json").read_text(encoding="utf-8"))
+            features = described["features"].items()
+        except (OSError, ValueError, KeyError, AttributeError, TypeError):
+            continue
+        # Older data sets have the names by kind: {"motors": ["shoulder", ...]}.
+        named = {name: own.get("names") for name, own in features if isinstance(own, dict)}
+        flat = {
+            n: next(iter(own.values()), None) if isinstance(own, dict) else own for n, own in named.items()
+        }
+        return {name: [str(label) for label in own] for name, own in flat.items() if isinstance(own, list)}
+    return {}
 
 
 def _origin(file: Any, dated: list[str]) -> np.datetime64 | None:
@@ -63,6 +128,17 @@ def _origin(file: Any, dated: list[str]) -> np.datetime64 | None:
         return None
     (first,) = [next(file.iter_batches(batch_size=1, columns=dated))]
     return earliest(np.datetime64(first.column(name).to_numpy(zero_copy_only=False)[0]) for name in dated)
+
+
+def _one_after_another(file: Any) -> NDArray[Any]:
+    """Return the time of episodes in one file, shape (n_samples,): each begins a pause after the one before."""
+    table = file.read(columns=[_STAMPS, _EPISODE])
+    stamps, episode = (np.asarray(table.column(name).to_numpy()) for name in (_STAMPS, _EPISODE))
+    # In single precision a time behind many episodes loses its digits.
+    stamps = as_stamps(stamps)
+    for begin in np.flatnonzero(np.diff(episode)) + 1:
+        stamps[begin:] += stamps[begin - 1] + _PAUSE - stamps[begin]
+    return stamps
 
 
 def _load(file: Any, name: str, origin: np.datetime64 | None, *, is_time: bool) -> Load:

@@ -89,7 +89,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     if driven is not None and amplitude:
         unit = f" [{driven.si}]" if has_si(driven.si) else ""
         lines.append(f"amplitude = {amplitude:g}  # of {driven.signal}{unit}, guessed; check")
-    timing, timing_blanks = _timing(guess, no_time)
+    timing, timing_blanks = _timing(guess, file.channels, no_time)
     columns, column_blanks = _columns(guess, file.channels)
     lines += timing
     if columns:
@@ -122,9 +122,9 @@ def _rises(time: Channel) -> bool:
         return False
 
 
-def _timing(guess: FileGuess, no_time: str) -> tuple[list[str], int]:
+def _timing(guess: FileGuess, channels: Sequence[Channel], no_time: str) -> tuple[list[str], int]:
     """Return the keys of timing other than the time column, and the number of blanks."""
-    found = [one.channel for one in guess.signals if one.channel is not None]
+    found = [one.channel for one in guess.signals if one.channel is not None] or channels
     if guess.time.is_clear or guess.time.candidates or guess.times:
         return [], 0
     if not found or any(channel.axis is None for channel in found):

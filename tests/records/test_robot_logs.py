@@ -1,0 +1,194 @@
+"""Logs of robots: bags on which publishers take turns, messages without definition, episodes in one file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.records import ColumnMapping, ReadingOptions
+from rigsight.records.channel_names import closeness
+from rigsight.records.formats.channel_file import open_channels
+from rigsight.records.read_record import read_stretches
+
+START = 1_700_000_000_000_000_000
+
+
+@dataclass(frozen=True)
+class Named:
+    name: str
+    unit: str
+
+
+def bag(path: Path, messages: Any) -> Path:
+    """Write messages (topic, type, received [ns], fields) into an MCAP file."""
+    rosbag2, typesys = pytest.importorskip("rosbags.rosbag2"), pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+
+    def built(kind: str, fields: dict[str, Any]) -> Any:
+        return store.types[kind](**fields)
+
+    topics: dict[str, Any] = {}
+    with rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as file:
+        for topic, kind, received, fields in messages(built):
+            if topic not in topics:
+                topics[topic] = file.add_connection(topic, kind, typestore=store)
+            file.write(topics[topic], received, store.serialize_cdr(built(kind, fields), kind))
+    return path / f"{path.name}.mcap"
+
+
+def joint_state(built: Any, stamp: int, names: list[str], position: list[float]) -> dict[str, Any]:
+    time = built("builtin_interfaces/msg/Time", {"sec": stamp // 10**9, "nanosec": stamp % 10**9})
+    header = built("std_msgs/msg/Header", {"stamp": time, "frame_id": ""})
+    empty = np.zeros(0)
+    return {
+        "header": header,
+        "name": names,
+        "position": np.array(position),
+        "velocity": empty,
+        "effort": empty,
+    }
+
+
+def test_publishers_of_different_joints_take_turns_on_one_topic(tmp_path: Path) -> None:
+    def messages(built: Any) -> Any:
+        for i in range(40):
+            time = START + i * 10_000_000
+            yield (
+                "/joint_states",
+                "sensor_msgs/msg/JointState",
+                time,
+                joint_state(built, time, ["arm"], [0.1 * i]),
+            )
+            if i % 2 == 0:
+                grip = joint_state(built, time + 1_000_000, ["grip"], [-0.1 * i])
+                yield "/joint_states", "sensor_msgs/msg/JointState", time + 1_000_000, grip
+
+    with open_channels(bag(tmp_path / "turns", messages)) as file:
+        arm, grip = file.channels
+        assert (arm.name, grip.name) == ("joint_states/position/arm", "joint_states/position/grip")
+        np.testing.assert_allclose(arm.load(), 0.1 * np.arange(40))
+        np.testing.assert_allclose(grip.load(), -0.1 * np.arange(0, 40, 2))
+        assert arm.axis is not None
+        assert grip.axis is not None
+        np.testing.assert_allclose(arm.axis.stamps(), 0.01 * np.arange(40))
+        np.testing.assert_allclose(grip.axis.stamps(), 0.001 + 0.02 * np.arange(20))
+
+
+def test_a_simulated_clock_gives_way_to_the_reception(tmp_path: Path) -> None:
+    def messages(built: Any) -> Any:
+        for i in range(10):
+            simulated = joint_state(built, 5_000_000_000 + i * 1_000_000, ["arm"], [float(i)])
+            yield "/joint_states", "sensor_msgs/msg/JointState", START + i * 2_000_000, simulated
+
+    with open_channels(bag(tmp_path / "simulated", messages)) as file:
+        (arm,) = file.channels
+        assert arm.axis is not None
+        np.testing.assert_allclose(arm.axis.stamps(), 0.002 * np.arange(10))
+
+
+def test_images_beside_the_joints_are_passed_over(tmp_path: Path) -> None:
+    def messages(built: Any) -> Any:
+        for i in range(4):
+            time = START + i * 10_000_000
+            head = joint_state(built, time, ["arm"], [float(i)])["header"]
+            image = {
+                "header": head,
+                "height": 8,
+                "width": 16,
+                "encoding": "mono8",
+                "is_bigendian": 0,
+                "step": 16,
+            }
+            yield "/camera", "sensor_msgs/msg/Image", time, {**image, "data": np.zeros(128, dtype=np.uint8)}
+            yield (
+                "/joint_states",
+                "sensor_msgs/msg/JointState",
+                time,
+                joint_state(built, time, ["arm"], [float(i)]),
+            )
+
+    with open_channels(bag(tmp_path / "images", messages)) as file:
+        assert [channel.name for channel in file.channels] == ["joint_states/position/arm"]
+        (camera,) = file.refused
+        assert camera.name == "camera"
+        assert "128 numbers in a message" in camera.reason
+
+
+def episodes(folder: Path, n_episodes: int) -> Path:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    (folder / "meta").mkdir()
+    features = {
+        "action": {"names": ["pan.pos", "lift.pos"]},
+        "observation.state": {"names": {"motors": ["pan", "lift"]}},
+    }
+    (folder / "meta/info.json").write_text(json.dumps({"fps": 50, "features": features}), encoding="utf-8")
+    stamps = np.tile(0.02 * np.arange(100), n_episodes).astype(np.float32)
+    moved = np.column_stack([np.sin(3 * stamps), np.cos(2 * stamps)])
+    path = folder / "data/chunk-000/file-000.parquet"
+    path.parent.mkdir(parents=True)
+    lists = arrow.list_(arrow.float32())
+    columns = {
+        "action": arrow.array(moved.tolist(), lists),
+        "observation.state": arrow.array((0.5 * moved).tolist(), lists),
+        "timestamp": arrow.array(stamps),
+        "episode_index": arrow.array(np.repeat(np.arange(n_episodes), 100)),
+    }
+    parquet.write_table(arrow.table(columns), path)
+    return path
+
+
+def test_the_episodes_of_a_lerobot_file_are_records(tmp_path: Path) -> None:
+    path = episodes(tmp_path, 3)
+    with open_channels(path) as file:
+        names = [channel.name for channel in file.channels]
+    assert names[:4] == [
+        "action/pan.pos",
+        "action/lift.pos",
+        "observation.state/pan",
+        "observation.state/lift",
+    ]
+    columns = {
+        "t": ColumnMapping("timestamp"),
+        "u": ColumnMapping("action/pan.pos"),
+        "x": ColumnMapping("observation.state/pan"),
+    }
+    records = read_stretches(
+        path, (Named("u", "rad"),), (Named("x", "rad"),), ReadingOptions(columns=columns)
+    )
+    assert [record.n_samples for record in records] == [100, 100, 100]
+    assert all(record.dt == pytest.approx(0.02, rel=1e-5) for record in records)
+    np.testing.assert_allclose(records[2]["x"], 0.5 * records[2]["u"], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("signal", "channel", "others"),
+    [
+        ("shoulder_angle", "joint_states/position/shoulder", ("joint_states/effort/shoulder", "joint_states/position/elbow")),
+        ("shoulder_motor_ctrl", "joint_states/effort/shoulder", ("joint_states/position/shoulder",)),
+        ("pan_angle", "observation.state/pan.pos", ("observation.state/lift.pos",)),
+        ("pan_motor_ctrl", "action/pan.pos", ("observation.state/pan.pos",)),
+        ("torque", "rig/torque", ("torque test/position",)),
+    ],
+)  # fmt: skip
+def test_the_joints_of_a_log_are_found(signal: str, channel: str, others: tuple[str, ...]) -> None:
+    assert closeness(channel, signal) >= 2.0
+    assert all(closeness(other, signal) < 2.0 for other in others)
+
+
+def test_a_sqlite_file_that_is_no_bag_is_one_message(tmp_path: Path) -> None:
+    import sqlite3
+
+    pytest.importorskip("rosbags")
+    with sqlite3.connect(tmp_path / "other.db3") as data:
+        data.execute("create table t (x real)")
+    with (
+        pytest.raises(InputError, match=r"other\.db3 cannot be read as ROS bag"),
+        open_channels(tmp_path / "other.db3"),
+    ):
+        pass
