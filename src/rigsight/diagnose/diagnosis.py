@@ -31,7 +31,13 @@ from rigsight.diagnose.result import (
 from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.uncertainty.bootstrap import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
-from rigsight.diagnose.verdict.families import families_at_places, shares_of_gap
+from rigsight.diagnose.verdict.families import (
+    FamilyAtPlace,
+    Shares,
+    families_at_places,
+    shares_of_force,
+    shares_of_gap,
+)
 from rigsight.diagnose.verdict.main_cause import traced_to
 from rigsight.diagnose.verdict.ranking import Grounds, noise_vector
 from rigsight.diagnose.verdict.remainder import remainder_of
@@ -166,6 +172,7 @@ def _assembled(
         ),
         rng.spawn(1)[0],
         found.proposal,
+        judgement.by_motion,
     )
     chosen = judgement.model.effects if is_effect else ()
     likely = _likely(candidates, calibration.least_probability)
@@ -213,14 +220,20 @@ def _assembled(
         remainder=remainder,
         families=families,
         missing_force=found.proposal,
-        shares=None
-        if found.adequacy is None
-        else shares_of_gap(families, reidentified, judgement.model, found.adequacy.adequate),
+        shares=_shares(found, families),
         localization=localize(context, traces, scored_on, before, reidentified, after, rng, floors),
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
         ),
     )
+
+
+def _shares(found: Examination, families: Sequence[FamilyAtPlace]) -> Shares | None:
+    if found.judgement.by_motion and found.proposal is not None:
+        return shares_of_force(families, found.proposal)
+    if found.adequacy is None:
+        return None
+    return shares_of_gap(families, found.reidentified, found.judgement.model, found.adequacy.adequate)
 
 
 def _situation(found: Examination) -> Situation:

@@ -24,6 +24,7 @@ from rigsight.diagnose.search.places import SuspectedPlace
 from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbance, with_parts
 from rigsight.diagnose.search.several.one_law import split_distinguishable
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
+from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
 from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
 from rigsight.diagnose.verdict.main_cause import main_cause
 from rigsight.diagnose.verdict.plausibility import doubts, has_size_of_zero, plausible_first
@@ -105,6 +106,8 @@ def examine(
         lambda: main_cause(campaign.rig, reidentified, best, tied, vector, rng),
         lower_bound,
     )
+    if models.alone.worth.is_shown and not is_exact(judgement, best, allowed, checks.is_adequate):
+        judgement = by_motion(judgement, campaign.rig, reidentified, ranking, vector, models.alone.proposal)
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
     remainder = checks.of(judgement.model) if judgement.model.residuals else None

@@ -3,7 +3,7 @@
 from rigsight.inverse.equation_fit import EquationFit as EquationFit
 from rigsight.inverse.equation_fit import generalized as generalized
 from rigsight.inverse.equation_fit import held_numbers as held_numbers
-from rigsight.inverse.equation_fit import matters as matters
+from rigsight.inverse.equation_fit import identifiable as identifiable
 from rigsight.inverse.equation_fit import of_undriven as of_undriven
 from rigsight.inverse.equation_fit import record_motions as record_motions
 from rigsight.inverse.equation_fit import size_in as size_in

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,21 @@ def record_motions(rig: Rig, records: Sequence[Record], known: Mapping[str, floa
 def matters(motions: Sequence[RecordMotion], values: Mapping[str, float], name: str) -> bool:
     """Return True if a parameter has an influence on the equations along the motions."""
     return any(bool(np.any(motion.slopes(values, [name]))) for motion in motions)
+
+
+def identifiable(
+    rig: Rig,
+    motions: Sequence[RecordMotion],
+    modelled: Sequence[Effect],
+    values: Mapping[str, float],
+    held: Collection[str],
+) -> tuple[str, ...]:
+    """Return the parameters that the equations determine along the motions, beside those that are held."""
+    free = [p.name for p in rig.parameters if p.name not in held and matters(motions, values, p.name)]
+    # A constant force and the rest of a spring do the same: the rest stays where it is known.
+    of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
+    ordered = sorted(free, key=lambda name: name in of_rest)
+    return EquationFit(rig, motions, modelled, ordered).independent(values)
 
 
 def of_undriven(motions: Sequence[RecordMotion], values: Mapping[str, float]) -> set[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -35,6 +35,8 @@ _MOST_CAUSES = 5
 _WORTH = 0.03
 """Least share of the residual that a further family must remove from stretches that it was not fitted to."""
 _SIGNIFICANCE = 0.01
+_DRAWS, _LIMITS = 100, (0.025, 0.975)
+"""Resamplings of the stretches for the interval of a share, and its limits."""
 _SMOOTH = 1e-9
 
 
@@ -49,6 +51,10 @@ class ProposedCause:
     # family alone for those not taken.
     share: float
     values: Mapping[str, float]  # parameters of the effect, as far as the regression gives them
+    interval: tuple[float, float] = (
+        0.0,
+        1.0,
+    )  # 95 % limits of the share over stretches drawn with replacement
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -57,6 +63,7 @@ class ProposedCause:
             "where": self.where,
             "effect": kind_of(self.effect.name),
             "share": self.share,
+            "interval": list(self.interval),
             "parameters": dict(self.values),
         }
 
@@ -218,7 +225,11 @@ class Selection:
         begun = self.remainder([])
         best = self.best(rig, [], [])
         ordered = sorted(best.items(), key=lambda found: found[1][0])
-        alone = tuple(self._cause(key, i, 1.0 - own / begun, []) for key, (own, i) in ordered)
+        intervals = self._intervals([i for _, (_, i) in ordered])
+        alone = tuple(
+            replace(self._cause(key, i, 1.0 - own / begun, []), interval=interval)
+            for (key, (own, i)), interval in zip(ordered, intervals, strict=True)
+        )
         selected = self.selected(rig)
         remainders = [begun, *(own for _, _, own in selected)]
         taken = tuple(
@@ -241,6 +252,21 @@ class Selection:
             numbers=numbers,
             starts={name: self._values(i, []) for name, (_, i) in starts.items()},
         )
+
+    def _intervals(self, terms: Sequence[int]) -> list[tuple[float, float]]:
+        """Return the limits of the share that each term removes alone, over stretches drawn with replacement."""
+        rng = np.random.default_rng(0)
+        drawn = [self.resampled(rng) for _ in range(_DRAWS)]
+        begun = [own.remainder([]) for own in drawn]
+        shares = [
+            [
+                1.0 - own.remainder(self.places[i]) / before
+                for own, before in zip(drawn, begun, strict=True)
+                if before > 0.0
+            ]
+            for i in terms
+        ]
+        return [(float(np.quantile(own, _LIMITS[0])), float(np.quantile(own, _LIMITS[1]))) for own in shares]
 
     def _numbers(self, chosen: Sequence[int]) -> dict[str, float]:
         """Return the parameters of the equations beside chosen columns, within their bounds."""

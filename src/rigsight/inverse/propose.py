@@ -24,7 +24,7 @@ from rigsight.inverse.effect_terms import EffectTerms, is_joint_force
 from rigsight.inverse.equation_fit import (
     EquationFit,
     held_numbers,
-    matters,
+    identifiable,
     of_undriven,
     record_motions,
     with_all_inputs,
@@ -93,10 +93,6 @@ def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit
     start |= {**campaign.constants, **known}
     motions = record_motions(rig, campaign.estimation, start)
     held |= of_undriven(motions, start)
-    free = tuple(p.name for p in rig.parameters if p.name not in held and matters(motions, start, p.name))
-    # A constant force and the rest of a spring do the same: the rest stays where it is known.
-    of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
-    ordered = sorted(free, key=lambda name: name in of_rest)
-    fit = EquationFit(rig, motions, campaign.modelled, ordered)
-    fit = EquationFit(rig, motions, campaign.modelled, fit.independent(start))
+    free = identifiable(rig, motions, campaign.modelled, start, held)
+    fit = EquationFit(rig, motions, campaign.modelled, free)
     return fit, fit.settled(start)[0]

@@ -45,6 +45,11 @@ class FamilyNumbers:
         "assumption",
         "Share that counts at most: a law error of some percent is never excluded.",
     )
+    probable: float = number(
+        0.5,
+        "convention",
+        "Probability from which a family is named by the motion: it is more probable than all others together.",
+    )
     listed: float = number(
         0.01,
         "convention",

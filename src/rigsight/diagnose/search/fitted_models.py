@@ -18,7 +18,7 @@ from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
-from rigsight.diagnose.search.several.stepwise import refit_singles, several_effects
+from rigsight.diagnose.search.several.stepwise import larger_part_closed, refit_singles, several_effects
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.diagnose.search.worth_fitting import WorthFitting, worth_fitting
 from rigsight.effects import Effect
@@ -136,8 +136,10 @@ def _singles(
         prepare([context.simplest((effect,)) for effect in first])
     singles = fit_candidates(context, reidentified, first, say, along_motion=worth.starts)
     best = min((model.error_over_noise for model in singles), default=np.inf)
-    # What the motion rules out need not be fitted for a remainder that no law reaches.
-    enough = _larger_part_closed(reidentified) if worth.is_shown else VERDICT.at_floor
+    # What the motion rules out need not be fitted for a remainder that no law reaches, nor where the motion names the cause.
+    enough = VERDICT.at_floor
+    if worth.is_shown:
+        enough = np.inf if worth.most >= VERDICT.larger_part else larger_part_closed(reidentified)
     if others and best > enough:
         # A right model must not be lost because places or effects were ranked wrongly.
         if prepare is not None:
@@ -153,11 +155,6 @@ def _comes_first(effect: Effect, search: Search, worth: WorthFitting) -> bool:
     # What the motion does not judge has to explain enough itself, not only another effect at its place.
     share = search.shares.get(effect.name, search.most)
     return effect in worth.named or share >= VERDICT.larger_part * search.most
-
-
-def _larger_part_closed(reidentified: FittedModel) -> float:
-    """Return the error at which the larger part of the squared gap is closed, in units of the noise floor."""
-    return reidentified.error_over_noise * float(np.sqrt(1.0 - VERDICT.larger_part))
 
 
 def with_several_effects(

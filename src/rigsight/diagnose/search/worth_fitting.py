@@ -19,6 +19,7 @@ class WorthFitting:
     named: tuple[Effect, ...] = ()  # of those alone the ones of families that the motion names
     # Whether the motion shows every force that matters: a family that it rules out is not the main cause.
     is_shown: bool = False
+    most: float = 0.0  # share of the missing force that the best family explains
     # Own parameters of effects by their names, with which they explain most of the missing force along the motion.
     starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
@@ -40,4 +41,4 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     named = tuple(e for e in effects if e.name in proposal.judged and (e.family, rig.where(e)) in near)
     kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
     is_shown = proposal.noise is not None and proposal.noise < SEARCH.noise_of_force
-    return WorthFitting(kept, named, is_shown, proposal.starts)
+    return WorthFitting(kept, named, is_shown, most, proposal.starts)

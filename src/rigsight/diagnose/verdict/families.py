@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +71,9 @@ class Shares:
     families: float
     remainder: float
     noise: float
+    of: Literal["simulation", "motion"] = (
+        "simulation"  # of which gap: of the sensors, or of the force along the motion
+    )
 
 
 def families_at_places(
@@ -82,6 +85,7 @@ def families_at_places(
     noise: NDArray[np.float64],
     rng: np.random.Generator,
     proposal: Proposal | None = None,
+    by_motion: bool = False,
 ) -> tuple[FamilyAtPlace, ...]:
     """Return the families of the diagnosed model and of its probable rivals, the largest share first.
 
@@ -104,6 +108,8 @@ def families_at_places(
         Source of the resampling.
     proposal
         What the families explain along the measured motion; None where the sensors do not show it.
+    by_motion
+        Whether shares are those of the force along the motion, because it named the diagnosed model.
     """
     usable = [
         own
@@ -117,28 +123,25 @@ def families_at_places(
     drawn = squares.resampled(squares.draws(rng))
     explained = 1.0 - squares.mean[1:] / squares.mean[0]
     explained_drawn = 1.0 - drawn[:, 1:] / drawn[:, :1]
-    keys = [frozenset(_keys(rig, model.effects)) for model in models]
-    own_keys = _keys(rig, diagnosed.effects)
+    keys = [frozenset(keys_of(rig, model.effects)) for model in models]
+    own_keys = keys_of(rig, diagnosed.effects)
     of_sets = {key_set: [i for i, own in enumerate(keys) if own == key_set] for key_set in set(keys)}
-    of_rank = {
-        key: math.fsum(usable[i][2] for i, own in enumerate(keys) if key in own)
-        for key in {*own_keys, *itertools.chain(*keys)}
-    }
-    along = {} if proposal is None else {(c.family, c.where): max(0.0, c.share) for c in proposal.alone}
-    certainty = 0.0 if proposal is None else 1.0 - proposal.by_chance
-    of_motion = {key: _evidence(share, FAMILIES.per_motion * certainty) for key, share in along.items()}
-    main = _main_causes(of_rank, of_sets, explained, of_motion)
+    causes = {} if proposal is None else {(c.family, c.where): c for c in proposal.alone}
+    main = _weighed(keys, [own[2] for own in usable], explained, proposal)
     found = []
     for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
         members = [i for i, own in enumerate(keys) if key in own]
         listed = math.fsum(usable[i][1] for i in members)
-        beyond = main[key]
+        beyond = main.get(key, 0.0)
         if key in own_keys and len(own_keys) > 1:
             others = of_sets.get(frozenset(own_keys) - {key}, ())
             beside = max((float(explained[i]) for i in others), default=0.0)
             beyond = max(beyond, _second_cause(_explained_by(diagnosed, models, explained), beside))
-        probability = min(1.0, listed + outside * beyond)
-        if key in own_keys:
+        # Where the motion decides, no law is exact: that one of the forms tried is the true one explains nothing.
+        probability = beyond if by_motion else min(1.0, listed + outside * beyond)
+        if key in own_keys and by_motion and key in causes:
+            share, (low, high) = causes[key].share, causes[key].interval
+        elif key in own_keys:
             share = _share(key, own_keys, explained, of_sets)
             ends = [_share(key, own_keys, row, of_sets) for row in explained_drawn]
             low, high = (float(end) for end in np.quantile(ends, FAMILIES.limits))
@@ -149,9 +152,17 @@ def families_at_places(
             best = max(alone, key=lambda i: explained[i])
             share, low = 0.0, 0.0
             high = float(np.clip(np.quantile(explained_drawn[:, best], FAMILIES.limits[1]), 0.0, 1.0))
+        along = max(0.0, causes[key].share) if key in causes else None
         forms = _forms(rig, key, [usable[i] for i in members])
-        found.append(FamilyAtPlace(*key, probability, share, (low, high), forms, along.get(key)))
+        found.append(FamilyAtPlace(*key, probability, share, (low, high), forms, along))
     return tuple(sorted(found, key=lambda own: (-own.share, -own.probability)))
+
+
+def shares_of_force(found: Sequence[FamilyAtPlace], proposal: Proposal) -> Shares:
+    """Return how the squared force divides that the equations leave along the motion."""
+    families = min(1.0, math.fsum(own.share for own in found))
+    noise = min(proposal.noise or 0.0, 1.0 - families)
+    return Shares(families, 1.0 - families - noise, noise, "motion")
 
 
 def shares_of_gap(
@@ -165,22 +176,50 @@ def shares_of_gap(
     return Shares(families, remainder, 1.0 - families - remainder)
 
 
-def _main_causes(
-    of_rank: Mapping[Key, float],
-    of_sets: Mapping[frozenset[Key], Sequence[int]],
+def main_causes(
+    rig: Rig,
+    reidentified: FittedModel,
+    candidates: Sequence[tuple[FittedModel, float]],
+    noise: NDArray[np.float64],
+    proposal: Proposal | None,
+) -> dict[Key, float]:
+    """Return how probable each family is as the main cause where no law is exact, from models and their shares of the ranking."""
+    usable = [
+        own
+        for own in candidates
+        if own[0].effects and own[0].residuals and math.isfinite(own[0].error_over_noise)
+    ]
+    if not usable:
+        return {}
+    squares = squared_errors([reidentified.residuals, *(model.residuals for model, _ in usable)], noise)
+    explained = np.asarray(1.0 - squares.mean[1:] / squares.mean[0])
+    keys = [frozenset(keys_of(rig, model.effects)) for model, _ in usable]
+    return _weighed(keys, [share for _, share in usable], explained, proposal)
+
+
+def _weighed(
+    keys: Sequence[frozenset[Key]],
+    of_rank: Sequence[float],
     explained: NDArray[np.float64],
-    of_motion: Mapping[Key, float],
+    proposal: Proposal | None,
 ) -> dict[Key, float]:
     """Return how probable each family is as the main cause where no law is exact.
 
     A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
     number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
-    the ranking, which also knows which parameters are plausible.
+    the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap.
     """
+    counts = float(np.clip(np.max(explained, initial=0.0), 0.0, 1.0))
+    of_motion: dict[Key, float] = {}
+    if proposal is not None:
+        per_share = FAMILIES.per_motion * (1.0 - proposal.by_chance)
+        of_motion = {(own.family, own.where): _evidence(own.share, per_share) for own in proposal.alone}
     weights = {}
-    for key, share in of_rank.items():
-        simulated = max((float(explained[i]) for i in of_sets.get(frozenset({key}), ())), default=0.0)
-        weights[key] = max(share, FAMILIES.least_rank) * math.exp(
+    for key in dict.fromkeys(itertools.chain(*map(sorted, keys))):
+        share = math.fsum(own for own, having in zip(of_rank, keys, strict=True) if key in having)
+        alone = [float(e) for e, having in zip(explained, keys, strict=True) if having == {key}]
+        simulated = max(alone, default=0.0)
+        weights[key] = max(share, FAMILIES.least_rank) ** counts * math.exp(
             _evidence(simulated, FAMILIES.per_simulation) + of_motion.get(key, 0.0)
         )
     whole = math.fsum(weights.values()) + FAMILIES.other_causes
@@ -204,7 +243,8 @@ def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: 
     return max((float(explained[i]) for i, own in enumerate(models) if own is model), default=0.0)
 
 
-def _keys(rig: Rig, effects: Sequence[Effect]) -> tuple[Key, ...]:
+def keys_of(rig: Rig, effects: Sequence[Effect]) -> tuple[Key, ...]:
+    """Return the families of effects at their places, each once."""
     return tuple(dict.fromkeys((effect.family, rig.where(effect)) for effect in effects))
 
 

@@ -20,6 +20,7 @@ class Judgement:
     verdict: Verdict
     model: FittedModel
     reason: str
+    by_motion: bool = False  # whether the missing force along the motion decides, not the simulations
 
 
 def most_remainder(gap: float) -> float:

@@ -81,7 +81,7 @@ def _is_list(kind: Any) -> bool:
     from pyarrow import types
 
     is_list = types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
-    return is_list and (types.is_integer(kind.value_type) or types.is_floating(kind.value_type))
+    return bool(is_list and (types.is_integer(kind.value_type) or types.is_floating(kind.value_type)))
 
 
 def _of_lists(file: Any, name: str, n_rows: int, labels: Sequence[str]) -> Iterator[Channel | Refused]:

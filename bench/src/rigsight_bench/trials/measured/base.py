@@ -17,7 +17,7 @@ from rigsight.inverse import (
     EquationFit,
     RecordMotion,
     held_numbers,
-    matters,
+    identifiable,
     of_undriven,
     record_motions,
     size_in,
@@ -133,7 +133,7 @@ def base_of(campaign: Campaign) -> Base:
     undriven = sorted(name for name in held if name not in known and name in start and start[name] != 0.0)
     if undriven:
         raise SimulationError(f"The campaign does not give {', '.join(undriven)}.")
-    free = tuple(p.name for p in rig.parameters if p.name not in held and matters(motions, start, p.name))
+    free = identifiable(rig, motions, campaign.modelled, start, held)
     if campaign.modelled:
         return _fitted(campaign, motions, start, free, campaign.modelled, is_chosen=False)
     best = plain = _fitted(campaign, motions, start, free, (), is_chosen=False)

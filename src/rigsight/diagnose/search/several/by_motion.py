@@ -38,6 +38,7 @@ class NamedByMotion:
     effects: Sequence[Effect]  # candidates for a further cause
     together: Together  # sets of effects that explain the residual of the equations
     prepare: Prepare | None  # compiles structures that are about to be fitted side by side
+    enough: float  # error up to which a simulation follows the motion, in units of the noise floor
 
     def found(self) -> list[FittedModel]:
         """Return the models of several effects and their parts."""
@@ -69,8 +70,17 @@ class NamedByMotion:
                     model = larger
                     yield model
         for _ in range(SEARCH.most_unnamed):
+            # Where the simulation does not follow, what it says of effects that the motion has judged is worth nothing.
+            follows = model.error_over_noise <= self.enough
+            judged = frozenset[str]() if follows else self.proposal.judged
             larger_ones = with_one_more(
-                self.context, model, self.effects, [], self.singles, self.prepare, VERDICT.larger_part
+                self.context,
+                model,
+                [effect for effect in self.effects if effect.name not in judged],
+                [],
+                self.singles,
+                self.prepare,
+                VERDICT.larger_part,
             )
             best = min(larger_ones, key=lambda one: one.error_over_noise, default=model)
             if not self._is_worth(best, model):

@@ -218,7 +218,8 @@ def several_effects(
     if is_shown and best.error_over_noise <= SEARCH.law_error * reidentified.error_over_noise:
         return []
     if is_shown and proposal is not None:
-        named = NamedByMotion(context, usable, proposal, effects, together, prepare).found()
+        enough = larger_part_closed(reidentified)
+        named = NamedByMotion(context, usable, proposal, effects, together, prepare, enough).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
     is_excused = lower_bound and best.error_over_noise <= VERDICT.at_lower_bound
     if is_excused and checks.is_adequate(best):
@@ -229,6 +230,11 @@ def several_effects(
     search = Stepwise(context, usable, effects, forms, together, prepare)
     found = search.found(at_floor, None if lower_bound else checks)
     return [model for model in found if not is_excused or model.error_over_noise <= VERDICT.at_floor]
+
+
+def larger_part_closed(reidentified: FittedModel) -> float:
+    """Return the error at which the larger part of the squared gap is closed, in units of the noise floor."""
+    return reidentified.error_over_noise * float(np.sqrt(1.0 - VERDICT.larger_part))
 
 
 def half_closed(remainder: float) -> float:
