@@ -27,7 +27,12 @@ from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
 from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
 from rigsight.diagnose.verdict.main_cause import main_cause
-from rigsight.diagnose.verdict.plausibility import doubts, has_size_of_zero, plausible_first
+from rigsight.diagnose.verdict.plausibility import (
+    doubts,
+    has_size_of_zero,
+    is_beyond_records,
+    plausible_first,
+)
 from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
 from rigsight.effects import Effect
 from rigsight.identify import FitMemory
@@ -160,9 +165,12 @@ def _ranked(
         several = with_parts(stand, several)
     fitted = [*singles, *several]
     candidates: list[FittedModel] = []
-    of_no_size: list[FittedModel] = []
+    not_shown: list[FittedModel] = []
     for model in fitted:
-        (of_no_size if has_size_of_zero(model, [reidentified, *fitted]) else candidates).append(model)
+        is_shown = not (
+            has_size_of_zero(model, [reidentified, *fitted]) or is_beyond_records(model, context.scales)
+        )
+        (candidates if is_shown else not_shown).append(model)
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
     # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.
     counts = likeliest is not None and models.checks.is_adequate(likeliest)
@@ -176,7 +184,7 @@ def _ranked(
         if ranking.order[0].error_over_noise > allowed:
             places = {e.name: context.rig.acts_at(e) for model in ranking.order for e in model.effects}
             ranking = plausible_first(ranking, reidentified, places)
-    return with_last(ranking, of_no_size), tuple(imitations)
+    return with_last(ranking, not_shown), tuple(imitations)
 
 
 def _with_offset_rivals(

@@ -63,7 +63,7 @@ TORQUE_RIPPLE = Effect(
             lower=1e-9,
             upper=1e12,
             starts=(6.0, 15.0),
-            search=(4.5, 60.0),
+            search=(3.3, 60.0),
             logarithmic=True,
         ),
     ),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
+from rigsight.diagnose.verdict.plausibility import doubts, is_beyond_records, plausible_first
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 
 PLACES = {"coulomb_friction": "dynamics", "stribeck_friction": "dynamics", "actuator_lag": "actuator"}
@@ -88,3 +88,17 @@ def test_a_model_that_is_far_worse_or_elsewhere_does_not(models, scored) -> None
         scored(("actuator_lag",), residuals=np.full(9, 5.1)), coulomb.fit.values, coulomb.fit.standard_errors
     )
     assert plausible_first(ranked(stribeck, lag, worse), reidentified, PLACES).order[0] is stribeck
+
+
+@pytest.mark.parametrize(("wave_number", "beyond"), [(3.0, True), (6.0, False)])
+def test_a_wave_of_which_the_motion_shows_less_than_one_and_a_half_periods_is_no_ripple(
+    scored, wave_number: float, beyond: bool
+) -> None:
+    values = {"T_sin": 1.0, "T_cos": 0.1, "kappa": wave_number}
+    model = with_numbers(scored(("torque_ripple",)), values, dict.fromkeys(values, 0.1))
+    assert is_beyond_records(model, {"x": 1.0}) is beyond
+    assert not is_beyond_records(model_without_waves(scored), {"x": 1.0})
+
+
+def model_without_waves(scored) -> FittedModel:
+    return with_numbers(scored(("coulomb_friction",)), {"T_c": 1.0}, {"T_c": 0.1})

@@ -14,7 +14,8 @@ from rigsight.diagnose.policy import NOTES, VERDICT
 from rigsight.diagnose.search.basins import is_lower
 from rigsight.diagnose.search.starts import ENDLESS
 from rigsight.diagnose.verdict.ranking import Ranking
-from rigsight.effects import Effect
+from rigsight.effects import Effect, placed_dimension
+from rigsight.units import characteristic_value
 
 _AT_BOUND = 1e-6
 """Distance from a bound of the search, relative to it, that counts as standing there."""
@@ -77,6 +78,21 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
         return (without is not None and not is_lower(model.fit, without)) or _is_within_errors(model, effect)
 
     return any(map(is_zero, model.effects))
+
+
+def is_beyond_records(model: FittedModel, scales: Mapping[str, float]) -> bool:
+    """Return True if an effect is periodic in the position with a wave longer than the motion shows: it is another spring."""
+
+    def is_too_long(effect: Effect) -> bool:
+        wave = next((p for p in effect.parameters if p.name == effect.wave_number), None)
+        if wave is None:
+            return False
+        fitted = model.fit.values[model.fit.structure.parameter_name(effect, wave.name)]
+        return fitted < wave.search[0] * characteristic_value(
+            placed_dimension(effect, wave.dimension), scales
+        )
+
+    return any(map(is_too_long, model.effects))
 
 
 def _is_within_errors(model: FittedModel, effect: Effect) -> bool:

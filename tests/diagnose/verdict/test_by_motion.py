@@ -1,0 +1,119 @@
+"""The motion names a family only where it is the most probable main cause and removes the larger part of the missing force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
+from rigsight.diagnose.verdict.families import families_at_places, shares_of_force
+from rigsight.diagnose.verdict.judgement import Judgement
+from rigsight.diagnose.verdict.ranking import Grounds, Ranking
+from rigsight.effects import Family, effect_named
+from rigsight.inverse import Proposal, ProposedCause
+from rigsight.rigs import AXIS
+
+GAP = 10.0 * np.random.default_rng(0).standard_normal(4000)
+
+
+def cause(name: str, share: float) -> ProposedCause:
+    effect = effect_named(name)
+    return ProposedCause(effect, effect.family, AXIS.where(effect), share, {}, (share - 0.05, share + 0.05))
+
+
+def proposal(*causes: ProposedCause) -> Proposal:
+    judged = frozenset(own.effect.name for own in causes)
+    return Proposal(causes[:1], causes, judged, causes[0].share, 0.0, noise=0.02)
+
+
+def ranking(*models: tuple[FittedModel, float]) -> Ranking:
+    shares = tuple(share for _, share in models)
+    grounds = tuple(Grounds(share, share, None) for share in shares)
+    return Ranking(tuple(model for model, _ in models), shares, (), grounds)
+
+
+@pytest.fixture
+def reidentified(scored) -> FittedModel:
+    return scored((), error_over_noise=10.0, residuals=GAP)
+
+
+@pytest.fixture
+def models(scored) -> dict[str, FittedModel]:
+    """Simulations of which none lowers the error clearly."""
+    names = ("coulomb_friction", "stribeck_friction", "cubic_stiffness")
+    return {name: scored((name,), error_over_noise=9.9, residuals=0.99 * GAP) for name in names}
+
+
+def named(judgement: Judgement, found: Proposal, order: Ranking, reidentified: FittedModel) -> Judgement:
+    return by_motion(judgement, AXIS, reidentified, order, np.ones(1), found)
+
+
+def test_the_family_of_the_missing_force_is_named_where_no_simulation_explains_the_gap(
+    reidentified, models
+) -> None:
+    order = ranking(
+        (models["cubic_stiffness"], 0.9),
+        (models["stribeck_friction"], 0.07),
+        (models["coulomb_friction"], 0.03),
+    )
+    seen = proposal(cause("coulomb_friction", 0.85), cause("cubic_stiffness", 0.1))
+    before = Judgement("unknown", reidentified, "")
+    found = named(before, seen, order, reidentified)
+    assert (found.verdict, found.model.names, found.by_motion) == ("effect", ("stribeck_friction",), True)
+    assert "85%" in found.reason
+    families = families_at_places(
+        AXIS,
+        reidentified,
+        found.model,
+        [(model, 0.0, share) for model, share in zip(order.order, order.probabilities, strict=True)],
+        1.0,
+        np.ones(1),
+        np.random.default_rng(1),
+        seen,
+        by_motion=True,
+    )
+    assert families[0].family is Family.DRY_FRICTION
+    assert families[0].probability > 0.9
+    assert (families[0].share, families[0].interval) == (0.85, pytest.approx((0.8, 0.9)))
+    shares = shares_of_force(families, seen)
+    assert shares.of == "motion"
+    assert shares.families + shares.remainder + shares.noise == pytest.approx(1.0)
+    assert shares.noise == 0.02
+
+
+def test_a_force_that_no_family_removes_stays_unknown(reidentified, models) -> None:
+    order = ranking(*((model, 1.0 / 3.0) for model in models.values()))
+    before = Judgement("unknown", reidentified, "")
+    assert named(before, proposal(cause("coulomb_friction", 0.45)), order, reidentified) is before
+
+
+def test_two_families_that_remove_as_much_leave_it_open(reidentified, models) -> None:
+    order = ranking((models["cubic_stiffness"], 0.5), (models["coulomb_friction"], 0.5))
+    before = Judgement("unknown", reidentified, "")
+    seen = proposal(cause("coulomb_friction", 0.8), cause("cubic_stiffness", 0.8))
+    assert named(before, seen, order, reidentified) is before
+
+
+def test_a_named_family_is_kept_where_the_motion_names_it_too(reidentified, models) -> None:
+    order = ranking((models["coulomb_friction"], 0.9), (models["cubic_stiffness"], 0.1))
+    before = Judgement("effect", models["coulomb_friction"], "")
+    assert named(before, proposal(cause("stribeck_friction", 0.9)), order, reidentified) is before
+
+
+@pytest.mark.parametrize(
+    ("verdict", "error", "adequate", "exact"),
+    [
+        ("none", 9.0, False, True),
+        ("parameters", 9.0, False, True),
+        ("effect", 1.05, False, True),
+        ("effect", 9.0, True, True),
+        ("effect", 9.0, False, False),
+        ("unknown", 9.0, True, False),
+    ],
+)
+def test_a_simulation_that_leaves_noise_decides(
+    scored, verdict, error: float, adequate: bool, exact: bool
+) -> None:
+    best = scored(("coulomb_friction",), error_over_noise=error)
+    assert is_exact(Judgement(verdict, best, ""), best, 1.6, lambda _: adequate) is exact
