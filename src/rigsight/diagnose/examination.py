@@ -25,6 +25,7 @@ from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbanc
 from rigsight.diagnose.search.several.one_law import split_distinguishable
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
+from rigsight.diagnose.verdict.families import probable_part
 from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
 from rigsight.diagnose.verdict.main_cause import main_cause
 from rigsight.diagnose.verdict.plausibility import (
@@ -103,6 +104,8 @@ def examine(
     ranking, imitations = _ranked(models, alone.effects, vector, allowed, rng)
     is_usable = bool(ranking.order) and bool(ranking.order[0].residuals) and ranking.probabilities[0] > 0.0
     best, tied = (ranking.order[0], ranking.tied) if is_usable else (reidentified, ())
+    if len(best.effects) > 1 and best.error_over_noise > allowed and not checks.is_adequate(best):
+        best = probable_part(campaign.rig, reidentified, best, ranking.order)
     judgement = judge(
         before.error_over_noise,
         reidentified,

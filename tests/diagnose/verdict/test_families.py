@@ -8,6 +8,7 @@ import pytest
 from rigsight.diagnose.policy import FAMILIES
 from rigsight.diagnose.verdict.families import (
     families_at_places,
+    probable_part,
     shares_of_gap,
 )
 from rigsight.effects import CATALOGUE, Family, effect_named
@@ -106,3 +107,17 @@ def test_a_family_that_explains_the_force_along_the_motion_is_more_probable(scor
     assert friction.probability / spring.probability == pytest.approx(expected, rel=1e-6)
     assert (friction.along_motion, spring.along_motion) == (0.6, None)
     assert friction.to_json()["along_motion"] == 0.6
+
+
+@pytest.mark.parametrize(
+    ("remainder", "kept"), [(8.8, ("cubic_stiffness",)), (2.0, ("cubic_stiffness", "coulomb_friction"))]
+)
+def test_a_further_family_is_named_only_where_it_removes_most_of_the_remainder(
+    scored, remainder: float, kept: tuple[str, ...]
+) -> None:
+    left = np.ones(8)
+    both = scored(("cubic_stiffness", "coulomb_friction"), error_over_noise=remainder, residuals=left)
+    alone = scored(("cubic_stiffness",), error_over_noise=9.8, residuals=left)
+    friction = scored(("coulomb_friction",), error_over_noise=60.0, residuals=left)
+    reidentified = scored((), error_over_noise=60.0)
+    assert probable_part(AXIS, reidentified, both, [both, alone, friction]).names == kept

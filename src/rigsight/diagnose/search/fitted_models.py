@@ -83,6 +83,10 @@ def single_models(
         reidentified = _from_numbers(context, reidentified, proposal.numbers)
     worth = worth_fitting(campaign.rig, proposal, effects)
     context = _with_known_motion(campaign, context, reidentified)
+    if worth.is_shown and len(context.look) == len(context.estimation):
+        # What a law errs does not average out: the most excited stretches say as much as whole records.
+        context = replace(context, estimation=context.look)
+        reidentified = reidentify(context, reidentified.fit.values)
     search, singles = _singles(context, reidentified, worth, say, prepare)
     lowered = lowered_by_extensions(context, reidentified, singles)
     if lowered.fit.cost <= (1.0 - SEARCH.worth_restarting) * reidentified.fit.cost:

@@ -197,6 +197,38 @@ def main_causes(
     return _weighed(keys, [share for _, share in usable], explained, proposal)
 
 
+def probable_part(
+    rig: Rig, reidentified: FittedModel, model: FittedModel, others: Sequence[FittedModel]
+) -> FittedModel:
+    """Return a model without the families that are less probable than not beside its other ones."""
+    gap = reidentified.error_over_noise**2
+    while len(keys := keys_of(rig, model.effects)) > 1:
+        parts = {
+            key: [
+                own for own in others if own.residuals and set(keys_of(rig, own.effects)) == set(keys) - {key}
+            ]
+            for key in keys
+        }
+        best = {key: min(own, key=_error, default=None) for key, own in parts.items()}
+        together = 1.0 - model.error_over_noise**2 / gap
+        chances = {
+            key: _second_cause(together, max(0.0, 1.0 - part.error_over_noise**2 / gap))
+            for key, part in best.items()
+            if part is not None
+        }
+        least = min(chances, key=lambda key: chances[key], default=None)
+        if least is None or chances[least] >= FAMILIES.probable:
+            break
+        smaller = best[least]
+        assert smaller is not None
+        model = smaller
+    return model
+
+
+def _error(model: FittedModel) -> float:
+    return model.error_over_noise
+
+
 def _weighed(
     keys: Sequence[frozenset[Key]],
     of_rank: Sequence[float],

@@ -219,7 +219,7 @@ def several_effects(
         return []
     if is_shown and proposal is not None:
         enough = larger_part_closed(reidentified)
-        named = NamedByMotion(context, usable, proposal, effects, together, prepare, enough).found()
+        named = NamedByMotion(context, usable, proposal, effects, prepare, enough).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
     is_excused = lower_bound and best.error_over_noise <= VERDICT.at_lower_bound
     if is_excused and checks.is_adequate(best):
