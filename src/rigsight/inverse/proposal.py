@@ -147,11 +147,7 @@ class Selection:
 
     def remainder(self, chosen: Sequence[int]) -> float:
         """Return the sum of squares of held-out stretches with further columns beside those of the equations."""
-        at = np.asarray([*self.own, *chosen], dtype=np.int64)
-        x = self._solved(self.whole - self.products, [*self.own, *chosen])
-        along = np.einsum("gi,gi->", x, self.products[:, at, -1])
-        squares = np.einsum("gi,gij,gj->", x, self.products[:, at[:, None], at], x)
-        return max(float(self.whole[-1, -1] - 2.0 * along + squares), 0.0)
+        return float(self._drawn(np.ones((1, _STRETCHES), dtype=np.int64), chosen)[0])
 
     def with_added(self, rows: Sequence[Floats]) -> Selection:
         """Return the selection for records in which a further force acts: what `EffectTerms.acting` gives."""
@@ -256,17 +252,23 @@ class Selection:
     def _intervals(self, terms: Sequence[int]) -> list[tuple[float, float]]:
         """Return the limits of the share that each term removes alone, over stretches drawn with replacement."""
         rng = np.random.default_rng(0)
-        drawn = [self.resampled(rng) for _ in range(_DRAWS)]
-        begun = [own.remainder([]) for own in drawn]
-        shares = [
-            [
-                1.0 - own.remainder(self.places[i]) / before
-                for own, before in zip(drawn, begun, strict=True)
-                if before > 0.0
-            ]
-            for i in terms
-        ]
+        counts = rng.multinomial(_STRETCHES, np.full(_STRETCHES, 1.0 / _STRETCHES), size=_DRAWS)
+        begun = self._drawn(counts, [])
+        shares = [1.0 - self._drawn(counts, self.places[i]) / begun for i in terms]
         return [(float(np.quantile(own, _LIMITS[0])), float(np.quantile(own, _LIMITS[1]))) for own in shares]
+
+    def _drawn(self, counts: NDArray[np.int64], chosen: Sequence[int]) -> Floats:
+        """Return what `remainder` is for stretches drawn so often, shape (n_draws, n_stretches) -> (n_draws,)."""
+        at = np.asarray([*self.own, *chosen, self.matrix.shape[1] - 1], dtype=np.int64)
+        parts = counts[:, :, None, None] * self.products[:, at[:, None], at]
+        whole = np.sum(parts, axis=1, keepdims=True)
+        rest = whole - parts
+        ridge = _SMOOTH * self.n_rows * np.eye(at.size - 1)
+        x = np.linalg.solve(rest[..., :-1, :-1] + ridge, rest[..., :-1, -1:])[..., 0]
+        along = np.einsum("dgi,dgi->d", x, parts[..., :-1, -1])
+        squares = np.einsum("dgi,dgij,dgj->d", x, parts[..., :-1, :-1], x)
+        least = np.finfo(np.float64).tiny
+        return np.asarray(np.maximum(whole[:, 0, -1, -1] - 2.0 * along + squares, least))
 
     def _numbers(self, chosen: Sequence[int]) -> dict[str, float]:
         """Return the parameters of the equations beside chosen columns, within their bounds."""
