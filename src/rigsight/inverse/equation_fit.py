@@ -99,7 +99,7 @@ class EquationFit:
 
     def rows(self, values: Mapping[str, float]) -> list[Floats]:
         """Return the residual of each equation along each motion, in the band of the motion."""
-        return [motion.filtered(self.residual(motion, values)) for motion in self.motions]
+        return [motion.inner(self.residual(motion, values)) for motion in self.motions]
 
     def residual(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
         """Return the residual of each equation along one motion in its whole band, shape (n_equations, n_samples)."""
@@ -165,7 +165,7 @@ class EquationFit:
 
     def _influences(self, values: Mapping[str, float], weight: Floats) -> tuple[Floats, Floats]:
         """Return the derivatives of all residuals by the free numbers as columns of RMS one, and the RMS that they had."""
-        slopes = [motion.filtered(self.slopes(motion, values)) / weight for motion in self.motions]
+        slopes = [motion.inner(self.slopes(motion, values)) / weight for motion in self.motions]
         matrix = np.concatenate([own.reshape(len(self.free), -1) for own in slopes], axis=1).T
         size = np.sqrt(np.mean(matrix**2, axis=0))
         size[size == 0.0] = 1.0

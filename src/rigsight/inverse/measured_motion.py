@@ -25,6 +25,8 @@ WIDER = 3.0
 _HIGHEST = 0.8
 """Share of the Nyquist frequency above which nothing is filtered."""
 _ORDER = 4
+_END = 2.0
+"""Samples of a filtered row at the end of a record that its edge spoils, in units of the samples of half a period of the band."""
 _ABOVE = 1.2
 """Sampling rate of filtered rows, in units of twice the end of their band."""
 
@@ -141,9 +143,14 @@ class RecordMotion:
             return rows
         return np.asarray(sosfiltfilt(self._filter, rows, axis=-1))
 
+    def inner(self, rows: Floats) -> Floats:
+        """Return filtered rows without the ends of the record, where neither acceleration nor filter has both sides."""
+        n_end = min(max(1, int(_END / self.band)), rows.shape[-1] // 10)
+        return self.filtered(rows)[..., n_end : rows.shape[-1] - n_end]
+
     def thinned(self, rows: Floats) -> Floats:
-        """Return filtered rows at those samples only that are nearly independent."""
-        return self.filtered(rows)[..., :: max(1, int(1.0 / (_ABOVE * self.band)))]
+        """Return inner filtered rows at those samples only that are nearly independent."""
+        return self.inner(rows)[..., :: max(1, int(1.0 / (_ABOVE * self.band)))]
 
 
 def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> RecordMotion | None:

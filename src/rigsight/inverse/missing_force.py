@@ -23,7 +23,6 @@ Floats = NDArray[np.float64]
 
 _CLASSES, _CLASS_ROWS = 24, 8
 """Number of classes, by displacement or velocity, over which a force is averaged at most, and of rows in each at least."""
-_SHORT = 10
 _SEED = 0
 """The noise of a weight is the same for equal records: a diagnosis depends on its records alone."""
 
@@ -109,7 +108,7 @@ def missing_forces(
     covariance
         Of the rows by noise of the sensors, see `noise_of_rows`; None: every equation counts in units of its own residual.
     """
-    rows = [_inner(motion, fit.residual(motion, values)) for motion in fit.motions]
+    rows = [motion.thinned(fit.residual(motion, values)) for motion in fit.motions]
     if covariance is None:
         weight = np.diag([1.0 / max(float(np.mean(own**2)), 1e-300) for own in np.concatenate(rows, axis=1)])
     else:
@@ -120,7 +119,7 @@ def missing_forces(
     for joint in fit.rig.mechanism.joints:
         forces, explained = [], -float(n_rows)
         for motion, own in zip(fit.motions, rows, strict=True):
-            along = _inner(motion, per_force(motion, joint, values))
+            along = motion.thinned(per_force(motion, joint, values))
             size = np.einsum("it,ij,jt->t", along, weight, along)
             pushed = np.einsum("it,ij,jt->t", along, weight, own)
             explained += float(np.sum(pushed**2 / np.maximum(size, np.finfo(np.float64).tiny)))
@@ -142,22 +141,16 @@ def missing_forces(
                 ),
                 np.concatenate(
                     [
-                        _inner(m, np.arange(m.record.n_samples, dtype=np.float64) * m.record.dt)
+                        m.thinned(np.arange(m.record.n_samples, dtype=np.float64) * m.record.dt)
                         for m in fit.motions
                     ]
                 ),
-                np.concatenate([_inner(m, own.x) for m, own in zip(fit.motions, moved, strict=True)]),
-                np.concatenate([_inner(m, own.v) for m, own in zip(fit.motions, moved, strict=True)]),
+                np.concatenate([m.thinned(own.x) for m, own in zip(fit.motions, moved, strict=True)]),
+                np.concatenate([m.thinned(own.v) for m, own in zip(fit.motions, moved, strict=True)]),
                 force,
             )
         )
     return tuple(sorted(found, key=lambda own: -own.share))
-
-
-def _inner(motion: RecordMotion, rows: Floats) -> Floats:
-    """Return nearly independent rows without the first and the last, where derivatives have neighbors on one side only."""
-    thinned = motion.thinned(rows)
-    return thinned[..., 1:-1] if thinned.shape[-1] > _SHORT else thinned
 
 
 def noise_of_rows(fit: EquationFit, values: Mapping[str, float], noise: Mapping[str, float]) -> Floats | None:
@@ -175,7 +168,7 @@ def noise_of_rows(fit: EquationFit, values: Mapping[str, float], noise: Mapping[
     except SimulationError:
         return None
     changes = [
-        _inner(motion, fit.residual(other, values) - fit.residual(motion, values))
+        motion.thinned(fit.residual(other, values) - fit.residual(motion, values))
         for motion, other in zip(fit.motions, moved, strict=True)
     ]
     return np.atleast_2d(np.cov(np.concatenate(changes, axis=1)))
