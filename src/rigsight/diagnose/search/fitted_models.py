@@ -83,7 +83,11 @@ def single_models(
         reidentified = _from_numbers(context, reidentified, proposal.numbers)
     worth = worth_fitting(campaign.rig, proposal, effects)
     context = _with_known_motion(campaign, context, reidentified)
-    if worth.is_shown and len(context.look) == len(context.estimation):
+    if (
+        worth.is_shown
+        and context.scoring != context.estimation
+        and len(context.look) == len(context.estimation)
+    ):
         # What a law errs does not average out: the most excited stretches say as much as whole records.
         context = replace(context, estimation=context.look)
         reidentified = reidentify(context, reidentified.fit.values)
@@ -183,6 +187,11 @@ def with_several_effects(
         if _explained(cut, cut.singles, at_floor):
             return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms)
     checks = Checks(context, rng, VERDICT.at_floor, most_remainder)
+
+    def ask(model: FittedModel) -> Proposal | None:
+        beside = replace(campaign, modelled=(*campaign.modelled, *model.effects))
+        return propose(beside, {**campaign.constants, **model.fit.values}, models.effects, noise)
+
     found = several_effects(
         context,
         models.reidentified,
@@ -190,6 +199,7 @@ def with_several_effects(
         models.effects,
         models.worth.is_shown,
         models.proposal,
+        ask,
         forms,
         checks,
         lower_bound,

@@ -220,6 +220,7 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
         [],
         False,
         None,
+        lambda _: None,
         None,
         SimpleNamespace(is_adequate=lambda _: adequate),
         adequate is not None,
@@ -260,6 +261,7 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
         [],
         False,
         None,
+        lambda _: None,
         None,
         SimpleNamespace(is_adequate=lambda _: adequate),
         lower_bound,
@@ -271,7 +273,17 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
 def test_a_residual_of_the_size_of_a_law_error_asks_for_no_second_effect(scored) -> None:
     single = scored(("cubic_stiffness",), error_over_noise=1.9, residuals=np.ones(8))
     kept = several_effects(
-        None, scored((), error_over_noise=40.0), [single], [], True, None, None, None, False, None
+        None,
+        scored((), error_over_noise=40.0),
+        [single],
+        [],
+        True,
+        None,
+        lambda _: None,
+        None,
+        None,
+        False,
+        None,
     )
     assert kept == []
 

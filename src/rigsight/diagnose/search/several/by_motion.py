@@ -8,7 +8,7 @@ needless are dropped, and other forms of each family are tried in their place.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -27,6 +27,9 @@ Key = tuple[Family, str]
 """A family and the place at which it acts."""
 
 
+Ask = Callable[[FittedModel], Proposal | None]
+
+
 @dataclass(frozen=True)
 class NamedByMotion:
     """What the search works with."""
@@ -36,6 +39,7 @@ class NamedByMotion:
     proposal: Proposal  # the families that the motion names
     effects: Sequence[Effect]  # candidates for a further cause
     prepare: Prepare | None  # compiles structures that are about to be fitted side by side
+    ask: Ask  # what the motion says of the force that a fitted model leaves
     enough: float  # error up to which a simulation follows the motion, in units of the noise floor
 
     def found(self) -> list[FittedModel]:
@@ -64,19 +68,21 @@ class NamedByMotion:
                 if self._is_worth(larger, model):
                     model = larger
                     yield model
+        unjudged = [effect for effect in self.effects if effect.name not in self.proposal.judged]
         for _ in range(SEARCH.most_unnamed):
-            # Where the simulation does not follow, what it says of effects that the motion has judged is worth nothing.
+            # Along the motion the fitted model leaves another force than the numbers of the regression did. Where the simulation
+            # does not follow the motion, its numbers are worth less than those; beside a delay or a lag nothing can be asked.
             follows = model.error_over_noise <= self.enough
-            judged = frozenset[str]() if follows else self.proposal.judged
+            beside = self.ask(model) if follows else None
+            further = unjudged if beside is not None or not follows else self.effects
             larger_ones = with_one_more(
-                self.context,
-                model,
-                [effect for effect in self.effects if effect.name not in judged],
-                [],
-                self.singles,
-                self.prepare,
-                VERDICT.larger_part,
+                self.context, model, further, [], self.singles, self.prepare, VERDICT.larger_part
             )
+            larger_ones += [
+                self._with(model, cause.effect, cause.values)
+                for cause in (() if beside is None else beside.taken[:1])
+                if (cause.family, cause.where) not in map(self._key, model.effects)
+            ]
             best = min(larger_ones, key=lambda one: one.error_over_noise, default=model)
             if not self._is_worth(best, model):
                 break

@@ -27,7 +27,7 @@ from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.first_look import LOOK_ACCURACY, FirstLook
 from rigsight.diagnose.search.same_equation import without_repeated_equations
-from rigsight.diagnose.search.several.by_motion import NamedByMotion
+from rigsight.diagnose.search.several.by_motion import Ask, NamedByMotion
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
 from rigsight.diagnose.search.several.parts import part_of, reduced
@@ -196,6 +196,7 @@ def several_effects(
     effects: Sequence[Effect],
     is_shown: bool,
     proposal: Proposal | None,
+    ask: Ask,
     forms: OtherForms,
     checks: Checks,
     lower_bound: bool,
@@ -203,7 +204,7 @@ def several_effects(
 ) -> list[FittedModel]:
     """Return models of several effects if a single effect does not explain everything.
 
-    `is_shown` is True where the motion shows every force that matters.
+    `is_shown` is True where the motion shows every force that matters; `ask` says what it shows of the force that a model leaves.
     Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
     bound. Where errors of laws are larger than noise, a residual of the size of the error of one law asks for no second one.
     """
@@ -219,7 +220,7 @@ def several_effects(
         return []
     if is_shown and proposal is not None:
         enough = larger_part_closed(reidentified)
-        named = NamedByMotion(context, usable, proposal, effects, prepare, enough).found()
+        named = NamedByMotion(context, usable, proposal, effects, prepare, ask, enough).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
     is_excused = lower_bound and best.error_over_noise <= VERDICT.at_lower_bound
     if is_excused and checks.is_adequate(best):
