@@ -25,7 +25,8 @@ def inspect(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="A measured file: CSV, MATLAB, HDF5, MDF4, TDMS, Parquet, UFF or JSON."
+            metavar="FILE",
+            help="A measured file: CSV, MATLAB, HDF5, MDF4, TDMS, Parquet, UFF, JSON, ROS bag (MCAP too) or ULog.",
         ),
     ],
     rigs: OwnRigs = None,

@@ -77,11 +77,11 @@ def closeness(name: str, signal: str) -> float:
     if signal in _SYMBOLS:
         return by_other_names
     # A name from a rig file: its words may be in another order or among others.
-    own = set(asked.split()) - _FILLERS or set(asked.split())
-    inside = set(words.split())
+    own, inside = set(asked.split()), set(words.split())
     shared = own & inside
     if shared and "/" in bare:
         # A log of a robot has a group for each quantity, and in it the joints: position/elbow.
+        own = own - _FILLERS or own
         inside |= set(_words(bare.split("/")[-2]).split())
         shared = {word for word in own if inside & {word, *_QUANTITIES.get(word, ())}}
     by_words = 2.0 if own and shared == own else _IN_PART * len(shared) / max(1, len(own))
