@@ -36,7 +36,7 @@ _QUANTITIES = {
     "ctrl": ("effort", "command", "commands", "action", "tau", "current"),
 }
 """What a log of a robot calls the quantities of its joints."""
-_FILLERS = frozenset({"motor", "joint", "actuator", "servo"})
+_FILLERS = frozenset({"motor", "joint", "actuator"})
 # A last word without brackets is a unit only if it can hardly be anything else: x_a is no length of years.
 _UNITS_BEHIND = frozenset({
     "s", "ms", "us", "µs", "A", "mA", "V", "mV", "N", "kN", "mN", "Nm", "kNm",
