@@ -89,6 +89,11 @@ class Proposal:
     # Parameters of every effect alone, by its name, where it can have the sign that it needs.
     starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The forms of the families that were taken."""
+        return tuple(cause.effect for cause in self.taken)
+
     def to_json(self) -> dict[str, Any]:
         """Return ``missing_force`` of ``diagnosis.json``."""
         return {

@@ -18,6 +18,7 @@ from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
 from rigsight.diagnose.search.several.parts import fitted_from, part_of
+from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, refine
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect, Family
@@ -39,12 +40,17 @@ class NamedByMotion:
     proposal: Proposal  # the families that the motion names
     effects: Sequence[Effect]  # candidates for a further cause
     prepare: Prepare | None  # compiles structures that are about to be fitted side by side
+    together: Together  # sets of the effects that the motion names or does not judge
     ask: Ask  # what the motion says of the force that a fitted model leaves
     enough: float  # error up to which a simulation follows the motion, in units of the noise floor
 
     def found(self) -> list[FittedModel]:
         """Return the models of several effects and their parts."""
         models = list(self._grown(self.singles[0]))
+        # Two that the motion does not judge, such as a delay and a resonance, may hide each other.
+        for size in (2, 3):
+            sets = self.together.fitted(size, VERDICT.larger_part)
+            models += [one for one in sets if self._is_worth(one, self.singles[0])]
         if not models:
             return []
         model = min(models, key=lambda one: one.error_over_noise)

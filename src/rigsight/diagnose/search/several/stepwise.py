@@ -219,8 +219,10 @@ def several_effects(
     if is_shown and best.error_over_noise <= SEARCH.law_error * reidentified.error_over_noise:
         return []
     if is_shown and proposal is not None:
+        open_ones = [e for e in effects if e.name not in proposal.judged or e in proposal.effects]
+        sets = Together(context, reidentified, open_ones, prepare)
         enough = larger_part_closed(reidentified)
-        named = NamedByMotion(context, usable, proposal, effects, prepare, ask, enough).found()
+        named = NamedByMotion(context, usable, proposal, effects, prepare, sets, ask, enough).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
     is_excused = lower_bound and best.error_over_noise <= VERDICT.at_lower_bound
     if is_excused and checks.is_adequate(best):
