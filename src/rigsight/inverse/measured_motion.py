@@ -26,7 +26,10 @@ _HIGHEST = 0.8
 """Share of the Nyquist frequency above which nothing is filtered."""
 _ORDER = 4
 _END = 1.5
-"""Samples of a filtered row at the end of a record that its edge spoils, in units of the samples of half a period of the band."""
+"""Samples at the end of a record that the edge of the filter spoils, in half periods of the end of the band.
+
+An assumption: at 1 the noise of the ends still dominates the rows of an arm, at 2 records of 240 samples lose what they show.
+"""
 _ABOVE = 1.2
 """Sampling rate of filtered rows, in units of twice the end of their band."""
 
