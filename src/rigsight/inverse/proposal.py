@@ -51,10 +51,8 @@ class ProposedCause:
     # family alone for those not taken.
     share: float
     values: Mapping[str, float]  # parameters of the effect, as far as the regression gives them
-    interval: tuple[float, float] = (
-        0.0,
-        1.0,
-    )  # 95 % limits of the share over stretches drawn with replacement
+    # 95 % limits of the share over stretches drawn with replacement.
+    interval: tuple[float, float] = (0.0, 1.0)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""

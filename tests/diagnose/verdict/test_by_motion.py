@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,16 +35,22 @@ def ranking(*models: tuple[FittedModel, float]) -> Ranking:
     return Ranking(tuple(model for model, _ in models), shares, (), grounds)
 
 
+def with_cost(model: FittedModel, cost: float) -> FittedModel:
+    return replace(model, fit=replace(model.fit, cost=cost))
+
+
 @pytest.fixture
 def reidentified(scored) -> FittedModel:
-    return scored((), error_over_noise=10.0, residuals=GAP)
+    return with_cost(scored((), error_over_noise=10.0, residuals=GAP), 4e5)
 
 
 @pytest.fixture
 def models(scored) -> dict[str, FittedModel]:
     """Simulations of which none lowers the error clearly."""
     names = ("coulomb_friction", "stribeck_friction", "cubic_stiffness")
-    return {name: scored((name,), error_over_noise=9.9, residuals=0.99 * GAP) for name in names}
+    return {
+        name: with_cost(scored((name,), error_over_noise=9.9, residuals=0.99 * GAP), 3.9e5) for name in names
+    }
 
 
 def named(judgement: Judgement, found: Proposal, order: Ranking, reidentified: FittedModel) -> Judgement:
@@ -80,6 +88,14 @@ def test_the_family_of_the_missing_force_is_named_where_no_simulation_explains_t
     assert shares.of == "motion"
     assert shares.families + shares.remainder + shares.noise == pytest.approx(1.0)
     assert shares.noise == 0.02
+
+
+def test_a_fit_that_ends_at_no_friction_is_not_named(reidentified, models) -> None:
+    absent = models["coulomb_friction"]
+    absent = with_cost(absent, reidentified.fit.cost)
+    before = Judgement("unknown", reidentified, "")
+    seen = proposal(cause("coulomb_friction", 0.85))
+    assert named(before, seen, ranking((absent, 1.0)), reidentified) is before
 
 
 def test_a_force_that_no_family_removes_stays_unknown(reidentified, models) -> None:

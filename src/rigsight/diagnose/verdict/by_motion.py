@@ -16,6 +16,7 @@ from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.policy import FAMILIES, VERDICT
 from rigsight.diagnose.verdict.families import keys_of, main_causes
 from rigsight.diagnose.verdict.judgement import Judgement
+from rigsight.diagnose.verdict.plausibility import has_size_of_zero
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
@@ -52,7 +53,13 @@ def by_motion(
         return judgement
     if judgement.verdict == "effect" and key in keys_of(rig, judgement.model.effects):
         return judgement
-    forms = [model for model in ranking.order if model.residuals and keys_of(rig, model.effects) == (key,)]
+    forms = [
+        model
+        for model in ranking.order
+        if model.residuals
+        and keys_of(rig, model.effects) == (key,)
+        and not has_size_of_zero(model, [reidentified, *ranking.order])
+    ]
     if not forms:
         return judgement
     of_rank = {model.names: share for model, share in zip(ranking.order, shares, strict=True)}
