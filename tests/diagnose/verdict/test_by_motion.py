@@ -49,7 +49,7 @@ def models(scored) -> dict[str, FittedModel]:
     """Simulations of which none lowers the error clearly."""
     names = ("coulomb_friction", "stribeck_friction", "cubic_stiffness")
     return {
-        name: with_cost(scored((name,), error_over_noise=9.9, residuals=0.99 * GAP), 3.9e5) for name in names
+        name: with_cost(scored((name,), error_over_noise=9.9, residuals=0.99 * GAP), 3e4) for name in names
     }
 
 
