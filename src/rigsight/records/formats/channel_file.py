@@ -131,7 +131,8 @@ def _reported(path: Path, known: Format) -> Iterator[None]:
         reported = str(error) if isinstance(error, ReadingError) else f"{type(error).__name__}: {error}"
         reason = " ".join(reported.split())[:200].removesuffix(":")
         raise InputError(
-            f"{path.name} cannot be read as {known.name}: the file is truncated or damaged ({reason}). {MEND}"
+            f"{path.name} cannot be read as {known.name}: the file is truncated or damaged ({reason}). "
+            f"{' '.join(filter(None, (known.repair, MEND)))}"
         ) from None
 
 

@@ -41,6 +41,7 @@ class Format:
     isolated: bool = False
     advice: str = ""  # sentence for a file with one of the suffixes and other content
     largest: int = LARGEST_FILE  # bytes that are read of a file
+    repair: str = ""  # sentence for a file that is cut short or damaged
     extra: str = "formats"  # extra of rigsight that installs the package
 
     def recognizes(self, head: bytes) -> bool:
@@ -68,7 +69,7 @@ FORMATS = (
     Format(
         "bag", "ROS bag", (".bag", ".mcap", ".db3"), _begins(rb"#ROSBAG V2\.0|\x89MCAP0\r\n|SQLite format 3\x00"), "rosbags",
         extra="logs", largest=200_000_000_000,
-        advice="Bags of ROS before 1.2 are not read: convert it with rosbag fix.",
+        repair="A recording that was cut off is repaired by 'mcap recover', 'ros2 bag reindex' or 'rosbag reindex'.",
     ),
     Format("ulog", "ULog", (".ulg",), _begins(rb"ULog\x01\x12\x35"), "pyulog", extra="logs"),
     # pyuff holds every number of a text dataset as an object, thirty times the file.
