@@ -6,7 +6,9 @@ from dataclasses import replace
 import pytest
 
 from rigsight.diagnose.result import Diagnosis, Estimate
+from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
 from rigsight.diagnose.verdict.remainder import Remainder
+from rigsight.effects import Family
 from rigsight.report.quantities import Written, estimate_text, gap_percent, written
 from rigsight.report.wording import (
     advice_sentences,
@@ -51,6 +53,31 @@ def test_an_effect_has_no_share_of_what_refitting_closed(variant: Callable[[str]
     assert "closes 50 % of the gap that refitting leaves" in sentence
     refitted = verdict_sentence(replace(variant("parameters"), gap=gap))
     assert "closes 95 % of the gap" in refitted
+
+
+def test_a_cause_that_the_motion_names_is_not_said_to_close_the_gap(
+    variant: Callable[[str], Diagnosis],
+) -> None:
+    named = variant("effect")
+    gap = {
+        name: replace(g, before=1.01, reidentified=0.11, after=0.12, noise_floor=0.01)
+        for name, g in named.gap.items()
+    }
+    friction = FamilyAtPlace(Family.DRY_FRICTION, "yaw_dynamics", 0.92, 0.79, (0.78, 0.81), (), 0.79)
+    found = replace(
+        named,
+        effects=("coulomb_friction",),
+        ambiguous_with=(),
+        gap=gap,
+        families=(friction,),
+        shares=Shares(0.79, 0.19, 0.02, "motion"),
+        remainder=Remainder(0.94, ("x",), "change of x", 0.001),
+    )
+    sentence = verdict_sentence(found)
+    assert "along the measured motion is mainly that of Coulomb friction" in sentence
+    assert "explains 79 % of the square of that force" in sentence
+    assert "closes none of the gap that refitting leaves; with it 12 × the noise floor remains" in sentence
+    assert remainder_sentence(found) == ""
 
 
 def test_no_gap_far_above_the_floor_says_that_the_floor_seems_too_low(

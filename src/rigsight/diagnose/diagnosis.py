@@ -35,6 +35,7 @@ from rigsight.diagnose.verdict.families import (
     FamilyAtPlace,
     Shares,
     families_at_places,
+    keys_of,
     shares_of_force,
     shares_of_gap,
 )
@@ -175,8 +176,13 @@ def _assembled(
         judgement.by_motion,
     )
     chosen = judgement.model.effects if is_effect else ()
-    likely = _likely(candidates, calibration.least_probability)
-    rivals = _not_distinguished(candidates, likely, judgement.model.names) if is_effect else []
+    if judgement.by_motion:
+        rivals = _other_families(rig, ranking.order, families, judgement.model)
+        outside = 1.0 - math.fsum(own.probability for own in families) >= calibration.least_probability
+        likely = LikelyCauses((judgement.model.names, *rivals), outside)
+    else:
+        likely = _likely(candidates, calibration.least_probability)
+        rivals = _not_distinguished(candidates, likely, judgement.model.names) if is_effect else []
     where = tuple(rig.where(effect) for effect in chosen)
     if judgement.verdict == "unknown":
         where = _evidence(found)
@@ -259,6 +265,19 @@ def _likely(candidates: Sequence[Candidate], least: float) -> LikelyCauses:
     enough = min(least, most)
     sets = tuple(candidate.effects for candidate in candidates if candidate.probability >= enough)
     return LikelyCauses(sets, outside >= enough)
+
+
+def _other_families(
+    rig: Rig, order: Sequence[FittedModel], families: Sequence[FamilyAtPlace], named: FittedModel
+) -> list[tuple[str, ...]]:
+    """Return the first model in the ranking of each other family that is more probable than negligible."""
+    keys = [
+        (own.family, own.where)
+        for own in families
+        if own.probability > VERDICT.surely and (own.family, own.where) not in keys_of(rig, named.effects)
+    ]
+    found = [next((m.names for m in order if keys_of(rig, m.effects) == (key,)), None) for key in keys]
+    return [names for names in found if names is not None]
 
 
 def _not_distinguished(

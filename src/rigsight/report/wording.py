@@ -94,6 +94,11 @@ def _leaves_more(diagnosis: Diagnosis) -> bool:
     return diagnosis.adequate is False and (remainder is None or remainder.share > 0.0)
 
 
+def _is_named_by_motion(diagnosis: Diagnosis) -> bool:
+    """Return whether the missing force names the cause, because no simulation decides."""
+    return diagnosis.verdict == "effect" and diagnosis.shares is not None and diagnosis.shares.of == "motion"
+
+
 def after_label(diagnosis: Diagnosis) -> str:
     """Return what the simulation after the diagnosis is called in tables and legends."""
     return list(stage_names(diagnosis).values())[0 if diagnosis.verdict == "none" else -1]
@@ -201,6 +206,14 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     refitted, after = error_over_noise(diagnosis, "reidentified"), error_over_noise(diagnosis, "after")
     # What wrong numbers cause is closed by refitting them, and is no share of the effect.
     of = " that refitting leaves" if is_given(diagnosis) else ""
+    if _is_named_by_motion(diagnosis):
+        sure = "mainly, most likely," if diagnosis.ambiguous_with else "mainly"
+        share = percent(max(own.share for own in diagnosis.families))
+        return (
+            f"The force that the equations lack along the measured motion is {sure} that of {effects_label(diagnosis.effects)}"
+            f"{' ' if places else ''}{places}: it explains {share} of the square of that force. Simulated, adding {it} "
+            f"{_shrinks(refitted, after, of)}; with {it} {times_floor(after)} remains."
+        )
     if _leaves_more(diagnosis):
         sure = "mainly caused, most likely," if diagnosis.ambiguous_with else "mainly caused"
     return (
@@ -235,6 +248,9 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
     """Return the remaining error of a named or an unknown cause and its correlated signal; empty where there is none."""
     remainder = diagnosis.remainder
     if remainder is None or not remainder.goes_with or diagnosis.verdict not in ("effect", "unknown"):
+        return ""
+    if _is_named_by_motion(diagnosis):
+        # What the simulation leaves says nothing of a cause that the simulation did not name.
         return ""
     return remainder.text
 
