@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from rigsight.diagnose import candidates_on
@@ -71,3 +72,17 @@ def test_a_rig_without_a_free_number_is_asked_too() -> None:
     found = propose(own, {"m": 2.0}, candidates_on(rig, CATALOGUE))
     assert found is not None
     assert found.alone[0].family == friction.family
+
+
+def test_a_change_that_widens_the_band_is_compared_in_the_band_of_the_measured_motion() -> None:
+    rig = RIGS["axis"]
+    (record,) = campaign(rig, AXIS_VALUES, [], (10.0,)).records
+    x = record["x"]
+    beat = 0.02 * np.std(x) * np.sin(0.5 * np.pi * np.arange(len(x)))
+    motions = [
+        record_motions(rig, [own], AXIS_VALUES) for own in (record, record.with_signals(x=x + beat))
+    ]
+    before, after = (EquationFit(rig, own, (), ("k", "d")) for own in motions)
+    assert motions[1][0].band != motions[0][0].band
+    wide = float(np.sqrt(np.mean((after.rows(AXIS_VALUES)[0] - np.mean(after.rows(AXIS_VALUES)[0])) ** 2)))
+    assert before.unexplained(after, AXIS_VALUES, np.ones(1))[0] < 0.1 * wide

@@ -183,9 +183,12 @@ class EquationFit:
         unit
             Of each equation.
         """
-        pairs = zip(self.rows(values), changed.rows(values), strict=True)
         weight = unit[:, None]
-        changes = [(after - before) / weight for before, after in pairs]
+        # In the band of the motion that was measured: a changed one may have another.
+        changes = [
+            before.inner(changed.residual(after, values) - self.residual(before, values)) / weight
+            for before, after in zip(self.motions, changed.motions, strict=True)
+        ]
         target = _joined(changes)
         if self.free:
             matrix, _ = self._influences(values, weight)
