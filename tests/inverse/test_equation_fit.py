@@ -79,9 +79,7 @@ def test_a_change_that_widens_the_band_is_compared_in_the_band_of_the_measured_m
     (record,) = campaign(rig, AXIS_VALUES, [], (10.0,)).records
     x = record["x"]
     beat = 0.02 * np.std(x) * np.sin(0.5 * np.pi * np.arange(len(x)))
-    motions = [
-        record_motions(rig, [own], AXIS_VALUES) for own in (record, record.with_signals(x=x + beat))
-    ]
+    motions = [record_motions(rig, [own], AXIS_VALUES) for own in (record, record.with_signals(x=x + beat))]
     before, after = (EquationFit(rig, own, (), ("k", "d")) for own in motions)
     assert motions[1][0].band != motions[0][0].band
     wide = float(np.sqrt(np.mean((after.rows(AXIS_VALUES)[0] - np.mean(after.rows(AXIS_VALUES)[0])) ** 2)))

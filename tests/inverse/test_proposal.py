@@ -74,13 +74,28 @@ def test_friction_is_found_at_its_joint() -> None:
     assert (found.taken[0].family, found.taken[0].where) == ("dry_friction", "motor_bearing")
 
 
-def test_a_delay_is_left_to_the_fits() -> None:
-    found = proposed(
-        campaign(AXIS, {**AXIS_VALUES, "T_d": 0.01}, [effect_named("input_delay")], (10.0, 20.0))
+@pytest.mark.parametrize(
+    ("effect", "number", "length"),
+    [("input_delay", "T_d", 0.01), ("sensor_lag", "T_m", 0.008), ("time_shift", "T_x", -0.01)],
+)
+def test_a_delay_comes_with_its_length(effect: str, number: str, length: float) -> None:
+    hidden = effect_named(effect)
+    own = campaign(AXIS, {**AXIS_VALUES, number: length}, [hidden], (10.0, 20.0))
+    (cause,) = proposed(own, [hidden]).taken
+    assert cause.share > 0.8
+    assert cause.values[number] == pytest.approx(length, rel=0.15)
+
+
+def test_beside_a_known_delay_friction_is_named() -> None:
+    delay, friction = effect_named("input_delay"), effect_named("coulomb_friction")
+    values = {**AXIS_VALUES, "T_d": 0.02, "T_c": 1.0}
+    own = replace(campaign(AXIS, values, [delay, friction], (10.0, 20.0)), modelled=(delay,))
+    found = propose(
+        own, {**own.constants, **own.given, "T_d": 0.02}, candidates_on(AXIS, CATALOGUE, (delay,))
     )
-    assert found.judged.isdisjoint(
-        {"input_delay", "sensor_delay", "time_shift", "actuator_lag", "sensor_lag"}
-    )
+    assert found is not None
+    assert found.alone[0].family == "dry_friction"
+    assert found.alone[0].share > 0.8
 
 
 def test_a_cause_comes_with_its_numbers() -> None:
@@ -109,11 +124,11 @@ def test_a_few_samples_name_nothing(n: int) -> None:
     ("modelled", "value", "is_asked"),
     [
         ("coulomb_friction", {"T_c": 3.0}, True),
-        ("input_delay", {"T_d": 0.01}, False),
-        ("sensor_delay", {"T_s": 0.01}, False),
+        ("input_delay", {"T_d": 0.01}, True),
+        ("input_dead_zone", {"u_0": 0.1}, False),
     ],
 )
-def test_a_modelled_effect_that_is_no_force_at_a_joint_is_left_to_the_fits(
+def test_beside_a_force_at_a_joint_or_a_delay_the_motion_is_asked(
     modelled: str, value: Mapping[str, float], is_asked: bool
 ) -> None:
     own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [effect_named("coulomb_friction")], (10.0, 20.0))

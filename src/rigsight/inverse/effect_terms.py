@@ -3,9 +3,8 @@
 Parameters in which an effect is linear become coefficients; the others, such as a clearance or the length of a presliding spring,
 are tried on a grid. Effects of a drive are functions of the force that the motion requires, not of the logged input: a clip of
 the logged input would explain that input. Effects of a sensor are what a small change of its reading changes in the equations.
-
-A delay or a lag is no term: it changes what every number of the equations means, and what it moves holds the residual that it
-would explain.
+A delay moves the reading, or the force that the motion requires of the drive, and so does a lag: what it weakens cannot be told
+from what smoothing takes from the measured motion. One longer than a radian of the motion is no term.
 """
 
 from __future__ import annotations
@@ -27,6 +26,7 @@ from rigsight.identify.rig_equations import FUNCTIONS
 from rigsight.inverse.equation_fit import EquationFit, generalized
 from rigsight.inverse.joint_force import JointMotion, joint_motion
 from rigsight.inverse.measured_motion import RecordMotion
+from rigsight.inverse.smooth_signals import shifted
 from rigsight.parameters import Parameter
 from rigsight.rigs import Drive, evaluated
 from rigsight.rigs.rig import joint_of
@@ -40,6 +40,8 @@ _WAVES = 40
 """Points of the grid of a wave number: between two of them a wave loses its phase at the ends of the motion."""
 _LEAST_SHARE, _MOST_SHARE = 0.02, 3.0
 """Range of the grid in characteristic sizes, within that of a search."""
+_LATEST = 1.0
+"""Longest delay or lag, in units of the time in which the motion advances by a radian."""
 _SMALL_PART = 0.05
 """Parameters of a drive effect in characteristic sizes: small, and above the noise of the force."""
 _SMALL = 1e-3
@@ -88,7 +90,9 @@ class EffectTerms:
 
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term."""
-        if effect.place is Place.SENSOR:
+        if is_late(effect):
+            yield from _of_late(effect, self.fit, self.values, self.scales)
+        elif effect.place is Place.SENSOR:
             yield from _of_sensor(effect, self.fit, self.values, self.scales)
         elif effect.place is Place.ACTUATOR:
             yield from _of_drive(effect, self.fit, self.values, self.scales)
@@ -110,7 +114,9 @@ class EffectTerms:
             Shape (n_equations, n_rows) each; None where it cannot be evaluated.
         """
         fit, values, motions = self.fit, self.values, self.fit.motions
-        if effect.place is Place.SENSOR:
+        if is_late(effect):
+            rows = [_late(effect, own, fit, m, values) for m in motions]
+        elif effect.place is Place.SENSOR:
             name, numbers = fit.rig.acts_at(effect), [sp.Symbol(p, real=True) for p in own]
             assert effect.measured is not None
             shown = _compiled(effect.measured, (canonical.reading, *numbers))
@@ -200,6 +206,66 @@ def _waves(effect: Effect, parameter: Parameter, scales: Mapping[str, float]) ->
 def _usual(effect: Effect, parameter: Parameter, scales: Mapping[str, float]) -> float:
     """Return the size of a parameter in the records, at the place of its effect."""
     return characteristic_value(placed_dimension(effect, parameter.dimension), scales)
+
+
+def is_late(effect: Effect) -> bool:
+    """Return True for a delay, and for a lag of first order."""
+    if effect.delay is not None or effect.reading_delay is not None:
+        return True
+    return len(effect.states) == 1 and effect.states[0].symbol in (effect.drive, effect.measured)
+
+
+def lateness(effect: Effect, own: Mapping[str, float]) -> float:
+    """Return the time by which a delay or a lag with own parameters makes slow signals late."""
+    late = effect.delay if effect.delay is not None else effect.reading_delay
+    if late is None:
+        (state,) = effect.states
+        late = -1 / derivative(state.rate, state.symbol)
+    return float(late.subs({sp.Symbol(name, real=True): value for name, value in own.items()}))
+
+
+def _of_late(
+    effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
+) -> Iterator[Term]:
+    """Yield what a delay or a lag of each length takes from the equations."""
+    (parameter,) = (p for p in effect.parameters if p.fitted)
+    lengths = _usual(effect, parameter, scales) * np.geomspace(_LEAST_SHARE, _LATEST, _GRID[1])
+    if parameter.lower < 0.0:
+        lengths = np.concatenate([-lengths, lengths])
+    for length in map(float, lengths):
+        rows = [_late(effect, {parameter.name: length}, fit, motion, values) for motion in fit.motions]
+        columns = tuple(
+            m.thinned(row[None]) for m, row in zip(fit.motions, rows, strict=True) if row is not None
+        )
+        if len(columns) == len(rows) and all(np.all(np.isfinite(column)) for column in columns):
+            yield Term(effect, {}, (parameter.name,), (length,), columns, (True,))
+
+
+def _late(
+    effect: Effect,
+    own: Mapping[str, float],
+    fit: EquationFit,
+    motion: RecordMotion,
+    values: Mapping[str, float],
+) -> Floats | None:
+    """Return what a delay or a lag takes from the equations, shape (n_equations, n_samples); None where it takes nothing."""
+    name, late, dt = fit.rig.acts_at(effect), lateness(effect, own), motion.record.dt
+    if effect.place is Place.SENSOR:
+        if name not in motion.record:
+            return None
+        reading = motion.filtered(motion.record[name])
+        return _influence(fit, motion, values, name, shifted(reading, dt, late) - reading)
+    if not motion.equations.n_coordinates:
+        return None
+    change = motion.ahead(late)
+    step = _SMALL * _rms(motion.z) / max(_rms(change[0]), np.finfo(np.float64).tiny)
+    near = motion.moved_by(change, step)
+    more = (fit.residual(near, values) - fit.residual(motion, values)) / step
+    p = motion.equations.parameters(values, motion.record)
+    along = motion.equations.slopes_along(motion.z, motion.u, p)[name]
+    size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
+    # What is required of the drive now was commanded earlier.
+    return np.asarray(along * np.sum(along * more, axis=0) / size)
 
 
 def _of_drive(

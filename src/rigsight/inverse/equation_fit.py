@@ -23,6 +23,9 @@ _ROUNDS = 12
 _SETTLED = 1e-6
 _RANK = 1e-9
 _DEPENDENT = 1e-6
+_LAW_ERROR = 0.05
+"""Error of laws relative to the force in an equation (an assumption). It weighs the joints of a rig against each other: one whose
+equation holds would else count as much as one whose friction is missing."""
 _APART = 1e-12
 """Least distance of two bounds, relative to them, that the solver accepts."""
 
@@ -111,6 +114,21 @@ class EquationFit:
     def rms(self, values: Mapping[str, float]) -> Floats:
         """Return the RMS of each equation."""
         return _rms(self.rows(values))
+
+    def tolerance(self, values: Mapping[str, float], noise: Floats | None = None) -> Floats:
+        """Return the error of each equation that laws and noise leave at least.
+
+        Parameters
+        ----------
+        values
+            Constants and parameters of the equations.
+        noise
+            Variance of each equation by noise of the sensors.
+        """
+        parts = zip(*(motion.forces(values) for motion in self.motions), strict=True)
+        filtered = [[m.inner(own) for m, own in zip(self.motions, part, strict=True)] for part in parts]
+        size = np.max([_rms(part) for part in filtered], axis=0)
+        return np.asarray(np.sqrt((_LAW_ERROR * size) ** 2 + (0.0 if noise is None else noise)))
 
     def settled(self, start: Mapping[str, float]) -> tuple[dict[str, float], Floats]:
         """Return the numbers with the smallest residual near a start, and its RMS in each equation.

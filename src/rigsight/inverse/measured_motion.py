@@ -8,10 +8,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.signal import butter, sosfiltfilt
 
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.start.measured_states import measured_states, sensor_factors
+from rigsight.inverse.smooth_signals import shifted, slope
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
@@ -96,6 +98,26 @@ class RecordMotion:
         columns = [equations.structure.names.index(name) for name in names]
         return np.moveaxis(rows[chosen][:, columns], 0, 1)
 
+    def forces(self, values: Mapping[str, float]) -> tuple[Floats, ...]:
+        """Return the forces of inertia and of the drives in each equation, shape (n_equations, n_samples) each.
+
+        Where every motion is prescribed: the reading of each force.
+
+        Parameters
+        ----------
+        values
+            Constants and parameters by name.
+        """
+        equations, p = self.equations, self.equations.parameters(values, self.record)
+        if not equations.n_coordinates:
+            return (np.array([self.record[equations.sensor_names[i]] for i in self.sensors]),)
+        inertia = np.einsum("kij,jk->ik", equations.mass(self.z, self.u, p), self.a)
+        along = equations.slopes_along(self.z, self.u, p)
+        given = equations.at_places(self.z, self.u, p)
+        drives = equations.rig.mechanism.drives
+        driven = sum((along[d.name] * given[f"force@{d.name}"] for d in drives), np.zeros_like(inertia))
+        return np.asarray(inertia), np.asarray(driven)
+
     def with_reading_changed(
         self, name: str, change: Floats, values: Mapping[str, float]
     ) -> tuple[Floats, Floats] | None:
@@ -118,10 +140,17 @@ class RecordMotion:
         z = np.zeros_like(self.z)
         z[first : first + n] = by_reading
         if reads_place:
-            z[n : 2 * n] = np.gradient(by_reading, dt, axis=1)
+            z[n : 2 * n] = slope(by_reading, dt)
         else:
-            z[:n] = dt * np.cumsum(by_reading, axis=1)
-        return z, np.gradient(z[n : 2 * n], dt, axis=1)
+            z[:n] = cumulative_trapezoid(by_reading, dx=dt, axis=1, initial=0)
+        return z, slope(z[n : 2 * n], dt)
+
+    def ahead(self, time: float) -> tuple[Floats, Floats]:
+        """Return the changes of `z` and `a` if the whole motion were ahead by so much time."""
+        n, dt = self.equations.n_coordinates, self.record.dt
+        change = np.array([shifted(row, dt, time) - row for row in self.filtered(self.z)])
+        change[n : 2 * n] = slope(change[:n], dt)
+        return change, slope(change[n : 2 * n], dt)
 
     def moved_by(self, change: tuple[Floats, Floats], step: float) -> RecordMotion:
         """Return the motion with a multiple of a change of `z` and `a`."""
@@ -172,7 +201,10 @@ def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> Reco
     equations = equations_of(rig)
     still = {s.name: np.zeros(record.n_samples) for s in rig.inputs if s.name not in record}
     complete = record.with_signals(**still) if still else record
-    u = equations.inputs_of(complete)[1]
+    u = equations.inputs_of(complete)[1].copy()
+    if complete.hold == "zoh":
+        # A held input steps at each sample: the smooth motion follows the mean of both sides.
+        u[::3, 1:] = (u[::3, :-1] + u[::3, 1:]) / 2.0
     n = equations.n_coordinates
     if not equations.n_states:
         nothing = np.zeros((0, record.n_samples))

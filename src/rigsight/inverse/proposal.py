@@ -70,7 +70,9 @@ class ProposedCause:
 class Proposal:
     """What a regression along the measured motion says of the missing force."""
 
-    taken: tuple[ProposedCause, ...]  # in the order in which they were taken
+    # In the order in which they were taken, each with the share that it removes beside those before it and with its parameters
+    # beside all others.
+    taken: tuple[ProposedCause, ...]
     alone: tuple[ProposedCause, ...]  # every family at every place by itself, the largest share first
     judged: frozenset[str]  # names of the effects that are terms of this regression
     # Share of the squared residual that those taken remove together.
@@ -107,10 +109,18 @@ class Proposal:
 class Selection:
     """Greedy selection of families by the residual of held-out stretches, on sums of products."""
 
-    def __init__(self, fit: EquationFit, values: Mapping[str, float], terms: Sequence[Term]) -> None:
+    def __init__(
+        self,
+        fit: EquationFit,
+        values: Mapping[str, float],
+        terms: Sequence[Term],
+        noise: Floats | None = None,
+    ) -> None:
         self.fit, self.values, self.terms = fit, values, terms
         rows, slopes, columns, stretch = [], [], [], []
-        self.unit = unit = fit.rms(values)[:, None]
+        unit = fit.tolerance(values, noise)[:, None]
+        # Together all rows have RMS one, for the ridge of the regression.
+        self.unit = unit = unit * np.sqrt(np.mean((fit.rms(values)[:, None] / unit) ** 2))
         per_record = max(1, round(2 * _STRETCHES / len(fit.motions)))
         for i, motion in enumerate(fit.motions):
             own = motion.thinned(fit.residual(motion, values))
@@ -232,7 +242,7 @@ class Selection:
         selected = self.selected(rig)
         remainders = [begun, *(own for _, _, own in selected)]
         taken = tuple(
-            self._cause(key, i, 1.0 - own / before, self.columns_of(selected[:n]))
+            self._cause(key, i, 1.0 - own / before, self.columns_of([*selected[:n], *selected[n + 1 :]]))
             for n, ((key, i, own), before) in enumerate(zip(selected, remainders, strict=False))
         )
         judged = frozenset(term.effect.name for term in self.terms)

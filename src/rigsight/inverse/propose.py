@@ -17,10 +17,10 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.effects import Effect
+from rigsight.effects import Effect, Place
 from rigsight.errors import SimulationError
 from rigsight.identify import characteristic_scales
-from rigsight.inverse.effect_terms import EffectTerms, is_joint_force
+from rigsight.inverse.effect_terms import EffectTerms, is_joint_force, is_late, lateness
 from rigsight.inverse.equation_fit import (
     EquationFit,
     held_numbers,
@@ -31,6 +31,8 @@ from rigsight.inverse.equation_fit import (
 )
 from rigsight.inverse.missing_force import missing_forces, noise_of_rows
 from rigsight.inverse.proposal import Proposal, Selection
+from rigsight.inverse.smooth_signals import shifted
+from rigsight.simulate import compose
 
 
 def propose(
@@ -42,7 +44,7 @@ def propose(
     """Return the families that explain what the equations of a campaign leave of its estimation records.
 
     None where the sensors do not show the motion, another program simulates the bodies, or the given simulation has an effect
-    that is no force at a joint.
+    that is neither a force at a joint nor a delay.
 
     Parameters
     ----------
@@ -61,11 +63,13 @@ def propose(
     fit, values = terms_of.fit, terms_of.values
     terms = [term for effect in effects for term in terms_of.of(effect)]
     covariance = noise_of_rows(fit, values, noise or {})
-    by_noise = None
+    by_noise, variance = None, None
     if covariance is not None:
-        by_noise = min(1.0, float(np.mean(np.diag(covariance) / fit.rms(values) ** 2)))
+        variance = np.diag(covariance)
+        weight = 1.0 / fit.tolerance(values, variance) ** 2
+        by_noise = min(1.0, float(np.sum(variance * weight) / np.sum(fit.rms(values) ** 2 * weight)))
     found = (
-        Selection(fit, values, terms).proposal(campaign.rig)
+        Selection(fit, values, terms, variance).proposal(campaign.rig)
         if terms
         else Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
     )
@@ -75,6 +79,7 @@ def propose(
 def along_motion(campaign: Campaign, known: Mapping[str, float]) -> EffectTerms | None:
     """Return effects as terms of the equations along the motion of the estimation records; None as for `propose`."""
     rig = campaign.rig
+    campaign = _in_time(campaign, known)
     if rig.mechanism.bodies is not None or not all(map(is_joint_force, campaign.modelled)):
         return None
     try:
@@ -84,6 +89,23 @@ def along_motion(campaign: Campaign, known: Mapping[str, float]) -> EffectTerms 
     own = {p.name: values[p.name] for p in (*rig.constants, *rig.parameters)}
     records = [with_all_inputs(rig, record) for record in campaign.estimation]
     return EffectTerms(fit, values, characteristic_scales(rig, records, own))
+
+
+def _in_time(campaign: Campaign, known: Mapping[str, float]) -> Campaign:
+    """Return a campaign without its modelled delays and lags: what they make late is moved to its time."""
+    structure = compose(campaign.rig, campaign.modelled)
+    records = campaign.records
+    for effect in filter(is_late, campaign.modelled):
+        own = {p.name: known[structure.parameter_name(effect, p.name)] for p in effect.parameters}
+        place, late = campaign.rig.acts_at(effect), lateness(effect, own)
+        signals = {place}
+        if effect.place is Place.ACTUATOR:
+            drive = next(drive for drive in campaign.rig.mechanism.drives if drive.name == place)
+            signals, late = {symbol.name for symbol in drive.signal.free_symbols}, -late
+        moved = [{n: shifted(r[n], r.dt, late) for n in signals if n in r} for r in records]
+        records = tuple(r.with_signals(**own) for r, own in zip(records, moved, strict=True))
+    kept = tuple(effect for effect in campaign.modelled if not is_late(effect))
+    return replace(campaign, records=records, modelled=kept)
 
 
 def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit, dict[str, float]]:

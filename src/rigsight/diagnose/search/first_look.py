@@ -60,8 +60,12 @@ def look_at(
     further: Sequence[Mapping[str, float]] = (),
     hold: frozenset[str] = frozenset(),
     substeps: Sequence[int] | None = None,
+    are_enough: bool = False,
 ) -> FirstLook:
-    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect."""
+    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect.
+
+    `further` are more values of its own parameters; where they `are_enough`, its declared starts are left out.
+    """
     structure = context.simplest(effects, base.structure)
     known = context.constant_forces_beside(structure.effects)
     moved = {*context.free_parameters(structure), *base.free} - {*hold, *known}
@@ -70,7 +74,8 @@ def look_at(
     if context.given and context.leaves_numbers_open(base):
         from_given = replace(base, values={**base.values, **context.given})
         starts += start_values(context, structure, effects[-1], from_given, {})
-    starts += [{**starts[0], **with_own_values(structure, effects[-1], base, own)} for own in further]
+    own_starts = [{**starts[0], **with_own_values(structure, effects[-1], base, own)} for own in further]
+    starts = own_starts if are_enough and own_starts else [*starts, *own_starts]
     starts = [{**start, **known} for start in starts]
     nearest = _looked(context, structure, free, starts, substeps)
     if not np.isfinite(nearest[0].cost) and context.start:

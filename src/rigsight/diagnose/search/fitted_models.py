@@ -142,17 +142,17 @@ def _singles(
     others = [effect for effect in (*search.effects, *search.others) if effect not in first]
     if prepare is not None:
         prepare([context.simplest((effect,)) for effect in first])
-    singles = fit_candidates(context, reidentified, first, say, along_motion=worth.starts)
+    singles = fit_candidates(context, reidentified, first, say, (), worth.starts, worth.is_shown)
     best = min((model.error_over_noise for model in singles), default=np.inf)
     # What the motion rules out need not be fitted for a remainder that no law reaches, nor where the motion names the cause.
     enough = VERDICT.at_floor
     if worth.is_shown:
-        enough = np.inf if worth.most >= VERDICT.larger_part else larger_part_closed(reidentified)
+        enough = np.inf if worth.explained >= VERDICT.larger_part else larger_part_closed(reidentified)
     if others and best > enough:
         # A right model must not be lost because places or effects were ranked wrongly.
         if prepare is not None:
             prepare([context.simplest((effect,)) for effect in others])
-        singles = fit_candidates(context, reidentified, others, say, singles, worth.starts)
+        singles = fit_candidates(context, reidentified, others, say, singles, worth.starts, worth.is_shown)
     return search, singles
 
 
@@ -209,7 +209,15 @@ def with_several_effects(
     unfitted = [e for e in models.effects if e.name in named - {model.names[0] for model in models.singles}]
     if unfitted:
         # The parts of a set compete with it, and tell the share of each.
-        parts = fit_candidates(context, models.reidentified, unfitted, say, models.singles)
+        parts = fit_candidates(
+            context,
+            models.reidentified,
+            unfitted,
+            say,
+            models.singles,
+            models.worth.starts,
+            models.worth.is_shown,
+        )
         models = replace(models, singles=parts)
     models = replace(models, singles=refit_singles(context, models.singles, found))
     if whole and not is_predictable(context, models.reidentified, found, allowed, rng):

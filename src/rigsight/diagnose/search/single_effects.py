@@ -59,13 +59,15 @@ def fit_candidates(
     progress: Callable[[str], None] | None = None,
     known: Sequence[FittedModel] = (),
     along_motion: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
+    is_shown: bool = False,
 ) -> list[FittedModel]:
     """Return every effect alone, fitted and scored, with those that were before.
 
-    `along_motion` are values of the effects' own parameters that explain the missing force along the motion: one more start.
+    `along_motion` are values of the effects' own parameters that explain the missing force along the motion: one more start, or
+    the only one where the motion `is_shown`.
     """
     before = {model.effects[0].name: model.fit for model in known if np.isfinite(model.fit.cost)}
-    looks = _looks(context, reidentified, context.offered(effects), along_motion, before)
+    looks = _looks(context, reidentified, context.offered(effects), along_motion, is_shown, before)
     wide = {look.newest: look for look in widened(context, looks)}
     costs = [*(look.cost for look in wide.values()), *(fit.cost for fit in before.values())]
     lowest = min(costs, default=float("inf"))
@@ -89,6 +91,7 @@ def _looks(
     reidentified: FittedModel,
     effects: Sequence[Effect],
     along_motion: Mapping[str, Mapping[str, float]],
+    is_shown: bool,
     known: Mapping[str, FitResult],
 ) -> list[FirstLook]:
     """Look at every effect; those that start from a simpler one, if it is not known, come after it."""
@@ -98,7 +101,7 @@ def _looks(
 
     def one(parents: Mapping[str, FitResult], effect: Effect) -> FirstLook:
         own = [along_motion[effect.name]] if effect.name in along_motion else []
-        return look_at(context, (effect,), reidentified.fit, parents, own)
+        return look_at(context, (effect,), reidentified.fit, parents, own, are_enough=is_shown)
 
     while waiting:
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]

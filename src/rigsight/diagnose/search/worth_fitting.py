@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rigsight.diagnose.policy import SEARCH
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.effects import Effect
 from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
@@ -19,7 +19,7 @@ class WorthFitting:
     named: tuple[Effect, ...] = ()  # of those alone the ones of families that the motion names
     # Whether the motion shows every force that matters: a family that it rules out is not the main cause.
     is_shown: bool = False
-    most: float = 0.0  # share of the missing force that the best family explains
+    explained: float = 0.0  # share of the missing force that one family explains, or all that were taken
     # Own parameters of effects by their names, with which they explain most of the missing force along the motion.
     starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
@@ -39,6 +39,9 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     near = {(c.family, c.where) for c in proposal.alone if c.share >= SEARCH.near_force * most}
     near |= {(cause.family, cause.where) for cause in proposal.taken}
     named = tuple(e for e in effects if e.name in proposal.judged and (e.family, rig.where(e)) in near)
-    kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
     is_shown = proposal.noise is not None and proposal.noise < SEARCH.noise_of_force
-    return WorthFitting(kept, named, is_shown, most, proposal.starts)
+    if is_shown and most < VERDICT.larger_part <= proposal.explained:
+        # No family alone follows the motion: other forms are tried beside the families that explain it together.
+        named = proposal.effects
+    kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
+    return WorthFitting(kept, named, is_shown, max(most, proposal.explained), proposal.starts)

@@ -15,6 +15,7 @@ import numpy as np
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.first_states import first_state, moves_freely, state_at_rest
 from rigsight.identify.fit.fit_data import FitData, RecordData
+from rigsight.identify.rig_equations import equations_of
 from rigsight.records.record import Floats
 from rigsight.simulate import has_dry_friction, parameter_vector, simulate_sets
 
@@ -66,8 +67,11 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
 
     def settled(index: int) -> Floats:
         record = data.records[index]
+        rig = data.structure.rig
         # If an input drives one mass, the initial state soon has no effect; a free motion depends on it alone.
-        if data.structure.rig.has_one_motion and not moves_freely(data.structure.rig, record.record):
+        if rig.has_one_motion and not moves_freely(rig, record.record):
+            return guesses[index]
+        if not rig.has_one_motion and equations_of(rig).shows_all_states(set(record.record.signals)):
             return guesses[index]
         return settled_state(data, record, p, guesses[index])
 
@@ -75,15 +79,14 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
 
 
 def moving_or_at_rest(data: FitData, values: Mapping[str, float], states: Sequence[Floats]) -> list[Floats]:
-    """Return each record's initial state, fitted to the whole record from the given one and from rest, whichever fits better."""
-    # While a joint sticks, its initial velocity has no effect: a descent neither leaves the state of rest nor finds it.
+    """Return each record's initial state: the given one or rest, whichever fits the record better."""
+    # While a joint sticks, its initial velocity has no effect: a fit neither leaves the state of rest nor finds it.
     p = parameter_vector(data.structure, values)
 
     def likelier(index: int) -> Floats:
         record = data.records[index]
         at_rest = state_at_rest(data.structure, record.record, states[index], values)
-        found = _fitted(data, record, record.parameters(p), [states[index], at_rest], record.record.n_samples)
-        return min(found, key=lambda fitted: fitted.error).state
+        return _likeliest(data, record, p, np.column_stack([states[index], at_rest]))
 
     return data.of_each_record(likelier)
 

@@ -1,15 +1,15 @@
 """Several effects where the motion shows the missing force: the families that it names, fitted together.
 
 The regression along the motion finds several causes at once, each with its numbers. Here they are added to the best single effect
-in that order. The motion does not judge a delay, and does not show what a delay hides: so effects whose push explains the larger
-part of the residual of the simulation are added after them. Each must lower the held-out error; those that the others make
-needless are dropped, and other forms of each family are tried in their place.
+at once: where a simulation drifts until the last of them is there, one alone seems to be of no use. The motion does not judge a
+resonance: so effects whose push explains the larger part of the residual of the simulation are added after them. Each must lower
+the held-out error; those that the others make needless are dropped, and other forms of each family are tried in their place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
@@ -22,7 +22,7 @@ from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, refine
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect, Family
-from rigsight.inverse import Proposal
+from rigsight.inverse import Proposal, ProposedCause
 
 Key = tuple[Family, str]
 """A family and the place at which it acts."""
@@ -67,17 +67,17 @@ class NamedByMotion:
         return [found for found in in_lowest_basins(self.context, competing) if len(found.effects) > 1]
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
-        """Yield a model with each further cause that lowers its error, one after the other."""
-        for cause in self.proposal.taken:
-            if (cause.family, cause.where) not in map(self._key, model.effects):
-                larger = self._with(model, cause.effect, cause.values)
-                if self._is_worth(larger, model):
-                    model = larger
-                    yield model
+        """Yield a model with all causes that the motion names, then with each further one that lowers its error."""
+        taken = [c for c in self.proposal.taken if (c.family, c.where) not in map(self._key, model.effects)]
+        if taken:
+            larger = self._with(model, taken, self.proposal)
+            if self._is_worth(larger, model):
+                model = larger
+                yield model
         unjudged = [effect for effect in self.effects if effect.name not in self.proposal.judged]
         for _ in range(SEARCH.most_unnamed):
             # Along the motion the fitted model leaves another force than the numbers of the regression did. Where the simulation
-            # does not follow the motion, its numbers are worth less than those; beside a delay or a lag nothing can be asked.
+            # does not follow the motion, its numbers are worth less than those; beside a limit of a drive nothing can be asked.
             follows = model.error_over_noise <= self.enough
             beside = self.ask(model) if follows else None
             further = unjudged if beside is not None or not follows else self.effects
@@ -85,9 +85,9 @@ class NamedByMotion:
                 self.context, model, further, [], self.singles, self.prepare, VERDICT.larger_part
             )
             larger_ones += [
-                self._with(model, cause.effect, cause.values)
+                self._with(model, [cause], beside)
                 for cause in (() if beside is None else beside.taken[:1])
-                if (cause.family, cause.where) not in map(self._key, model.effects)
+                if beside is not None and (cause.family, cause.where) not in map(self._key, model.effects)
             ]
             best = min(larger_ones, key=lambda one: one.error_over_noise, default=model)
             if not self._is_worth(best, model):
@@ -102,12 +102,17 @@ class NamedByMotion:
     def _key(self, effect: Effect) -> Key:
         return effect.family, self.context.rig.where(effect)
 
-    def _with(self, model: FittedModel, effect: Effect, own: Mapping[str, float]) -> FittedModel:
-        """Return a model with an effect more, fitted from the values that the motion gives it."""
-        structure = self.context.simplest((*model.effects, effect), model.fit.structure)
-        declared = next(start_values(self.context, structure, effect, model.fit, {}))
-        values = {**declared, **with_own_values(structure, effect, model.fit, own)}
-        return fitted_from(self.context, model, (*model.effects, effect), structure, values)
+    def _with(self, model: FittedModel, causes: Sequence[ProposedCause], found: Proposal) -> FittedModel:
+        """Return a model with further causes, fitted from the values that the motion gives them and the equations."""
+        numbers = {name: value for name, value in found.numbers.items() if name in model.fit.free}
+        effects, fit = model.effects, replace(model.fit, values={**model.fit.values, **numbers})
+        for cause in causes:
+            effects = (*effects, cause.effect)
+            structure = self.context.simplest(effects, fit.structure)
+            declared = next(start_values(self.context, structure, cause.effect, fit, {}))
+            values = {**declared, **with_own_values(structure, cause.effect, fit, cause.values)}
+            fit = replace(fit, values=values, structure=structure)
+        return fitted_from(self.context, model, effects, fit.structure, dict(fit.values))
 
     def _parts(self, model: FittedModel) -> list[FittedModel]:
         """Return a model without each of its effects, fitted from where the others are in it."""
