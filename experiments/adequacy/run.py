@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.preparation import fit_context_of
+from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
 from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import reidentify
@@ -59,7 +59,7 @@ def row(seed: int, trial: int) -> Row | None:
     constants = {p.name: drawn.values[p.name] for p in rig.constants}
     campaign = Campaign(str(trial), rig, constants, {}, tuple(records))
     noise = {floor.output: floor.std for floor in noise_floors(rig, records)}
-    bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1))
+    bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1), start_values_of(campaign))
     rng = np.random.default_rng(trial)
     linear = reidentify(bench, bench.start)
     effects = tuple(effect_named(name) for name in drawn.key["effects"])

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.preparation import fit_context_of
+from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.single_effects import reidentify
@@ -39,7 +39,7 @@ def row(seed: int, number: int) -> tuple[int, int, bool, str]:
     constants = {p.name: trial.values[p.name] for p in rig.constants}
     campaign = Campaign(str(number), rig, constants, trial.given, trial.records)
     noise = {floor.output: floor.std for floor in noise_floors(rig, campaign.records, campaign.drifts, True)}
-    bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1))
+    bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1), start_values_of(campaign))
     linear = reidentify(bench, bench.start)
     offered = bench.offered(CATALOGUE)
     begun = time.process_time()

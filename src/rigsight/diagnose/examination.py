@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from rigsight.diagnose.data_quality.checks import data_quality, with_best_model,
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.fitting.preparation import Prepare, start_values_of
 from rigsight.diagnose.noise.adequacy import Adequacy
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
@@ -81,12 +81,13 @@ def examine(
     at_rest: bool = True,
 ) -> Examination:
     """Fit the given simulation, its equations and every candidate; rank and judge them."""
-    floors, windowing = _floors(campaign, n_jobs, at_rest)
+    start = start_values_of(campaign)
+    floors, windowing = _floors(campaign, n_jobs, at_rest, start)
     say("noise floor")
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
     ready = preparing(prepare, windowing.cut(campaign.records))
-    alone = single_models(campaign, noise, effects, windowing, n_jobs, say, ready, memory)
+    alone = single_models(campaign, noise, effects, windowing, start, n_jobs, say, ready, memory)
     quality = data_quality(alone.context, campaign.records, alone.reidentified)
     allowed = VERDICT.at_lower_bound if lower_bound else most_remainder(alone.reidentified.error_over_noise)
     asked = (
@@ -140,13 +141,17 @@ def examine(
     )
 
 
-def _floors(campaign: Campaign, n_jobs: int, at_rest: bool) -> tuple[tuple[NoiseFloor, ...], Windowing]:
+def _floors(
+    campaign: Campaign, n_jobs: int, at_rest: bool, start: Mapping[str, float]
+) -> tuple[tuple[NoiseFloor, ...], Windowing]:
     """Return the noise floor of each output, and how records are compared with models."""
     drifts = campaign.drifts or not restores(campaign)
     floors = noise_floors(campaign.rig, campaign.records, drifts, at_rest)
     if not drifts:
         return floors, Windowing()
-    windowing, amplified = windowing_of(campaign, {floor.output: floor.std for floor in floors}, n_jobs)
+    windowing, amplified = windowing_of(
+        campaign, {floor.output: floor.std for floor in floors}, n_jobs, start
+    )
     return tuple(_raised(floor, amplified.get(floor.output, 1.0)) for floor in floors), windowing
 
 

@@ -121,7 +121,7 @@ class EffectTerms:
             assert effect.measured is not None
             shown = _compiled(effect.measured, (canonical.reading, *numbers))
             rows = [
-                _influence(fit, m, values, name, m.record[name] - shown(m.record[name], *own.values()))
+                _influence(m, values, name, m.record[name] - shown(m.record[name], *own.values()))
                 for m in motions
             ]
         elif effect.place is Place.ACTUATOR:
@@ -254,13 +254,13 @@ def _late(
         if name not in motion.record:
             return None
         reading = motion.filtered(motion.record[name])
-        return _influence(fit, motion, values, name, shifted(reading, dt, late) - reading)
+        return _influence(motion, values, name, shifted(reading, dt, late) - reading)
     if not motion.equations.n_coordinates:
         return None
     change = motion.ahead(late)
     step = _SMALL * _rms(motion.z) / max(_rms(change[0]), np.finfo(np.float64).tiny)
     near = motion.moved_by(change, step)
-    more = (fit.residual(near, values) - fit.residual(motion, values)) / step
+    more = (near.residual(values) - motion.residual(values)) / step
     p = motion.equations.parameters(values, motion.record)
     along = motion.equations.slopes_along(motion.z, motion.u, p)[name]
     size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
@@ -343,7 +343,7 @@ def _of_sensor(
         columns = []
         for motion in fit.motions:
             changes = [-_compiled(slopes[p], arguments)(motion.record[name], *inner.values()) for p in linear]
-            parts = [_influence(fit, motion, values, name, change) for change in changes]
+            parts = [_influence(motion, values, name, change) for change in changes]
             if any(part is None for part in parts):
                 return
             columns.append(motion.thinned(np.array(parts)))
@@ -359,10 +359,8 @@ def _compiled(expression: sp.Expr, arguments: tuple[sp.Symbol, ...]) -> Callable
     )
 
 
-def _influence(
-    fit: EquationFit, motion: RecordMotion, values: Mapping[str, float], name: str, change: Floats
-) -> Floats | None:
-    """Return the change of the residual of the equations by a small change of a reading; None where it has none."""
+def _influence(motion: RecordMotion, values: Mapping[str, float], name: str, change: Floats) -> Floats | None:
+    """Return the change of the residual of the rig's equations by a small change of a reading; None where it has none."""
     size = _rms(change)
     if not size > 0.0:
         return None
@@ -375,7 +373,7 @@ def _influence(
         return None
     step = _SMALL * _rms(motion.record[name] - np.mean(motion.record[name])) / size
     near = motion.moved_by(moved, step)
-    return np.asarray((fit.residual(near, values) - fit.residual(motion, values)) / step)
+    return np.asarray((near.residual(values) - motion.residual(values)) / step)
 
 
 def _rms(signal: Floats) -> float:

@@ -41,6 +41,15 @@ _SMOOTH = 1e-9
 
 
 @dataclass(frozen=True)
+class ProposedForm:
+    """Another form of a family, beside the other families that were taken."""
+
+    effect: Effect
+    values: Mapping[str, float]  # its parameters
+    left: float  # squared residual of held-out stretches that it leaves, in units of what the form that was taken leaves
+
+
+@dataclass(frozen=True)
 class ProposedCause:
     """A family at a place, in the form that explains most."""
 
@@ -53,6 +62,9 @@ class ProposedCause:
     values: Mapping[str, float]  # parameters of the effect, as far as the regression gives them
     # 95 % limits of the share over stretches drawn with replacement.
     interval: tuple[float, float] = (0.0, 1.0)
+    forms: tuple[
+        ProposedForm, ...
+    ] = ()  # of a family that was taken, the others that are possible in its place
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -184,6 +196,20 @@ class Selection:
         drawn.whole = np.sum(drawn.products, axis=0)
         return drawn
 
+    def _forms(self, rig: Rig, key: Key, taken: int, chosen: Sequence[int]) -> tuple[ProposedForm, ...]:
+        """Return the other forms of a selected family, beside the columns of the other families."""
+        own = [i for i, term in enumerate(self.terms) if (term.effect.family, rig.where(term.effect)) == key]
+        best: dict[str, tuple[float, int]] = {}
+        for i, remainder in self._remainders(chosen, own):
+            name = self.terms[i].effect.name
+            best[name] = min(best.get(name, (remainder, i)), (remainder, i))
+        whole = self.remainder([*chosen, *self.places[taken]])
+        return tuple(
+            ProposedForm(self.terms[i].effect, self._values(i, chosen), remainder / whole)
+            for name, (remainder, i) in best.items()
+            if name != self.terms[taken].effect.name
+        )
+
     def best(self, rig: Rig, chosen: Sequence[int], taken: Sequence[Key]) -> dict[Key, tuple[float, int]]:
         """Return the best term of each family at each place beside columns that were chosen, with what it leaves."""
         best: dict[Key, tuple[float, int]] = {}
@@ -193,9 +219,12 @@ class Selection:
                 best[key] = (remainder, i)
         return best
 
-    def _remainders(self, chosen: Sequence[int]) -> Iterator[tuple[int, float]]:
-        """Yield each term that can have the sign that it needs beside chosen columns, and what it leaves."""
-        for i, term in enumerate(self.terms):
+    def _remainders(
+        self, chosen: Sequence[int], asked: Sequence[int] | None = None
+    ) -> Iterator[tuple[int, float]]:
+        """Yield each (asked) term that can have the sign that it needs beside chosen columns, and what it leaves."""
+        for i in range(len(self.terms)) if asked is None else asked:
+            term = self.terms[i]
             columns = [*chosen, *self.places[i]]
             own = self._solved(self.whole, [*self.own, *columns])[-len(self.places[i]) :]
             if all(number >= 0.0 or not sided for sided, number in zip(term.one_sided, own, strict=True)):
@@ -241,9 +270,13 @@ class Selection:
         )
         selected = self.selected(rig)
         remainders = [begun, *(own for _, _, own in selected)]
+        beside = [self.columns_of([*selected[:n], *selected[n + 1 :]]) for n in range(len(selected))]
         taken = tuple(
-            self._cause(key, i, 1.0 - own / before, self.columns_of([*selected[:n], *selected[n + 1 :]]))
-            for n, ((key, i, own), before) in enumerate(zip(selected, remainders, strict=False))
+            replace(
+                self._cause(key, i, 1.0 - own / before, chosen),
+                forms=self._forms(rig, key, i, chosen),
+            )
+            for (key, i, own), before, chosen in zip(selected, remainders, beside, strict=False)
         )
         judged = frozenset(term.effect.name for term in self.terms)
         explained = 1.0 - remainders[-1] / begun if begun > 0.0 else 0.0

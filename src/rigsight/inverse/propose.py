@@ -91,6 +91,25 @@ def along_motion(campaign: Campaign, known: Mapping[str, float]) -> EffectTerms 
     return EffectTerms(fit, values, characteristic_scales(rig, records, own))
 
 
+def numbers_along_motion(campaign: Campaign, known: Mapping[str, float]) -> dict[str, float] | None:
+    """Return the parameters of the rig with the smallest error of the equations along the motion; None as for `propose`.
+
+    Parameters
+    ----------
+    campaign
+        Records and rig.
+    known
+        Constants and parameters from which the regression starts.
+    """
+    if campaign.rig.mechanism.bodies is not None or campaign.modelled:
+        return None
+    try:
+        _, values = _fitted(campaign, known)
+    except SimulationError:
+        return None
+    return {p.name: values[p.name] for p in campaign.rig.parameters}
+
+
 def _in_time(campaign: Campaign, known: Mapping[str, float]) -> Campaign:
     """Return a campaign without its modelled delays and lags: what they make late is moved to its time."""
     structure = compose(campaign.rig, campaign.modelled)

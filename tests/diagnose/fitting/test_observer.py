@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose, structures_to_fit
+from rigsight.diagnose.fitting.preparation import start_values_of
 from rigsight.diagnose.search.horizon import windowing_of
 from rigsight.effects import CATALOGUE, effect_named, placed
 from rigsight.identify import GreyBoxFit, characteristic_scales
@@ -226,7 +227,7 @@ def test_noise_that_is_followed_shows_in_a_pressure_and_counts_as_its_floor(tmp_
         records.append(run.with_signals(**shown))
     given = {name: value for name, value in truth.items() if name not in ("area", "T_c")}
     campaign = Campaign("cylinder", rig, {"area": 1e-3}, given, tuple(records))
-    windowing, amplified = windowing_of(campaign, noise, 1)
+    windowing, amplified = windowing_of(campaign, noise, 1, start_values_of(campaign))
     left = {}
     for bandwidth in (100.0, windowing.bandwidth):
         (record,) = Observer(("position",), bandwidth).following(records[1:2])

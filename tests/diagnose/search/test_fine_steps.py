@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigsight.diagnose.fitting.preparation import fit_context_of
+from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.identify import IdleThreads
@@ -16,7 +16,7 @@ def test_a_mass_that_samples_do_not_show_is_not_followed_to_zero(shared_data: Pa
     # At 50 samples a second the pole of a measured servo went to -1073 rad/s, in 16 steps a sample, for a thousandth of the cost.
     campaign = read_campaign(shared_data / "so101" / "elbow" / "campaign.toml")
     noise = {floor.output: floor.std for floor in noise_floors(campaign.rig, campaign.records)}
-    context = fit_context_of(campaign, noise, Windowing(), None, IdleThreads())
+    context = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(), start_values_of(campaign))
     reidentified = reidentify(context, context.start)
     assert max(reidentified.fit.substeps) <= 4
     finest = context.problem(reidentified.fit.structure, context.estimation).fit(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.preparation import fit_context_of
+from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import effect_named, placed
 from rigsight.identify import IdleThreads
@@ -69,7 +69,9 @@ def test_a_law_about_zero_does_no_harm_to_a_pendulum_that_hangs_at_pi(tmp_path: 
             Record(f"decay_{i}", dt, {"angle": angle + noise * rng.standard_normal(t.size)}, {}, role=role)
         )
     campaign = Campaign("pendulum", rig, {"J": 1.0}, {}, tuple(records))
-    context = fit_context_of(campaign, {"angle": noise}, Windowing(), None, IdleThreads(1))
+    context = fit_context_of(
+        campaign, {"angle": noise}, Windowing(), None, IdleThreads(1), start_values_of(campaign)
+    )
     reidentified = reidentify(context, context.start)
     (model,) = fit_candidates(context, reidentified, [effect_named("cubic_stiffness")])
     assert model.fit.cost < 1.01 * reidentified.fit.cost

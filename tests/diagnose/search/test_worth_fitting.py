@@ -41,3 +41,12 @@ def test_where_no_family_explains_enough_all_are_fitted() -> None:
     assert len(fitted(cause("coulomb_friction", 0.2))) == len(CATALOGUE)
     assert len(fitted(cause("coulomb_friction", 0.8), by_chance=0.9)) == len(CATALOGUE)
     assert worth_fitting(AXIS, None, CATALOGUE).alone == CATALOGUE
+
+
+def test_of_families_that_explain_the_force_only_together_the_forms_that_were_taken_are_fitted() -> None:
+    both = cause("coulomb_friction", 0.5), cause("cubic_stiffness", 0.9)
+    judged = frozenset(effect.name for effect in CATALOGUE)
+    proposal = Proposal(both, both[:1], judged, explained=0.95, by_chance=0.01, noise=0.01)
+    worth = worth_fitting(AXIS, proposal, CATALOGUE)
+    assert {effect.name for effect in worth.alone} == {"coulomb_friction", "cubic_stiffness"}
+    assert worth.explained == 0.95

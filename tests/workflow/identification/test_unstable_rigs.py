@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import with_weighed_spring
+from rigsight.diagnose.fitting.preparation import start_values_of
 from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.identify.identification import Identification
 from rigsight.identify.record_identification import EstimationOptions, identify_record
@@ -99,7 +100,7 @@ def test_a_diagnosis_holds_an_unstable_rig(tmp_path: Path) -> None:
     records = {name: in_a_loop(2.0, 5.0, -30.0, seed=seed) for seed, name in enumerate("ab")}
     campaign = read_campaign(campaign_of(tmp_path, records, "m = 2.0\nd = 5.0\nk = -20.0"))
     assert not restores(campaign)
-    windowing, _ = windowing_of(campaign, {"x": NOISE}, 1)
+    windowing, _ = windowing_of(campaign, {"x": NOISE}, 1, start_values_of(campaign))
     fastest = np.max(np.abs(np.roots([2.0, 5.0, -30.0])))
     assert windowing.bandwidth is not None
     assert windowing.bandwidth > fastest

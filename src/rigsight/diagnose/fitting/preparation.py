@@ -15,6 +15,7 @@ from rigsight.identify import (
     swallowed_by_offsets,
 )
 from rigsight.identify.fit.windows import Observer, Windowing, followed_sensors, liveliest, until_rest
+from rigsight.inverse import numbers_along_motion
 from rigsight.simulate import Structure, compose, structure_of_fit
 
 Prepare = Callable[[Sequence[Structure]], None]
@@ -27,10 +28,9 @@ def fit_context_of(
     windowing: Windowing,
     memory: FitMemory | None,
     threads: IdleThreads,
-    start: Mapping[str, float] | None = None,
+    start: Mapping[str, float],
 ) -> FitContext:
     """Return the context in which candidates of a campaign are fitted and scored."""
-    start = start_values_of(campaign) if start is None else start
     fitted = windowing.cut(campaign.estimation)
     moving = until_rest(fitted, campaign.rig)
     held = _held(campaign)
@@ -67,9 +67,13 @@ def start_values_of(campaign: Campaign) -> dict[str, float]:
     held = {} if campaign.absent_spring is None else {campaign.absent_spring: 0.0}
     if campaign.open_factor is not None:
         held[campaign.open_factor.held] = campaign.open_factor.value
+    rig, given = campaign.rig, {**campaign.constants, **campaign.given, **held}
+    along = None
+    if not rig.has_one_motion and all(p.name in given for p in rig.parameters):
+        along = numbers_along_motion(campaign, given)
     start = {
         **campaign.constants,
-        **linear_start(campaign.rig, campaign.estimation, campaign.constants, held),
+        **(along or linear_start(rig, campaign.estimation, campaign.constants, held)),
     }
     # Numbers fitted without the effects that the simulation has are farther off than those it came with.
     return (

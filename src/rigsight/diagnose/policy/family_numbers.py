@@ -20,7 +20,7 @@ class FamilyNumbers:
         ),
     )
     per_motion: float = number(
-        3.4,
+        5.6,
         "measured",
         "The same for the share of the squared force that a family leaves along the measured motion; less where few independent "
         "rows leave much to chance.",
@@ -28,7 +28,7 @@ class FamilyNumbers:
         "made these trials",
     )
     other_causes: float = number(
-        7.5,
+        5.0,
         "measured",
         "Weight of a cause of no family of the catalogue, or of one that the motion does not judge; a family that explains "
         "nothing has the weight one.",

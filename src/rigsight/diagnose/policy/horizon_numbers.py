@@ -74,3 +74,12 @@ class HorizonNumbers:
         "budget",
         "Evaluations of the rig's equations from each other set of start values.",
     )
+    lost: float = number(
+        3.0,
+        "assumption",
+        (
+            "RMS error of the given simulation, in standard deviations of a reading, from which on several bodies are not "
+            "run free. Two motions of one size in opposite phase differ by two."
+        ),
+        set_by="an arm whose free run ends ten deviations off",
+    )

@@ -12,7 +12,6 @@ from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.basins import is_lower
 from rigsight.diagnose.search.nested_models import lowered_by_extensions, ordered_by_inclusion
 from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
@@ -64,13 +63,14 @@ def single_models(
     noise: Mapping[str, float],
     effects: Sequence[Effect],
     windowing: Windowing,
+    start: Mapping[str, float],
     n_jobs: int,
     say: Callable[[str], None],
     prepare: Prepare | None,
     memory: FitMemory | None,
 ) -> SingleModels:
     """Fit and score the given simulation, its equations and every candidate."""
-    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs))
+    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs), start)
     reidentified = reidentify(context, context.start)
     if not reidentified.residuals:
         raise SimulationError(
@@ -79,8 +79,6 @@ def single_models(
     say("re-identified")
     proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, noise)
     say("missing force")
-    if proposal is not None:
-        reidentified = _from_numbers(context, reidentified, proposal.numbers)
     worth = worth_fitting(campaign.rig, proposal, effects)
     context = _with_known_motion(campaign, context, reidentified)
     if (
@@ -104,16 +102,6 @@ def single_models(
     return SingleModels(
         windowing, context, before, reidentified, singles, search, proposal, tuple(effects), worth
     )
-
-
-def _from_numbers(
-    context: FitContext, reidentified: FittedModel, numbers: Mapping[str, float]
-) -> FittedModel:
-    """Return the equations fitted from the numbers of a regression with the missing effects, if that is better."""
-    fit = reidentified.fit
-    start = {**fit.values, **{name: value for name, value in numbers.items() if name in fit.free}}
-    found = context.problem(fit.structure, context.estimation).fit(start, fit.free)
-    return context.score((), found) if is_lower(found, fit) else reidentified
 
 
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:

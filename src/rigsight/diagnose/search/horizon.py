@@ -14,6 +14,7 @@ from rigsight.diagnose.policy import HORIZON, VERDICT
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.errors import SimulationError
 from rigsight.identify import DEFAULT_ACCURACY, FitResult, IdleThreads
+from rigsight.identify.fit.first_states import first_state
 from rigsight.identify.fit.windows import (
     Observer,
     Windowing,
@@ -24,20 +25,52 @@ from rigsight.identify.fit.windows import (
 from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.records.record import Record
 from rigsight.rigs import evaluated
-from rigsight.simulate import compose, parameter_vector, simulate_outputs, structure_of_fit
+from rigsight.simulate import (
+    compose,
+    parameter_vector,
+    record_input,
+    record_values,
+    simulate_outputs,
+    structure_of_fit,
+)
 
 
 def restores(campaign: Campaign) -> bool:
     """Return True if records can be run free: else errors of forces or of initial states accumulate.
 
-    The spring of one mass must be stiffer than the slowest observer, and no rig may be unstable near its rest.
+    The spring of one mass must be stiffer than the slowest observer. No rig may be unstable near its rest, or leave its records.
     """
     if not (campaign.rig.has_one_motion and campaign.rig.is_driven):
-        return longest_free_run(_poles(campaign), campaign.estimation) is None
+        return longest_free_run(_poles(campaign), campaign.estimation) is None and not _is_lost(campaign)
     typical = 2.0 * np.pi / typical_period(campaign.rig, campaign.estimation)
     poles = _poles(campaign)
     returns = bool(np.min(np.abs(poles)) >= HORIZON.observer_loose * typical)
     return returns and longest_free_run(poles, campaign.estimation) is None
+
+
+def _is_lost(campaign: Campaign) -> bool:
+    """Return True if the given simulation, run free, ends so far from a record that its error says nothing of the equations."""
+    known = {**campaign.constants, **campaign.given}
+    structure = compose(campaign.rig, campaign.modelled)
+    if not all(name in known for name in structure.names):
+        return False
+    columns = [signal.name for signal in campaign.rig.outputs]
+    for record in campaign.estimation:
+        held, p = (
+            record_input(structure, record),
+            parameter_vector(structure, record_values(structure, known, record)),
+        )
+        try:
+            run = simulate_outputs(
+                structure, held, p, first_state(structure, record, known), record.n_samples
+            )
+        except SimulationError:
+            return False
+        for name in followed_sensors(campaign.rig, [record]):
+            error = run[:, columns.index(name)] - record[name]
+            if np.sqrt(np.mean(error**2)) > HORIZON.lost * np.std(record[name]) > 0.0:
+                return True
+    return False
 
 
 def _poles(campaign: Campaign) -> NDArray[np.complex128]:
@@ -59,7 +92,7 @@ def _poles(campaign: Campaign) -> NDArray[np.complex128]:
 
 
 def windowing_of(
-    campaign: Campaign, noise: Mapping[str, float], n_jobs: int
+    campaign: Campaign, noise: Mapping[str, float], n_jobs: int, start: Mapping[str, float]
 ) -> tuple[Windowing, dict[str, float]]:
     """Return how records of a rig that drifts are compared with models: by an observer.
 
@@ -80,8 +113,7 @@ def windowing_of(
         max(HORIZON.observer_close * typical, slowest),
         HORIZON.observer_sampling / max(record.dt for record in campaign.records),
     )
-    start = start_values_of(campaign)
-    values: Mapping[str, float] = start
+    values = start
     while True:
         windowing = Windowing(observer=Observer(sensors, bandwidth))
         context = fit_context_of(campaign, noise, windowing, None, IdleThreads(n_jobs), start)

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
@@ -22,7 +24,7 @@ from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, refine
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect, Family
-from rigsight.inverse import Proposal, ProposedCause
+from rigsight.inverse import Proposal, ProposedCause, ProposedForm
 
 Key = tuple[Family, str]
 """A family and the place at which it acts."""
@@ -48,9 +50,10 @@ class NamedByMotion:
         """Return the models of several effects and their parts."""
         models = list(self._grown(self.singles[0]))
         # Two that the motion does not judge, such as a delay and a resonance, may hide each other.
-        for size in (2, 3):
-            sets = self.together.fitted(size, VERDICT.larger_part)
-            models += [one for one in sets if self._is_worth(one, self.singles[0])]
+        if min((model.error_over_noise for model in models), default=np.inf) > VERDICT.at_floor:
+            for size in (2, 3):
+                sets = self.together.fitted(size, VERDICT.larger_part)
+                models += [one for one in sets if self._is_worth(one, self.singles[0])]
         if not models:
             return []
         model = min(models, key=lambda one: one.error_over_noise)
@@ -76,6 +79,8 @@ class NamedByMotion:
                 yield model
         unjudged = [effect for effect in self.effects if effect.name not in self.proposal.judged]
         for _ in range(SEARCH.most_unnamed):
+            if model.error_over_noise <= VERDICT.at_floor:
+                break
             # Along the motion the fitted model leaves another force than the numbers of the regression did. Where the simulation
             # does not follow the motion, its numbers are worth less than those; beside a limit of a drive nothing can be asked.
             follows = model.error_over_noise <= self.enough
@@ -122,10 +127,29 @@ class NamedByMotion:
         return list(self.context.threads.side_by_side(partial(part_of, self.context, model), kept))
 
     def _other_forms(self, model: FittedModel, replaced: Effect, part: FittedModel) -> list[FittedModel]:
-        """Return a model with other effects of the family of one at its place; the part is the model without it."""
+        """Return a model with other effects of the family of one at its place; the part is the model without it.
+
+        Those that the motion judges start from there; one that leaves far more of the missing force than the best form is no
+        candidate.
+        """
         key = self._key(replaced)
-        forms = [e for e in self.effects if self._key(e) == key and e not in model.effects]
-        if not forms or not part.residuals:
+        if not part.residuals:
             return []
-        of_model = (replaced, model.fit)
-        return with_one_more(self.context, part, forms, [], self.singles, self.prepare, replaced=of_model)
+        of_family = [c for c in self.proposal.taken if (c.family, c.where) == key]
+        causes = [
+            replace(cause, effect=form.effect, values=form.values)
+            for cause in of_family
+            for form in (ProposedForm(cause.effect, cause.values, 1.0), *cause.forms)
+            if form.effect not in model.effects and SEARCH.near_force * form.left <= 1.0
+        ]
+        known = self.proposal.judged if of_family else frozenset()
+        forms = [
+            e for e in self.effects if self._key(e) == key and e not in model.effects and e.name not in known
+        ]
+        found = [self._with(part, [cause], self.proposal) for cause in causes]
+        if forms:
+            of_model = (replaced, model.fit)
+            found += with_one_more(
+                self.context, part, forms, [], self.singles, self.prepare, replaced=of_model
+            )
+        return found
