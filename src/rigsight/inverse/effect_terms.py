@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import sympy as sp
@@ -44,8 +44,6 @@ _LATEST = 1.0
 """Longest delay or lag, in units of the time in which the motion advances by a radian."""
 _SMALL_PART = 0.05
 """Parameters of a drive effect in characteristic sizes: small, and above the noise of the force."""
-_SMALL = 1e-3
-"""Change of a reading, in units of its deviation, from which its influence on the equations is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +89,9 @@ class EffectTerms:
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term."""
         if is_late(effect):
-            yield from _of_late(effect, self.fit, self.values, self.scales)
+            yield from _of_late(effect, self.fit, self.values, self.scales, self._by_motion)
         elif effect.place is Place.SENSOR:
-            yield from _of_sensor(effect, self.fit, self.values, self.scales)
+            yield from _of_sensor(effect, self.fit, self.values, self.scales, self._by_motion)
         elif effect.place is Place.ACTUATOR:
             yield from _of_drive(effect, self.fit, self.values, self.scales)
         elif is_joint_force(effect) and not _is_resonance(effect):
@@ -115,14 +113,14 @@ class EffectTerms:
         """
         fit, values, motions = self.fit, self.values, self.fit.motions
         if is_late(effect):
-            rows = [_late(effect, own, fit, m, values) for m in motions]
+            rows = [_late(effect, own, m, by, values) for m, by in zip(motions, self._by_motion, strict=True)]
         elif effect.place is Place.SENSOR:
             name, numbers = fit.rig.acts_at(effect), [sp.Symbol(p, real=True) for p in own]
             assert effect.measured is not None
             shown = _compiled(effect.measured, (canonical.reading, *numbers))
             rows = [
-                _influence(m, values, name, m.record[name] - shown(m.record[name], *own.values()))
-                for m in motions
+                _influence(m, by, values, name, m.record[name] - shown(m.record[name], *own.values()))
+                for m, by in zip(motions, self._by_motion, strict=True)
             ]
         elif effect.place is Place.ACTUATOR:
             drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
@@ -133,6 +131,12 @@ class EffectTerms:
         found = [m.thinned(part) for m, part in zip(motions, rows, strict=True) if part is not None]
         finite = len(found) == len(motions) and all(np.all(np.isfinite(part)) for part in found)
         return tuple(found) if finite else None
+
+    @cached_property
+    def _by_motion(self) -> list[Floats]:
+        if not self.fit.motions[0].equations.n_states:
+            return [np.zeros(0) for _ in self.fit.motions]
+        return [motion.by_motion(self.values) for motion in self.fit.motions]
 
     def _motion_of(self, effect: Effect) -> list[JointMotion]:
         joint = joint_of(self.fit.rig, effect)
@@ -225,7 +229,11 @@ def lateness(effect: Effect, own: Mapping[str, float]) -> float:
 
 
 def _of_late(
-    effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
+    effect: Effect,
+    fit: EquationFit,
+    values: Mapping[str, float],
+    scales: Mapping[str, float],
+    by_motion: Sequence[Floats],
 ) -> Iterator[Term]:
     """Yield what a delay or a lag of each length takes from the equations."""
     (parameter,) = (p for p in effect.parameters if p.fitted)
@@ -233,7 +241,9 @@ def _of_late(
     if parameter.lower < 0.0:
         lengths = np.concatenate([-lengths, lengths])
     for length in map(float, lengths):
-        rows = [_late(effect, {parameter.name: length}, fit, motion, values) for motion in fit.motions]
+        own = {parameter.name: length}
+        along = zip(fit.motions, by_motion, strict=True)
+        rows = [_late(effect, own, motion, by, values) for motion, by in along]
         columns = tuple(
             m.thinned(row[None]) for m, row in zip(fit.motions, rows, strict=True) if row is not None
         )
@@ -244,23 +254,20 @@ def _of_late(
 def _late(
     effect: Effect,
     own: Mapping[str, float],
-    fit: EquationFit,
     motion: RecordMotion,
+    by_motion: Floats,
     values: Mapping[str, float],
 ) -> Floats | None:
     """Return what a delay or a lag takes from the equations, shape (n_equations, n_samples); None where it takes nothing."""
-    name, late, dt = fit.rig.acts_at(effect), lateness(effect, own), motion.record.dt
+    name, late, dt = motion.equations.rig.acts_at(effect), lateness(effect, own), motion.record.dt
     if effect.place is Place.SENSOR:
         if name not in motion.record:
             return None
         reading = motion.filtered(motion.record[name])
-        return _influence(motion, values, name, shifted(reading, dt, late) - reading)
+        return _influence(motion, by_motion, values, name, shifted(reading, dt, late) - reading)
     if not motion.equations.n_coordinates:
         return None
-    change = motion.ahead(late)
-    step = _SMALL * _rms(motion.z) / max(_rms(change[0]), np.finfo(np.float64).tiny)
-    near = motion.moved_by(change, step)
-    more = (near.residual(values) - motion.residual(values)) / step
+    more = _along_change(by_motion, motion.ahead(late))
     p = motion.equations.parameters(values, motion.record)
     along = motion.equations.slopes_along(motion.z, motion.u, p)[name]
     size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
@@ -327,7 +334,11 @@ def _required(
 
 
 def _of_sensor(
-    effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
+    effect: Effect,
+    fit: EquationFit,
+    values: Mapping[str, float],
+    scales: Mapping[str, float],
+    by_motion: Sequence[Floats],
 ) -> Iterator[Term]:
     """Yield what small changes of the reading, which undo a unit of each linear parameter, change in the equations."""
     name = fit.rig.acts_at(effect)
@@ -341,9 +352,9 @@ def _of_sensor(
     for inner in _grid_of(effect, linear, scales):
         arguments = (canonical.reading, *(sp.Symbol(own, real=True) for own in inner))
         columns = []
-        for motion in fit.motions:
+        for motion, by in zip(fit.motions, by_motion, strict=True):
             changes = [-_compiled(slopes[p], arguments)(motion.record[name], *inner.values()) for p in linear]
-            parts = [_influence(motion, values, name, change) for change in changes]
+            parts = [_influence(motion, by, values, name, change) for change in changes]
             if any(part is None for part in parts):
                 return
             columns.append(motion.thinned(np.array(parts)))
@@ -359,22 +370,20 @@ def _compiled(expression: sp.Expr, arguments: tuple[sp.Symbol, ...]) -> Callable
     )
 
 
-def _influence(motion: RecordMotion, values: Mapping[str, float], name: str, change: Floats) -> Floats | None:
+def _influence(
+    motion: RecordMotion, by_motion: Floats, values: Mapping[str, float], name: str, change: Floats
+) -> Floats | None:
     """Return the change of the residual of the rig's equations by a small change of a reading; None where it has none."""
-    size = _rms(change)
-    if not size > 0.0:
+    if not np.any(change):
         return None
     if not motion.equations.n_states:
         rows = np.zeros((len(motion.sensors), change.size))
         rows[[motion.equations.sensor_names[i] for i in motion.sensors].index(name)] = -change
         return rows
     moved = motion.with_reading_changed(name, change, values)
-    if moved is None:
-        return None
-    step = _SMALL * _rms(motion.record[name] - np.mean(motion.record[name])) / size
-    near = motion.moved_by(moved, step)
-    return np.asarray((near.residual(values) - motion.residual(values)) / step)
+    return None if moved is None else _along_change(by_motion, moved)
 
 
-def _rms(signal: Floats) -> float:
-    return float(np.sqrt(np.mean(signal**2)))
+def _along_change(by_motion: Floats, change: tuple[Floats, Floats]) -> Floats:
+    """Return the change of the equations by small changes of `z` and `a`, shape (n_equations, n_samples)."""
+    return np.asarray(np.einsum("ekt,kt->et", by_motion, np.concatenate(change)))

@@ -32,6 +32,8 @@ _END = 1.5
 
 An assumption: at 1 the noise of the ends still dominates the rows of an arm, at 2 records of 240 samples lose what they show.
 """
+_SMALL = 1e-3
+"""Change of a state, in units of its deviation, from which its influence on the equations is taken."""
 _ABOVE = 1.2
 """Sampling rate of filtered rows, in units of twice the end of their band."""
 
@@ -152,9 +154,23 @@ class RecordMotion:
         change[n : 2 * n] = slope(change[:n], dt)
         return change, slope(change[n : 2 * n], dt)
 
-    def moved_by(self, change: tuple[Floats, Floats], step: float) -> RecordMotion:
-        """Return the motion with a multiple of a change of `z` and `a`."""
-        return replace(self, z=self.z + step * change[0], a=self.a + step * change[1])
+    def by_motion(self, values: Mapping[str, float]) -> Floats:
+        """Return the derivatives of `residual` by `z` and `a`, shape (n_equations, n_states + n_coordinates, n_samples).
+
+        Parameters
+        ----------
+        values
+            Constants and parameters by name.
+        """
+        equations, now = self.equations, self.residual(values)
+        columns = []
+        for i, row in enumerate(self.z):
+            step = _SMALL * float(np.std(row)) or _SMALL
+            moved = replace(self, z=np.concatenate([self.z[:i], row[None] + step, self.z[i + 1 :]]))
+            columns.append((moved.residual(values) - now) / step)
+        p = equations.parameters(values, self.record)
+        masses = np.moveaxis(equations.mass(self.z, self.u, p), 0, 2)
+        return np.concatenate([np.array(columns).swapaxes(0, 1), masses], axis=1)
 
     @cached_property
     def band(self) -> float:

@@ -13,6 +13,7 @@ from rigsight.errors import SimulationError
 from rigsight.identify.fit.first_states import rig_state
 from rigsight.identify.fit.windows import pieces
 from rigsight.identify.rig_equations import RigEquations, equations_of
+from rigsight.identify.start.measured_states import measured_states, sensor_factors
 from rigsight.identify.typical_size import size_about_zero, size_of_signal, typical_size
 from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
@@ -33,8 +34,13 @@ _BEYOND = 3.0
 def simulated_motion(
     equations: RigEquations, record: Record, values: Mapping[str, float]
 ) -> tuple[Floats, Floats]:
-    """Return states and inputs with their derivatives in a record according to a rig's equations, by rows."""
+    """Return states and inputs with their derivatives in a record by rows: as measured, else by the equations."""
     u = equations.inputs_of(record)[1]
+    if equations.shows_all_states(set(record.signals)):
+        p = equations.parameters(values, record)
+        measured = measured_states(equations, record, p, sensor_factors(equations, frozenset()))
+        if measured is not None and not measured.is_integrated:
+            return measured.z, u
     found: Floats | None = None
     for count in _PIECES:
         try:

@@ -45,12 +45,13 @@ class NamedByMotion:
     together: Together  # sets of the effects that the motion names or does not judge
     ask: Ask  # what the motion says of the force that a fitted model leaves
     enough: float  # error up to which a simulation follows the motion, in units of the noise floor
+    settled: float  # error up to which nothing remains to explain, or no more than a law errs
 
     def found(self) -> list[FittedModel]:
         """Return the models of several effects and their parts."""
         models = list(self._grown(self.singles[0]))
         # Two that the motion does not judge, such as a delay and a resonance, may hide each other.
-        if min((model.error_over_noise for model in models), default=np.inf) > VERDICT.at_floor:
+        if min((model.error_over_noise for model in models), default=np.inf) > self.settled:
             for size in (2, 3):
                 sets = self.together.fitted(size, VERDICT.larger_part)
                 models += [one for one in sets if self._is_worth(one, self.singles[0])]
@@ -79,7 +80,7 @@ class NamedByMotion:
                 yield model
         unjudged = [effect for effect in self.effects if effect.name not in self.proposal.judged]
         for _ in range(SEARCH.most_unnamed):
-            if model.error_over_noise <= VERDICT.at_floor:
+            if model.error_over_noise <= self.settled:
                 break
             # Along the motion the fitted model leaves another force than the numbers of the regression did. Where the simulation
             # does not follow the motion, its numbers are worth less than those; beside a limit of a drive nothing can be asked.

@@ -216,13 +216,14 @@ def several_effects(
         return []
     best = usable[0]
     together = Together(context, reidentified, effects, prepare)
-    if is_shown and best.error_over_noise <= SEARCH.law_error * reidentified.error_over_noise:
+    settled = max(VERDICT.at_floor, SEARCH.law_error * reidentified.error_over_noise)
+    if is_shown and best.error_over_noise <= settled:
         return []
     if is_shown and proposal is not None:
         open_ones = [e for e in effects if e.name not in proposal.judged or e in proposal.effects]
         sets = Together(context, reidentified, open_ones, prepare)
         enough = larger_part_closed(reidentified)
-        named = NamedByMotion(context, usable, proposal, effects, prepare, sets, ask, enough).found()
+        named = NamedByMotion(context, usable, proposal, effects, prepare, sets, ask, enough, settled).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
     is_excused = lower_bound and best.error_over_noise <= VERDICT.at_lower_bound
     if is_excused and checks.is_adequate(best):
