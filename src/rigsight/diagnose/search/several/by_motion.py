@@ -148,7 +148,7 @@ class NamedByMotion:
             e for e in self.effects if self._key(e) == key and e not in model.effects and e.name not in known
         ]
         found = [self._with(part, [cause], self.proposal) for cause in causes]
-        if forms:
+        if forms and model.error_over_noise > self.settled:
             of_model = (replaced, model.fit)
             found += with_one_more(
                 self.context, part, forms, [], self.singles, self.prepare, replaced=of_model
