@@ -44,7 +44,7 @@ def first_family(friction: float) -> str | None:
 
 @pytest.fixture(scope="module")
 def power() -> Power:
-    return power_of(campaign(), [effect_named("coulomb_friction"), effect_named("sensor_delay")])
+    return power_of(campaign(), [effect_named("coulomb_friction"), effect_named("flexible_mode")])
 
 
 def test_friction_of_twice_the_size_is_found_in_records_and_a_quarter_is_not(power: Power) -> None:

@@ -128,7 +128,8 @@ class EquationFit:
         parts = zip(*(motion.forces(values) for motion in self.motions), strict=True)
         filtered = [[m.inner(own) for m, own in zip(self.motions, part, strict=True)] for part in parts]
         size = np.max([_rms(part) for part in filtered], axis=0)
-        return np.asarray(np.sqrt((_LAW_ERROR * size) ** 2 + (0.0 if noise is None else noise)))
+        error = np.sqrt((_LAW_ERROR * size) ** 2 + (0.0 if noise is None else noise))
+        return np.asarray(np.maximum(error, _DEPENDENT * np.max(error)))
 
     def settled(self, start: Mapping[str, float]) -> tuple[dict[str, float], Floats]:
         """Return the numbers with the smallest residual near a start, and its RMS in each equation.

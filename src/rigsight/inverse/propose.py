@@ -111,9 +111,11 @@ def numbers_along_motion(campaign: Campaign, known: Mapping[str, float]) -> dict
 
 
 def _in_time(campaign: Campaign, known: Mapping[str, float]) -> Campaign:
-    """Return a campaign without its modelled delays and lags: what they make late is moved to its time."""
+    """Return a campaign without its modelled delays and lags of known length: what they make late is moved to its time."""
     structure = compose(campaign.rig, campaign.modelled)
     records = campaign.records
+    if not all(name in known for name in structure.names):
+        return campaign
     for effect in filter(is_late, campaign.modelled):
         own = {p.name: known[structure.parameter_name(effect, p.name)] for p in effect.parameters}
         place, late = campaign.rig.acts_at(effect), lateness(effect, own)

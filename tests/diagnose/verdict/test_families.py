@@ -95,18 +95,18 @@ def test_a_family_that_explains_the_force_along_the_motion_is_more_probable(scor
     models = [
         (scored((name,), residuals=0.7 * GAP), 0.0, 0.5) for name in ("coulomb_friction", "cubic_stiffness")
     ]
-    seen = ProposedCause(effect_named("coulomb_friction"), Family.DRY_FRICTION, "dynamics", 0.6, {})
-    proposal = Proposal((seen,), (seen,), frozenset({"coulomb_friction", "cubic_stiffness"}), 0.6, by_chance)
+    seen = ProposedCause(effect_named("coulomb_friction"), Family.DRY_FRICTION, "dynamics", 0.5, {})
+    proposal = Proposal((seen,), (seen,), frozenset({"coulomb_friction", "cubic_stiffness"}), 0.5, by_chance)
     rng = np.random.default_rng(1)
     found = families_at_places(
         AXIS, scored((), residuals=GAP), models[0][0], models, 1.0, np.ones(1), rng, proposal
     )
     by_family = {own.family: own for own in found}
     friction, spring = by_family[Family.DRY_FRICTION], by_family[Family.SPRING_LAW]
-    expected = 0.4 ** (-FAMILIES.per_motion * (1.0 - by_chance))
+    expected = 0.5 ** (-FAMILIES.per_motion * (1.0 - by_chance))
     assert friction.probability / spring.probability == pytest.approx(expected, rel=1e-6)
-    assert (friction.along_motion, spring.along_motion) == (0.6, None)
-    assert friction.to_json()["along_motion"] == 0.6
+    assert (friction.along_motion, spring.along_motion) == (0.5, None)
+    assert friction.to_json()["along_motion"] == 0.5
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,8 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
     named = tuple(e for e in effects if e.name in proposal.judged and (e.family, rig.where(e)) in near)
     is_shown = proposal.noise is not None and proposal.noise < SEARCH.noise_of_force
     beside = (proposal.explained - most) / (1.0 - most) if most < 1.0 else 0.0
-    if is_shown and min(beside, proposal.explained) >= VERDICT.larger_part:
+    is_rich = proposal.by_chance < VERDICT.larger_part
+    if is_shown and is_rich and min(beside, proposal.explained) >= VERDICT.larger_part:
         # No family alone follows the motion: other forms are tried beside the families that explain it together.
         named = proposal.effects
     kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
