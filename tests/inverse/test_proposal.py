@@ -167,3 +167,13 @@ def test_a_motion_that_no_sensor_shows_gives_no_proposal() -> None:
     )
     hidden = Campaign("test", rig, own.constants, own.parameters, records)
     assert propose(hidden, {**own.constants, **own.given}, candidates_on(rig, CATALOGUE)) is None
+
+
+def test_a_held_input_is_no_delay() -> None:
+    structure = compose(AXIS)
+    drive = 10.0 * np.sin(2.0 * np.pi * (0.3 * T + 0.4 * T**2))
+    run = simulate(structure, AXIS_VALUES, Record("run", DT, {"u": drive}, {}, hold="zoh"))
+    noisy = run["x"] + NOISE * np.std(run["x"]) * np.random.default_rng(0).standard_normal(T.size)
+    given = {name: value for name, value in AXIS_VALUES.items() if name != "gain"}
+    own = Campaign("held", AXIS, {"gain": 1.0}, given, (run.with_signals(x=noisy),))
+    assert all(cause.share < 0.1 for cause in proposed(own).alone if cause.family == "delay_or_lag")

@@ -267,12 +267,9 @@ def _late(
         return _influence(motion, by_motion, values, name, shifted(reading, dt, late) - reading)
     if not motion.equations.n_coordinates:
         return None
-    more = _along_change(by_motion, motion.ahead(late))
-    p = motion.equations.parameters(values, motion.record)
-    along = motion.equations.slopes_along(motion.z, motion.u, p)[name]
-    size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
     # What is required of the drive now was commanded earlier.
-    return np.asarray(along * np.sum(along * more, axis=0) / size)
+    along, more = _through_drive(name, motion, values, _along_change(by_motion, motion.ahead(late)))
+    return np.asarray(along * more)
 
 
 def _of_drive(
@@ -325,12 +322,20 @@ def _required(
 ) -> tuple[Floats, Floats]:
     """Return how a drive enters the equations, shape (n_equations, n_samples), and the force that the motion requires of it."""
     equations = motion.equations
+    along, missing = _through_drive(drive.name, motion, values, fit.residual(motion, values))
     p = equations.parameters(values, motion.record)
-    along = equations.slopes_along(motion.z, motion.u, p)[drive.name]
-    size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
-    missing = np.sum(along * fit.residual(motion, values), axis=0) / size
     given = equations.at_places(motion.z, motion.u, p)[f"force@{drive.name}"]
     return along, motion.filtered(missing + given)
+
+
+def _through_drive(
+    name: str, motion: RecordMotion, values: Mapping[str, float], rows: Floats
+) -> tuple[Floats, Floats]:
+    """Return how a drive enters the equations, shape (n_equations, n_samples), and the force of the drive nearest to rows."""
+    p = motion.equations.parameters(values, motion.record)
+    along = motion.equations.slopes_along(motion.z, motion.u, p)[name]
+    size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
+    return along, np.sum(along * rows, axis=0) / size
 
 
 def _of_sensor(
