@@ -185,7 +185,7 @@ def with_several_effects(
         models.reidentified,
         models.singles,
         models.effects,
-        models.worth.is_shown,
+        models.worth,
         models.proposal,
         ask,
         forms,

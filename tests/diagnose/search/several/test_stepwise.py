@@ -17,6 +17,7 @@ from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.stepwise import Stepwise, each_once, refit_singles, several_effects
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
+from rigsight.diagnose.search.worth_fitting import WorthFitting
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
 from rigsight.identify import characteristic_scales
@@ -218,7 +219,7 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
         scored((), error_over_noise=40.0),
         [alone],
         [],
-        False,
+        WorthFitting(),
         None,
         lambda _: None,
         None,
@@ -259,7 +260,7 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
         scored((), error_over_noise=40.0),
         [scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))],
         [],
-        False,
+        WorthFitting(),
         None,
         lambda _: None,
         None,
@@ -277,7 +278,7 @@ def test_a_residual_of_the_size_of_a_law_error_asks_for_no_second_effect(scored)
         scored((), error_over_noise=40.0),
         [single],
         [],
-        True,
+        WorthFitting(is_shown=True),
         None,
         lambda _: None,
         None,

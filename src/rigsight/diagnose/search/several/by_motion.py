@@ -42,7 +42,7 @@ class NamedByMotion:
     proposal: Proposal  # the families that the motion names
     effects: Sequence[Effect]  # candidates for a further cause
     prepare: Prepare | None  # compiles structures that are about to be fitted side by side
-    together: Together  # sets of the effects that the motion names or does not judge
+    together: Together  # sets of the effects that may be the main cause
     ask: Ask  # what the motion says of the force that a fitted model leaves
     enough: float  # error up to which a simulation follows the motion, in units of the noise floor
     settled: float  # error up to which nothing remains to explain, or no more than a law errs

@@ -33,6 +33,7 @@ from rigsight.diagnose.search.several.one_more_effect import with_one_more
 from rigsight.diagnose.search.several.parts import part_of, reduced
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, followed, refine
+from rigsight.diagnose.search.worth_fitting import WorthFitting
 from rigsight.effects import Effect
 from rigsight.inverse import Proposal
 from rigsight.simulate import carried_over
@@ -194,7 +195,7 @@ def several_effects(
     reidentified: FittedModel,
     singles: Sequence[FittedModel],
     effects: Sequence[Effect],
-    is_shown: bool,
+    worth: WorthFitting,
     proposal: Proposal | None,
     ask: Ask,
     forms: OtherForms,
@@ -204,7 +205,7 @@ def several_effects(
 ) -> list[FittedModel]:
     """Return models of several effects if a single effect does not explain everything.
 
-    `is_shown` is True where the motion shows every force that matters; `ask` says what it shows of the force that a model leaves.
+    `worth` says what the motion shows and leaves as main causes; `ask` what it shows of the force that a model leaves.
     Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
     bound. Where errors of laws are larger than noise, a residual of the size of the error of one law asks for no second one.
     """
@@ -217,11 +218,10 @@ def several_effects(
     best = usable[0]
     together = Together(context, reidentified, effects, prepare)
     settled = max(VERDICT.at_floor, SEARCH.law_error * reidentified.error_over_noise)
-    if is_shown and best.error_over_noise <= settled:
+    if worth.is_shown and best.error_over_noise <= settled:
         return []
-    if is_shown and proposal is not None:
-        open_ones = [e for e in effects if e.name not in proposal.judged or e in proposal.effects]
-        sets = Together(context, reidentified, open_ones, prepare)
+    if worth.is_shown and proposal is not None:
+        sets = Together(context, reidentified, worth.alone, prepare)
         enough = larger_part_closed(reidentified)
         named = NamedByMotion(context, usable, proposal, effects, prepare, sets, ask, enough, settled).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
