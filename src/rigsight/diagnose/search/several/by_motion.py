@@ -72,8 +72,7 @@ class NamedByMotion:
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
         """Yield a model with all causes that the motion names, then with each further one that lowers its error."""
-        taken = [c for c in self.proposal.taken if (c.family, c.where) not in map(self._key, model.effects)]
-        if taken:
+        if taken := self._new(self.proposal, model):
             larger = self._with(model, taken, self.proposal)
             if self._is_worth(larger, model):
                 model = larger
@@ -90,16 +89,18 @@ class NamedByMotion:
             larger_ones = with_one_more(
                 self.context, model, further, [], self.singles, self.prepare, VERDICT.larger_part
             )
-            larger_ones += [
-                self._with(model, [cause], beside)
-                for cause in (() if beside is None else beside.taken[:1])
-                if beside is not None and (cause.family, cause.where) not in map(self._key, model.effects)
-            ]
+            if beside is not None and (new := self._new(beside, model)):
+                larger_ones.append(self._with(model, new, beside))
             best = min(larger_ones, key=lambda one: one.error_over_noise, default=model)
             if not self._is_worth(best, model):
                 break
             model = best
             yield model
+
+    def _new(self, proposal: Proposal, model: FittedModel) -> list[ProposedCause]:
+        """Return the causes that were taken of families that a model does not have at their places."""
+        known = set(map(self._key, model.effects))
+        return [cause for cause in proposal.taken if (cause.family, cause.where) not in known]
 
     def _is_worth(self, larger: FittedModel, model: FittedModel) -> bool:
         """Return True if one more effect lowers the held-out error of a model enough."""
