@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -84,3 +86,12 @@ def test_a_change_that_widens_the_band_is_compared_in_the_band_of_the_measured_m
     assert motions[1][0].band != motions[0][0].band
     wide = float(np.sqrt(np.mean((after.rows(AXIS_VALUES)[0] - np.mean(after.rows(AXIS_VALUES)[0])) ** 2)))
     assert before.unexplained(after, AXIS_VALUES, np.ones(1))[0] < 0.1 * wide
+
+
+def test_beside_a_delay_of_one_of_two_drives_on_one_input_nothing_is_asked() -> None:
+    second = '[drives.brake]\nsignal = "f"\nforce = "-brake/10"\nalong = "x"\n[sensors.x]'
+    rig = rig_of_text(CART.replace("[sensors.x]", second), "cart.toml")
+    friction, delay = effect_named("coulomb_friction"), effect_named("input_delay@motor")
+    own = campaign(rig, {"m": 2.0, "T_c": 0.5}, [friction], (3.0,))
+    late = replace(own, modelled=(delay,))
+    assert propose(late, {"m": 2.0, "T_d": 0.01}, candidates_on(rig, CATALOGUE, late.modelled)) is None

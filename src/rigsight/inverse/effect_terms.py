@@ -85,11 +85,12 @@ class EffectTerms:
     def __init__(self, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]) -> None:
         self.fit, self.values, self.scales = fit, values, scales
         self._moved: dict[str, list[JointMotion]] = {}
+        self._of_lateness: dict[tuple[str, float], tuple[Floats, ...] | None] = {}
 
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term."""
         if is_late(effect):
-            yield from _of_late(effect, self.fit, self.values, self.scales, self._by_motion)
+            yield from self._of_late(effect)
         elif effect.place is Place.SENSOR:
             yield from _of_sensor(effect, self.fit, self.values, self.scales, self._by_motion)
         elif effect.place is Place.ACTUATOR:
@@ -113,8 +114,8 @@ class EffectTerms:
         """
         fit, values, motions = self.fit, self.values, self.fit.motions
         if is_late(effect):
-            rows = [_late(effect, own, m, by, values) for m, by in zip(motions, self._by_motion, strict=True)]
-        elif effect.place is Place.SENSOR:
+            return self._late(effect, lateness(effect, own))
+        if effect.place is Place.SENSOR:
             name, numbers = fit.rig.acts_at(effect), [sp.Symbol(p, real=True) for p in own]
             assert effect.measured is not None
             shown = _compiled(effect.measured, (canonical.reading, *numbers))
@@ -128,8 +129,36 @@ class EffectTerms:
         else:
             along = zip(motions, self._motion_of(effect), strict=True)
             rows = [generalized(m, effect, own, values, moved) for m, moved in along]
-        found = [m.thinned(part) for m, part in zip(motions, rows, strict=True) if part is not None]
-        finite = len(found) == len(motions) and all(np.all(np.isfinite(part)) for part in found)
+        return self._thinned(rows)
+
+    def _of_late(self, effect: Effect) -> Iterator[Term]:
+        """Yield a delay or a lag at each length of a grid."""
+        (parameter,) = (p for p in effect.parameters if p.fitted)
+        lengths = _usual(effect, parameter, self.scales) * np.geomspace(_LEAST_SHARE, _LATEST, _GRID[1])
+        if parameter.lower < 0.0:
+            lengths = np.concatenate([-lengths, lengths])
+        for length in map(float, lengths):
+            rows = self.acting(effect, {parameter.name: length})
+            if rows is None:
+                return
+            columns = tuple(own[None] for own in rows)
+            yield Term(effect, {}, (parameter.name,), (length,), columns, (True,))
+
+    def _late(self, effect: Effect, late: float) -> tuple[Floats, ...] | None:
+        """Return what a delay or a lag takes from the equations; of one length at one place they take the same."""
+        key = (self.fit.rig.acts_at(effect), late)
+        if key not in self._of_lateness:
+            along = zip(self.fit.motions, self._by_motion, strict=True)
+            of_place = _late_reading if effect.place is Place.SENSOR else _late_drive
+            self._of_lateness[key] = self._thinned(
+                [of_place(key[0], late, motion, by, self.values) for motion, by in along]
+            )
+        return self._of_lateness[key]
+
+    def _thinned(self, rows: Sequence[Floats | None]) -> tuple[Floats, ...] | None:
+        """Return rows along each motion filtered and thinned; None where one is missing or not finite."""
+        found = [m.thinned(own) for m, own in zip(self.fit.motions, rows, strict=True) if own is not None]
+        finite = len(found) == len(rows) and all(np.all(np.isfinite(own)) for own in found)
         return tuple(found) if finite else None
 
     @cached_property
@@ -228,46 +257,22 @@ def lateness(effect: Effect, own: Mapping[str, float]) -> float:
     return float(late.subs({sp.Symbol(name, real=True): value for name, value in own.items()}))
 
 
-def _of_late(
-    effect: Effect,
-    fit: EquationFit,
-    values: Mapping[str, float],
-    scales: Mapping[str, float],
-    by_motion: Sequence[Floats],
-) -> Iterator[Term]:
-    """Yield what a delay or a lag of each length takes from the equations."""
-    (parameter,) = (p for p in effect.parameters if p.fitted)
-    lengths = _usual(effect, parameter, scales) * np.geomspace(_LEAST_SHARE, _LATEST, _GRID[1])
-    if parameter.lower < 0.0:
-        lengths = np.concatenate([-lengths, lengths])
-    for length in map(float, lengths):
-        own = {parameter.name: length}
-        along = zip(fit.motions, by_motion, strict=True)
-        rows = [_late(effect, own, motion, by, values) for motion, by in along]
-        columns = tuple(
-            m.thinned(row[None]) for m, row in zip(fit.motions, rows, strict=True) if row is not None
-        )
-        if len(columns) == len(rows) and all(np.all(np.isfinite(column)) for column in columns):
-            yield Term(effect, {}, (parameter.name,), (length,), columns, (True,))
-
-
-def _late(
-    effect: Effect,
-    own: Mapping[str, float],
-    motion: RecordMotion,
-    by_motion: Floats,
-    values: Mapping[str, float],
+def _late_reading(
+    name: str, late: float, motion: RecordMotion, by_motion: Floats, values: Mapping[str, float]
 ) -> Floats | None:
-    """Return what a delay or a lag takes from the equations, shape (n_equations, n_samples); None where it takes nothing."""
-    name, late, dt = motion.equations.rig.acts_at(effect), lateness(effect, own), motion.record.dt
-    if effect.place is Place.SENSOR:
-        if name not in motion.record:
-            return None
-        reading = motion.filtered(motion.record[name])
-        return _influence(motion, by_motion, values, name, shifted(reading, dt, late) - reading)
+    """Return what a late reading takes from the equations, shape (n_equations, n_samples); None where it takes nothing."""
+    if name not in motion.record:
+        return None
+    reading = motion.filtered(motion.record[name])
+    return _influence(motion, by_motion, values, name, shifted(reading, motion.record.dt, late) - reading)
+
+
+def _late_drive(
+    name: str, late: float, motion: RecordMotion, by_motion: Floats, values: Mapping[str, float]
+) -> Floats | None:
+    """Return what a late drive takes from the equations, as `_late_reading`: what is required of it now was commanded earlier."""
     if not motion.equations.n_coordinates:
         return None
-    # What is required of the drive now was commanded earlier.
     along, more = _through_drive(name, motion, values, _along_change(by_motion, motion.ahead(late)))
     return np.asarray(along * more)
 

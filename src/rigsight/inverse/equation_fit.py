@@ -23,7 +23,7 @@ _ROUNDS = 12
 _SETTLED = 1e-6
 _RANK = 1e-9
 _DEPENDENT = 1e-6
-_LAW_ERROR = 0.05
+LAW_ERROR = 0.05
 """Error of laws relative to the force in an equation (an assumption). It weighs the joints of a rig against each other: one whose
 equation holds would else count as much as one whose friction is missing."""
 _APART = 1e-12
@@ -128,7 +128,7 @@ class EquationFit:
         parts = zip(*(motion.forces(values) for motion in self.motions), strict=True)
         filtered = [[m.inner(own) for m, own in zip(self.motions, part, strict=True)] for part in parts]
         size = np.max([_rms(part) for part in filtered], axis=0)
-        error = np.sqrt((_LAW_ERROR * size) ** 2 + (0.0 if noise is None else noise))
+        error = np.sqrt((LAW_ERROR * size) ** 2 + (0.0 if noise is None else noise))
         return np.asarray(np.maximum(error, _DEPENDENT * np.max(error)))
 
     def settled(self, start: Mapping[str, float]) -> tuple[dict[str, float], Floats]:

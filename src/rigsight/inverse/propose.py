@@ -111,18 +111,23 @@ def numbers_along_motion(campaign: Campaign, known: Mapping[str, float]) -> dict
 
 
 def _in_time(campaign: Campaign, known: Mapping[str, float]) -> Campaign:
-    """Return a campaign without its modelled delays and lags of known length: what they make late is moved to its time."""
+    """Return a campaign without its modelled delays and lags, if known: what they make late is moved to its time."""
     structure = compose(campaign.rig, campaign.modelled)
     records = campaign.records
     if not all(name in known for name in structure.names):
         return campaign
     for effect in filter(is_late, campaign.modelled):
-        own = {p.name: known[structure.parameter_name(effect, p.name)] for p in effect.parameters}
-        place, late = campaign.rig.acts_at(effect), lateness(effect, own)
+        numbers = {p.name: known[structure.parameter_name(effect, p.name)] for p in effect.parameters}
+        place, late = campaign.rig.acts_at(effect), lateness(effect, numbers)
         signals = {place}
         if effect.place is Place.ACTUATOR:
-            drive = next(drive for drive in campaign.rig.mechanism.drives if drive.name == place)
-            signals, late = {symbol.name for symbol in drive.signal.free_symbols}, -late
+            inputs = {
+                drive.name: {symbol.name for symbol in drive.signal.free_symbols}
+                for drive in campaign.rig.mechanism.drives
+            }
+            signals, late = inputs.pop(place), -late
+            if any(signals & others for others in inputs.values()):
+                return campaign  # The other drive is in time.
         moved = [{n: shifted(r[n], r.dt, late) for n in signals if n in r} for r in records]
         records = tuple(r.with_signals(**own) for r, own in zip(records, moved, strict=True))
     kept = tuple(effect for effect in campaign.modelled if not is_late(effect))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rigsight.diagnose.policy.number import number
+from rigsight.inverse import LAW_ERROR
 
 
 @dataclass(frozen=True)
@@ -342,7 +343,10 @@ class SearchNumbers:
     near_force: float = number(
         0.5,
         "assumption",
-        "Share of that from which on another family may be the cause: grids and first-order terms understate some.",
+        (
+            "Share of that from which on another family, or another form beside other causes, may be the cause: grids and "
+            "first-order terms understate some."
+        ),
     )
     noise_of_force: float = number(
         0.1,
@@ -353,7 +357,7 @@ class SearchNumbers:
         ),
     )
     law_error: float = number(
-        0.05,
+        LAW_ERROR,
         "assumption",
         (
             "Error of a law relative to its own force. Where the motion shows that laws err more than sensors, a residual of "

@@ -56,14 +56,11 @@ def _is_lost(campaign: Campaign) -> bool:
         return False
     columns = [signal.name for signal in campaign.rig.outputs]
     for record in campaign.estimation:
-        held, p = (
-            record_input(structure, record),
-            parameter_vector(structure, record_values(structure, known, record)),
-        )
+        held = record_input(structure, record)
+        p = parameter_vector(structure, record_values(structure, known, record))
+        state = first_state(structure, record, known)
         try:
-            run = simulate_outputs(
-                structure, held, p, first_state(structure, record, known), record.n_samples
-            )
+            run = simulate_outputs(structure, held, p, state, record.n_samples)
         except SimulationError:
             return False
         for name in followed_sensors(campaign.rig, [record]):

@@ -1,6 +1,6 @@
 """Characteristic size of each base quantity in a campaign, as units of searches.
 
-For any rig they follow from its motion in the records according to its equations, so they do not depend on which sensors exist.
+For any rig they follow from its motion in the records: as measured where the sensors show it, else according to its equations.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _BEYOND = 3.0
 """Largest ratio of simulated to measured motion; a rig with estimated parameters at its resonance stays below."""
 
 
-def simulated_motion(
+def motion_in_record(
     equations: RigEquations, record: Record, values: Mapping[str, float]
 ) -> tuple[Floats, Floats]:
     """Return states and inputs with their derivatives in a record by rows: as measured, else by the equations."""
@@ -133,7 +133,7 @@ def _in_record(
     equations: RigEquations, record: Record, values: Mapping[str, float]
 ) -> tuple[dict[str, Floats], Floats]:
     """Return motions and forces at each place in a record, and the size at which each parameter matters."""
-    z, u = simulated_motion(equations, record, values)
+    z, u = motion_in_record(equations, record, values)
     p, n = equations.parameters(values, record), equations.n_coordinates
     rates = equations.rates(z, u, p)
     accelerations = rates[n : 2 * n]
