@@ -84,7 +84,7 @@ def named_sizes(
 
 
 _NOT_ASKED = (
-    "Not judged along the motion: only fits of the simulation find delays, lags, resonances and limits."
+    "Not judged along the motion: only fits of the simulation find resonances, tones and limits of drives."
 )
 
 

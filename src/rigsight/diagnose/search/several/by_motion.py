@@ -50,7 +50,7 @@ class NamedByMotion:
     def found(self) -> list[FittedModel]:
         """Return the models of several effects and their parts."""
         models = list(self._grown(self.singles[0]))
-        # Two that the motion does not judge, such as a delay and a resonance, may hide each other.
+        # A delay and a resonance may hide each other: neither lowers the error without the other.
         if min((model.error_over_noise for model in models), default=np.inf) > self.settled:
             for size in (2, 3):
                 sets = self.together.fitted(size, VERDICT.larger_part)
