@@ -1,6 +1,7 @@
 """Characteristic size of each base quantity in a campaign, as units of searches.
 
-For any rig they follow from its motion in the records: as measured where the sensors show it, else according to its equations.
+They follow from the motion in the records: of several bodies as measured where the sensors show all of it, else according to the
+equations.
 """
 
 from __future__ import annotations
@@ -34,9 +35,10 @@ _BEYOND = 3.0
 def motion_in_record(
     equations: RigEquations, record: Record, values: Mapping[str, float]
 ) -> tuple[Floats, Floats]:
-    """Return states and inputs with their derivatives in a record by rows: as measured, else by the equations."""
+    """Return states and inputs with their derivatives in a record by rows: as measured or by the equations."""
     u = equations.inputs_of(record)[1]
-    if equations.shows_all_states(set(record.signals)):
+    # The first states of each piece of several bodies take seconds, where the sensors show all of them anyway.
+    if not equations.rig.has_one_motion and equations.shows_all_states(set(record.signals)):
         p = equations.parameters(values, record)
         measured = measured_states(equations, record, p, sensor_factors(equations, frozenset()))
         if measured is not None and not measured.is_integrated:
