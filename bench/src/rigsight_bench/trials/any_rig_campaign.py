@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.rig_equations import equations_of
-from rigsight.identify.start.scales import simulated_motion
+from rigsight.identify.start.scales import motion_in_record
 from rigsight.records import Kind
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, simulate
@@ -105,7 +105,7 @@ def _unit(
     record = _trial("sweep", waves).record()
     shown = simulate(structure, values, record)
     equations = equations_of(rig)
-    states, _ = simulated_motion(equations, shown, values)
+    states, _ = motion_in_record(equations, shown, values)
     moved = [float(np.ptp(z)) / 2.0 for z in states[: equations.n_coordinates]]
     prescribed = [c.prescribed_by for c in rig.mechanism.prescribed]
     return max([*moved, small if name in prescribed else 0.0]) / small

@@ -34,6 +34,7 @@ _RATES_APART = 100.0
 def record_notes(called: str, rig: Rig, records: Sequence[Record]) -> tuple[str, ...]:
     """Return a sentence for each finding."""
     found = [
+        *_sensors_missing(rig, records),
         *_rates_apart(records),
         *_other_units(rig, records),
         *(note for record in records for note in _other_amplitude(record, rig)),
@@ -45,6 +46,18 @@ def record_notes(called: str, rig: Rig, records: Sequence[Record]) -> tuple[str,
             f'{called}: no record has role = "validation"; errors of models that were fitted to these records are too small.'
         )
     return tuple(found)
+
+
+def _sensors_missing(rig: Rig, records: Sequence[Record]) -> Iterator[str]:
+    """Ask about a sensor that only some records hold: its column may have another name in the others."""
+    for sensor in rig.outputs:
+        without = [record.name for record in records if sensor.name not in record]
+        if 0 < len(without) < len(records):
+            listed = ", ".join(f"'{name}'" for name in without)
+            yield (
+                f"{sensor.name} is missing in {listed}: nothing is compared with it there. If its column has another name, write "
+                f'columns = {{ {sensor.name} = "..." }} for that record.'
+            )
 
 
 def _fitted_again(file: str, records: Sequence[Record]) -> Iterator[str]:
