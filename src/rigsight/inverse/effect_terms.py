@@ -41,7 +41,8 @@ _WAVES = 40
 _LEAST_SHARE, _MOST_SHARE = 0.02, 3.0
 """Range of the grid in characteristic sizes, within that of a search."""
 _LATEST = 1.0
-"""Longest delay or lag, in units of the time in which the motion advances by a radian."""
+"""Longest delay or lag, in units of the time in which the motion advances by a radian (an assumption): a longer one makes driving
+forces of restoring ones, and imitates any law."""
 _SMALL_PART = 0.05
 """Parameters of a drive effect in characteristic sizes: small, and above the noise of the force."""
 
