@@ -15,7 +15,15 @@ from rigsight import rigs
 from rigsight.effects import Effect, effect_named, placed
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS, read_rig_file
-from rigsight.simulate import compose, parameter_vector, record_input, simulate, simulate_sets
+from rigsight.simulate import (
+    compose,
+    parameter_vector,
+    record_input,
+    simulate,
+    simulate_outputs,
+    simulate_sets,
+    simulate_tangents,
+)
 from rigsight.simulate.input_hold import Hold
 
 Floats = NDArray[np.float64]
@@ -153,6 +161,18 @@ ARM = {
 }
 
 
+TRAIN = {
+    "k_t": 0.05,
+    "J_m": 2e-3,
+    "J_l": 6e-3,
+    "k_s": 1.5,
+    "d_s": 2e-3,
+    "d_m": 1e-3,
+    "d_l": 1e-3,
+    "k_l": 0.4,
+}
+
+
 @pytest.mark.parametrize("hold", ["foh", "zoh"])
 def test_one_late_drive_of_two(hold: Hold) -> None:
     """A late input is the input later: the arm does what it does under a command that was given later, from sample to sample."""
@@ -166,6 +186,41 @@ def test_one_late_drive_of_two(hold: Hold) -> None:
     expected = simulate(compose(rig), ARM, later, np.zeros(4))
     for name in ("angle_1", "angle_2"):
         assert_same(found[name], expected[name])
+
+
+def test_two_late_drives_that_arrive_between_samples() -> None:
+    """Sampled five times as finely, both commands are late by whole samples; sets side by side follow, with their derivatives."""
+    rig, (first, second) = RIGS["two_link_arm"], RIGS["two_link_arm"].mechanism.drives
+    commands = {"tau_1": 0.5 * np.sin(9.0 * T), "tau_2": 0.2 * np.sin(14.0 * T)}
+    held = {name: np.repeat(samples, 5) for name, samples in commands.items()}
+    late = {
+        name: np.r_[np.full(n, held[name][0]), held[name][:-n]] for name, n in (("tau_1", 8), ("tau_2", 2))
+    }
+    given, fine = Record("run", DT, commands, {}, hold="zoh"), Record("run", DT / 5, late, {}, hold="zoh")
+    structure = compose(rig, [at(f"input_delay@{first.name}"), at(f"input_delay@{second.name}")])
+    delays = {f"input_delay@{first.name}.T_d": 8 * DT / 5, f"input_delay@{second.name}.T_d": 2 * DT / 5}
+    expected = simulate(compose(rig), ARM, fine, np.zeros(4))
+    found = simulate(structure, {**ARM, **delays}, given, np.zeros(4))
+    p, x0, inputs = (
+        parameter_vector(structure, {**ARM, **delays}),
+        np.zeros(4),
+        record_input(structure, given),
+    )
+    fast = simulate_sets(structure, inputs, p[:, None], x0[:, None], N, 8)[:, :, 0]
+    for i, output in enumerate(rig.outputs):
+        assert_same(found[output.name], expected[output.name][::5])
+        assert_same(fast[:, i], expected[output.name][::5])
+    names = [structure.names.index(name) for name in delays]
+    derivatives = simulate_tangents(
+        structure, inputs, p, np.eye(p.size)[:, names], x0, np.zeros((4, 2)), N, 8
+    )
+    for i, name in enumerate(names):
+        step = 1e-5 * np.eye(p.size)[name]
+        ahead, behind = (
+            simulate_outputs(structure, inputs, p + sign * step, x0, N, 1e-10) for sign in (1, -1)
+        )
+        slope = (ahead - behind) / 2e-5
+        assert np.max(np.abs(derivatives[:, :, 1 + i] - slope)) < 1e-4 * np.max(np.abs(slope))
 
 
 def test_outputs_move_smoothly_with_a_delay_however_short() -> None:
@@ -192,21 +247,11 @@ def test_any_sensor_shows_late_what_it_reads(sensor: str, tmp_path: Path) -> Non
     more = '[sensors.load_speed]\nreads = "d(phi_m)"\nunit = "rad/s"\n'
     path.write_text((FILES / "drive_train.toml").read_text("utf-8") + more, "utf-8")
     rig = read_rig_file(path)
-    values = {
-        "k_t": 0.05,
-        "J_m": 2e-3,
-        "J_l": 6e-3,
-        "k_s": 1.5,
-        "d_s": 2e-3,
-        "d_m": 1e-3,
-        "d_l": 1e-3,
-        "k_l": 0.4,
-    }
     record = Record("run", DT, {"u": np.sin(20.0 * T)}, {}, hold="zoh")
     fine = Record("run", DT / 5, {"u": np.repeat(np.sin(20.0 * T), 5)}, {}, hold="zoh")
     late = compose(rig, [at(f"sensor_delay@{sensor}")])
-    found = simulate(late, {**values, "T_s": 0.4 * DT}, record, np.zeros(4))
-    expected = simulate(compose(rig), values, fine, np.zeros(4))
+    found = simulate(late, {**TRAIN, "T_s": 0.4 * DT}, record, np.zeros(4))
+    expected = simulate(compose(rig), TRAIN, fine, np.zeros(4))
     assert np.max(np.abs(found[sensor][1:] - expected[sensor][3::5][: N - 1])) < 1e-5 * np.ptp(
         expected[sensor]
     )

@@ -25,7 +25,7 @@ from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbanc
 from rigsight.diagnose.search.several.one_law import split_distinguishable
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
-from rigsight.diagnose.verdict.families import probable_part
+from rigsight.diagnose.verdict.families import keys_of, probable_part
 from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
 from rigsight.diagnose.verdict.main_cause import main_cause
 from rigsight.diagnose.verdict.plausibility import (
@@ -169,8 +169,12 @@ def _ranked(
     best_single = min(contenders(singles), key=lambda model: model.error_over_noise, default=reidentified)
     evidence = Evidence(context, reidentified, best_single)
     if not models.are_in_windows:
-        stand = beyond_disturbance(evidence, singles, models.forms.with_own_evidence(singles, several))
-        several = with_parts(stand, several)
+        # Families that the motion names were judged beside each other, on stretches to which they were not fitted.
+        named = models.alone.named
+        by_motion = [model for model in several if named.issuperset(keys_of(context.rig, model.effects))]
+        others = [model for model in several if model not in by_motion]
+        stand = beyond_disturbance(evidence, singles, models.forms.with_own_evidence(singles, others))
+        several = with_parts([*by_motion, *stand], several)
     fitted = [*singles, *several]
     candidates: list[FittedModel] = []
     not_shown: list[FittedModel] = []

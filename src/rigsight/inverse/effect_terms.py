@@ -3,6 +3,7 @@
 Parameters in which an effect is linear become coefficients; the others, such as a clearance or the length of a presliding spring,
 are tried on a grid. Effects of a drive are functions of the force that the motion requires, not of the logged input: a clip of
 the logged input would explain that input. Effects of a sensor are what a small change of its reading changes in the equations.
+A tone has the frequency of a line that the residual has in all records, and its own phase in each of them.
 A delay moves the reading, or the force that the motion requires of the drive, and so does a lag: what it weakens cannot be told
 from what smoothing takes from the measured motion. One longer than a radian of the motion is no term.
 """
@@ -22,8 +23,9 @@ from rigsight.effects import Effect, Place, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
+from rigsight.frequency.persistent_line import line_power, persistent_line
 from rigsight.identify.rig_equations import FUNCTIONS
-from rigsight.inverse.equation_fit import EquationFit, generalized
+from rigsight.inverse.equation_fit import EquationFit, generalized, per_force
 from rigsight.inverse.joint_force import JointMotion, joint_motion
 from rigsight.inverse.measured_motion import RecordMotion
 from rigsight.inverse.smooth_signals import shifted
@@ -43,6 +45,14 @@ _LEAST_SHARE, _MOST_SHARE = 0.02, 3.0
 _LATEST = 1.0
 """Longest delay or lag, in units of the time in which the motion advances by a radian (an assumption): a longer one makes driving
 forces of restoring ones, and imitates any law."""
+_FINER = 8
+"""Frequencies tried on either side of a line, up to the next one that the longest record resolves."""
+_MOST_PHASES = 12
+"""Records up to which each has a tone of its own phase: of more, each is left out as a whole, and its phase is not known."""
+_OWN_LINE = 0.5
+"""Share of an input's power in one line from which the motion has one frequency (an assumption)."""
+_OVERTONES = (1, 2, 3, 4, 5)
+"""Overtones of an input's line that laws of the motion make."""
 _SMALL_PART = 0.05
 """Parameters of a drive effect in characteristic sizes: small, and above the noise of the force."""
 
@@ -92,6 +102,8 @@ class EffectTerms:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term."""
         if is_late(effect):
             yield from self._of_late(effect)
+        elif effect.pulsation is not None:
+            yield from _of_tone(effect, self.fit, self.values)
         elif effect.place is Place.SENSOR:
             yield from _of_sensor(effect, self.fit, self.values, self.scales, self._by_motion)
         elif effect.place is Place.ACTUATOR:
@@ -204,6 +216,43 @@ def _of_joint(
             return
         if all(np.all(np.isfinite(column)) for column in columns):
             yield Term(effect, inner, tuple(p.name for p in linear), tuple(units), columns, one_sided)
+
+
+def _of_tone(effect: Effect, fit: EquationFit, values: Mapping[str, float]) -> Iterator[Term]:
+    """Yield a tone at the line of the residual that all records share, with a phase of its own in each record.
+
+    Nothing where the motion has one frequency and this is an overtone: what follows from the motion and a tone are one.
+    """
+    motions, joint = fit.motions, joint_of(fit.rig, effect)
+    pushes = [per_force(motion, joint, values) for motion in motions]
+    row = int(np.argmax(sum(np.sum(push**2, axis=1) for push in pushes)))
+    residuals = [m.inner(fit.residual(m, values))[row] for m in motions]
+    steps = [motion.record.dt for motion in motions]
+    line = persistent_line(residuals, steps)
+    inputs = [signal - np.mean(signal) for motion in motions for signal in motion.u[::3]]
+    if line is None or len(motions) > _MOST_PHASES:
+        return
+    spacing = np.pi / max(r.size * dt for r, dt in zip(residuals, steps, strict=True))
+    near = line + spacing * np.arange(-_FINER, _FINER + 1) / _FINER
+    power = [sum(line_power(r, dt, w) for r, dt in zip(residuals, steps, strict=True)) for w in near]
+    pulsation = float(near[int(np.argmax(power))])
+    of_inputs = zip(inputs, np.repeat(steps, len(motions[0].u) // 3), strict=True)
+    if any(
+        line_power(signal, dt, pulsation / overtone) > _OWN_LINE * float(signal @ signal)
+        for signal, dt in of_inputs
+        for overtone in _OVERTONES
+    ):
+        return
+    columns = []
+    for i, (motion, push) in enumerate(zip(motions, pushes, strict=True)):
+        phase = pulsation * motion.record.dt * np.arange(motion.record.n_samples)
+        own = np.zeros((2 * len(motions), *push.shape))
+        own[2 * i], own[2 * i + 1] = push * np.sin(phase), push * np.cos(phase)
+        columns.append(motion.thinned(own))
+    parts = 2 * len(motions)
+    yield Term(
+        effect, {effect.pulsation or "": pulsation}, (), (1.0,) * parts, tuple(columns), (False,) * parts
+    )
 
 
 def _is_linear(effect: Effect, parameter: Parameter) -> bool:

@@ -7,7 +7,6 @@ S. A. Billings, *Nonlinear System Identification* (Wiley 2013), for greedy forwa
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 
 from rigsight.effects import Effect, Family, kind_of
 from rigsight.inverse.effect_terms import Term
-from rigsight.inverse.equation_fit import EquationFit
+from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.missing_force import MissingForce
 from rigsight.rigs import Rig
@@ -158,10 +157,11 @@ class Selection:
         parts = [self.matrix[self.groups == g] for g in range(_STRETCHES)]
         self.products = np.array([part.T @ part for part in parts])
         self.whole = np.sum(self.products, axis=0)
-        # Limit of the largest of so many squared normal deviates (Bonferroni), as a share of the squares of all rows. What laws
-        # leave moves with the motion: in its band lie fewer rows than in that of the forces.
-        independent = target.size / WIDER
-        self.by_chance = min(1.0, 2.0 * math.log(len(terms) / _SIGNIFICANCE) / independent)
+        # Limit of the largest share of the squares that one of so many columns explains (Bonferroni): the share that a column
+        # explains by chance has a beta distribution. What laws leave moves with the motion: in its band lie fewer rows than in
+        # that of the forces.
+        independent = max(target.size / WIDER, 2.0)
+        self.by_chance = 1.0 - (_SIGNIFICANCE / len(terms)) ** (2.0 / (independent - 1.0))
 
     def _solved(self, products: Floats, columns: Sequence[int]) -> Floats:
         """Return the numbers of columns, shape (.., n_columns), from sums of products, shape (.., n, n)."""
@@ -241,15 +241,35 @@ class Selection:
                 break
             remainder, i = best[key]
             found.append((key, i, remainder))
-        return found
+        return self._plain(rig, found)
+
+    def _plain(self, rig: Rig, found: Sequence[tuple[Key, int, float]]) -> list[tuple[Key, int, float]]:
+        """Return selected families, each in its form with the fewest numbers that leaves no more than a law errs."""
+        terms = [i for _, i, _ in found]
+        for n, (key, i, _) in enumerate(found):
+            chosen = [column for other in (*terms[:n], *terms[n + 1 :]) for column in self.places[other]]
+            whole, without = self.remainder([*chosen, *self.places[i]]), self.remainder(chosen)
+            enough = whole + LAW_ERROR**2 * (without - whole)
+            own = [
+                t for t, term in enumerate(self.terms) if (term.effect.family, rig.where(term.effect)) == key
+            ]
+            forms = [(remainder, t) for t, remainder in self._remainders(chosen, own) if remainder <= enough]
+            terms[n] = min(
+                forms, key=lambda form: (_n_fitted(self.terms[form[1]].effect), form[0]), default=(whole, i)
+            )[1]
+        columns = [[c for t in terms[: n + 1] for c in self.places[t]] for n in range(len(terms))]
+        return [
+            (key, t, self.remainder(own)) for (key, _, _), t, own in zip(found, terms, columns, strict=True)
+        ]
 
     def columns_of(self, found: Sequence[tuple[Key, int, float]]) -> list[int]:
         """Return the columns of selected terms."""
         return [column for _, i, _ in found for column in self.places[i]]
 
     def is_worth(self, after: float, before: float) -> bool:
-        """Return whether a further family removes enough of what was left before."""
-        return after < (1.0 - max(_WORTH, self.by_chance)) * before
+        """Return whether a further family removes enough: of what was left before, and beside what the laws taken before err."""
+        of_laws = LAW_ERROR**2 * max(self.remainder([]) - before, 0.0)
+        return before - after > max(max(_WORTH, self.by_chance) * before, of_laws)
 
     def names(self, rig: Rig, key: Key, known: Sequence[tuple[Key, int, float]]) -> bool:
         """Return whether a family at a place is taken first beside known ones."""
@@ -336,6 +356,10 @@ class Selection:
             for name, number, unit in zip(term.names, numbers, term.units, strict=False)
         }
         return {**term.inner, **linear}
+
+
+def _n_fitted(effect: Effect) -> int:
+    return sum(parameter.fitted for parameter in effect.parameters)
 
 
 def _as_columns(rows: Floats) -> Floats:

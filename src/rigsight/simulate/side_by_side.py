@@ -44,10 +44,10 @@ def simulate_sets(
     """Return the outputs of parameter sets that are simulated side by side, shape (n_samples, n_outputs, n_sets).
 
     Parameters have the shape (n_parameters, n_sets), initial states (n_states, n_sets). A set that diverges has NaN or infinity.
-    With delays within the rig, the sets are simulated accurately, one after the other, and the substeps are not used.
+    If other signals than inputs are delayed, the sets are simulated accurately one after the other, and the substeps not used.
     """
     held, p = read_ahead(structure, held, p)
-    if structure.histories:
+    if structure.late_inputs is None:
         return _one_by_one(structure, held, p, initial_states, n_samples)
     steps = Substeps.per_piece(
         substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
@@ -76,9 +76,10 @@ def normal_equations(
 
     Outputs are not stored: for many records and sets, moving them through memory would take longer than computing them.
     Parameters have the shape (n_parameters, n_sets), initial states (n_records, n_states, n_sets). The kernel has no tangents,
-    and a ValueError is raised for a delayed sensor, because its reading is interpolated afterwards, or delays within the rig.
+    and a ValueError is raised for a delayed sensor, because its reading is interpolated afterwards, or if another signal than an
+    input is delayed.
     """
-    if structure.is_shifted or structure.histories:
+    if structure.is_shifted or structure.late_inputs is None:
         raise ValueError(
             "The reading of a delayed sensor is available only after the whole record has been simulated."
         )
@@ -92,7 +93,7 @@ def carries_tangents(structure: Structure) -> bool:
 
 def differs_at_events(structure: Structure) -> bool:
     """Return True if differences of sets need long steps, because events and steps of each set are located to a tolerance."""
-    if structure.is_shifted or structure.histories or structure.jumps_at_a_place:
+    if structure.is_shifted or structure.late_inputs is None or structure.jumps_at_a_place:
         return True
     return has_dry_friction(structure) and not carries_tangents(structure)
 
@@ -159,7 +160,7 @@ def choose_substeps(
     SimulationError
         If no number of substeps up to `most` reaches it, or the accurate integrator itself fails.
     """
-    if structure.histories:
+    if structure.late_inputs is None:
         return Substeps(1)
     taken = np.zeros(held.n_pieces, dtype=np.intc)
     exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)

@@ -254,16 +254,6 @@ class SearchNumbers:
         "budget",
         "Number of starts that are continued from there.",
     )
-    line_neighbors: int = number(
-        21,
-        "budget",
-        "Number of frequencies whose median is the background of a spectral line.",
-    )
-    line_cycles: int = number(
-        4,
-        "convention",
-        "Minimum cycles in a record that distinguish a spectral line from a drift.",
-    )
     waves_per_line: float = number(
         4.0,
         "budget",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,8 +18,15 @@ from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
-from rigsight.diagnose.search.several.stepwise import larger_part_closed, refit_singles, several_effects
+from rigsight.diagnose.search.several.parts import part_of, with_causes
+from rigsight.diagnose.search.several.stepwise import (
+    larger_part_closed,
+    refit_singles,
+    settled,
+    several_effects,
+)
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.diagnose.search.single_models import SingleModels
 from rigsight.diagnose.search.worth_fitting import WorthFitting, worth_fitting
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
@@ -26,23 +34,6 @@ from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
 from rigsight.identify.fit.windows import Windowing, leading_output
 from rigsight.inverse import Proposal, propose
 from rigsight.simulate import Structure
-
-
-@dataclass(frozen=True)
-class SingleModels:
-    """Models with at most one effect, fitted and scored on the same records."""
-
-    windowing: Windowing  # how records were cut
-    context: FitContext  # records, scales and noise
-    # The given simulation, and its equations with refitted parameters.
-    before: FittedModel
-    reidentified: FittedModel
-    singles: list[FittedModel]  # every effect by itself
-    search: Search  # where and for which effects was searched
-    # What the motion says of the missing force before any fit; None where the sensors do not show the motion.
-    proposal: Proposal | None
-    effects: tuple[Effect, ...]  # all candidates
-    worth: WorthFitting  # those that may be the main cause
 
 
 @dataclass(frozen=True)
@@ -89,7 +80,11 @@ def single_models(
         # What a law errs does not average out: the most excited stretches say as much as whole records.
         context = replace(context, estimation=context.look)
         reidentified = reidentify(context, reidentified.fit.values)
-    search, singles = _singles(context, reidentified, worth, say, prepare)
+    together = None
+    if worth.is_shown and proposal is not None and len(proposal.taken) > 1:
+        together = with_causes(context, reidentified, proposal.taken, proposal)
+        say("causes that the motion names")
+    search, singles = _singles(context, reidentified, worth, together, say, prepare)
     lowered = lowered_by_extensions(context, reidentified, singles)
     if lowered.fit.cost <= (1.0 - SEARCH.worth_restarting) * reidentified.fit.cost:
         # What was compared with a local minimum of the equations was compared with a gap that does not exist.
@@ -100,7 +95,7 @@ def single_models(
     if campaign.given:
         say("given simulation")
     return SingleModels(
-        windowing, context, before, reidentified, singles, search, proposal, tuple(effects), worth
+        windowing, context, before, reidentified, singles, search, proposal, tuple(effects), worth, together
     )
 
 
@@ -120,17 +115,22 @@ def _singles(
     context: FitContext,
     reidentified: FittedModel,
     worth: WorthFitting,
+    together: FittedModel | None,
     say: Callable[[str], None],
     prepare: Prepare | None,
 ) -> tuple[Search, list[FittedModel]]:
     """Return where was searched, and every effect by itself."""
     search = search_places(context, reidentified, context.offered(worth.alone))
     say("suspects")
-    first = [e for e in context.offered(worth.alone) if _comes_first(e, search, worth)]
+    # Beside causes that leave nothing together, one that the motion does not judge must explain the larger part itself.
+    leaves_nothing = together is not None and together.error_over_noise <= settled(reidentified)
+    least = VERDICT.larger_part if leaves_nothing else VERDICT.larger_part * search.most
+    first = [e for e in context.offered(worth.alone) if _comes_first(e, search, worth, least)]
     others = [effect for effect in (*search.effects, *search.others) if effect not in first]
     if prepare is not None:
         prepare([context.simplest((effect,)) for effect in first])
-    singles = fit_candidates(context, reidentified, first, say, (), worth.starts, worth.is_shown)
+    reached = together if leaves_nothing else None
+    singles = fit_candidates(context, reidentified, first, say, (), worth.starts, worth.is_shown, reached)
     best = min((model.error_over_noise for model in singles), default=np.inf)
     # What the motion rules out need not be fitted for a remainder that no law reaches, nor where the motion names the cause.
     enough = VERDICT.at_floor
@@ -144,13 +144,12 @@ def _singles(
     return search, singles
 
 
-def _comes_first(effect: Effect, search: Search, worth: WorthFitting) -> bool:
-    """Return True for an effect that the motion names, or that explains nearly as much in the screening as the best one."""
+def _comes_first(effect: Effect, search: Search, worth: WorthFitting, least: float) -> bool:
+    """Return True for an effect that the motion names, or that explains so much in the screening."""
     if not worth.is_shown:
         return effect in search.effects or effect in worth.named
     # What the motion does not judge has to explain enough itself, not only another effect at its place.
-    share = search.shares.get(effect.name, search.most)
-    return effect in worth.named or share >= VERDICT.larger_part * search.most
+    return effect in worth.named or search.shares.get(effect.name, search.most) >= least
 
 
 def with_several_effects(
@@ -180,33 +179,14 @@ def with_several_effects(
         beside = replace(campaign, modelled=(*campaign.modelled, *model.effects))
         return propose(beside, {**campaign.constants, **model.fit.values}, models.effects, noise)
 
-    found = several_effects(
-        context,
-        models.reidentified,
-        models.singles,
-        models.effects,
-        models.worth,
-        models.proposal,
-        ask,
-        forms,
-        checks,
-        lower_bound,
-        prepare,
-    )
-    named = {effect.name for model in found for effect in model.effects}
-    unfitted = [e for e in models.effects if e.name in named - {model.names[0] for model in models.singles}]
-    if unfitted:
+    found = several_effects(models, ask, forms, checks, lower_bound, prepare)
+    known = {model.names for model in models.singles}
+    for model in found:
         # The parts of a set compete with it, and tell the share of each.
-        parts = fit_candidates(
-            context,
-            models.reidentified,
-            unfitted,
-            say,
-            models.singles,
-            models.worth.starts,
-            models.worth.is_shown,
-        )
-        models = replace(models, singles=parts)
+        alone = [(effect,) for effect in model.effects if (effect.name,) not in known]
+        parts = context.threads.side_by_side(partial(part_of, context, model), alone)
+        known |= {part.names for part in parts}
+        models = replace(models, singles=[*models.singles, *parts])
     models = replace(models, singles=refit_singles(context, models.singles, found))
     if whole and not is_predictable(context, models.reidentified, found, allowed, rng):
         cut = cut or _in_windows(campaign, noise, models)

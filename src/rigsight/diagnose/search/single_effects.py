@@ -60,17 +60,19 @@ def fit_candidates(
     known: Sequence[FittedModel] = (),
     along_motion: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
     is_shown: bool = False,
+    reached: FittedModel | None = None,
 ) -> list[FittedModel]:
     """Return every effect alone, fitted and scored, with those that were before.
 
     `along_motion` are values of the effects' own parameters that explain the missing force along the motion: one more start, or
-    the only one where the motion `is_shown`.
+    the only one where the motion `is_shown`. `reached` is a model of several effects that leaves nothing: beside it one effect
+    alone only tells its share, so that rough fits are enough.
     """
     before = {model.effects[0].name: model.fit for model in known if np.isfinite(model.fit.cost)}
     looks = _looks(context, reidentified, context.offered(effects), along_motion, is_shown, before)
     wide = {look.newest: look for look in widened(context, looks)}
     costs = [*(look.cost for look in wide.values()), *(fit.cost for fit in before.values())]
-    lowest = min(costs, default=float("inf"))
+    lowest = min(costs, default=float("inf")) if reached is None else reached.fit.cost
 
     def one(found: FirstLook) -> FittedModel:
         found = wide.get(found.newest, found)
@@ -82,7 +84,8 @@ def fit_candidates(
         return scored
 
     models = list(context.threads.side_by_side(one, looks))
-    refined = in_lowest_basins(context, refine(context, [*known, *models]))
+    fitted = [*known, *models]
+    refined = in_lowest_basins(context, refine(context, fitted)) if reached is None else fitted
     return without_repeated_equations(context, ordered_by_inclusion(context, reidentified, refined))
 
 

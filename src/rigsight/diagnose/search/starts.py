@@ -6,9 +6,9 @@ import itertools
 from collections.abc import Iterator, Mapping
 
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.search.persistent_line import persistent_line
 from rigsight.diagnose.search.waves import wave_starts
 from rigsight.effects import Effect, placed_dimension
+from rigsight.frequency.persistent_line import persistent_line
 from rigsight.identify import FitResult
 from rigsight.identify.fit.windows import leading_output
 from rigsight.identify.start.declared_starts import declared_values, in_structure, moved_starts

@@ -261,7 +261,7 @@ class Problem:
     def _products(self, theta: Floats) -> list[Floats]:
         """Return each record's products of residual and derivatives, shape (1 + n, 1 + n), n = n_free + n_states."""
         data = self.data
-        if data.structure.is_shifted or data.structure.histories:
+        if data.structure.is_shifted or data.structure.late_inputs is None:
             columns = [np.column_stack(parts) for parts in self.sensitivities(theta)]
             return [np.asarray(own.T @ own) for own in columns]
         fitted, lengths = self._fitted_records(), [record.record.n_samples for record in data.records]

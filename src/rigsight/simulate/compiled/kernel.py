@@ -79,7 +79,7 @@ class Kernel:
         self._one = _function(loaded, "simulate_one", "a l d l i d a a d a l a")
         self.carries_tangents = hasattr(loaded, "tangent_equations")
         """True if `tangent_equations` and `simulate_tangents` are available, False if `normal_equations` is."""
-        if structure.histories:
+        if structure.late_inputs is None:
             return
         self._lanes = _function(loaded, "simulate_lanes", "a l d l a d a l l a a", None)
         if self.carries_tangents:

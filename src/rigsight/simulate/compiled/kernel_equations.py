@@ -21,6 +21,9 @@ class KernelEquations:
     def __init__(self, structure: Structure) -> None:
         self.structure = structure
         self.frozen: FrozenStructure = freeze(structure)
+        # Late inputs are read as further inputs, so that no history has to be kept of them.
+        self._arriving = structure.late_inputs or ()
+        self._remembered = structure.histories if structure.late_inputs is None else ()
         self._friction_signs = self.frozen.friction_signs(structure)
         fixed, speeds = set(structure.parameter_symbols), self.frozen.speeds(structure)
         groups: dict[str, Sequence[sp.Expr]] = {
@@ -37,9 +40,9 @@ class KernelEquations:
             "speeds": speeds,
             "speed_slopes": [self._slope(speed) for speed in speeds],
             "limits": [e.limit for e in structure.remembering_equations if e.limit is not None],
-            "signals": [history.signal for history in structure.histories],
-            "delays": [history.delay for history in structure.histories],
-            "delay": [structure.delay if structure.delay is not None else sp.Integer(0)],
+            "signals": [history.signal for history in self._remembered],
+            "delays": [history.delay for history in self._remembered],
+            "arrivals": [delay for _, delay in self._arriving],
         }
         flat, hoisted = hoist_constants(
             [expression for group in groups.values() for expression in group],
@@ -66,8 +69,9 @@ class KernelEquations:
             "SIZE_STATES": max(1, n_states),
             "N_MODES": n_modes,
             "SIZE_MODES": max(1, n_modes),
-            "N_INPUTS": structure.n_inputs,
-            "SIZE_INPUTS": max(1, structure.n_inputs),
+            "SIZE_COLUMNS": max(1, structure.n_inputs),
+            "N_INPUTS": len(self._read_inputs),
+            "SIZE_INPUTS": max(1, len(self._read_inputs)),
             "SIZE_CONSTANTS": max(1, len(self.constants)),
             "N_COMPUTED": len(structure.computed_outputs),
             "N_DEGREES": len(structure.tree.motion.coordinates),
@@ -80,8 +84,9 @@ class KernelEquations:
             or "-1",
             "FRICTION_IS_SHOWN": int(self.friction_is_shown),
             "VELOCITY": (structure.velocity_index or 0) if single is None else single.velocity,
-            "HAS_DELAY": int(structure.delay is not None),
-            "N_LATE": len(structure.histories),
+            "N_ARRIVING": len(self._arriving),
+            "ARRIVE": self._body("q by", "by", self.delays),
+            "N_LATE": len(self._remembered),
             "READS_LATE_RATE": int(
                 any(slope.free_symbols & set(self._late_rates) for slope in self._groups["switch_slopes"])
             ),
@@ -93,9 +98,6 @@ class KernelEquations:
             "PARAMETERS": parameters,
             "PREPARE": function_body(
                 ("p", "q"), elements("q", len(self.constants)), list(self.constants.values()), prepare
-            ),
-            "DELAY": function_body(
-                ("q",), ["const double delay"], self._groups["delay"], names, "return delay;"
             ),
             "RATES": self._body("now x s q r", "r", self._groups["rates"]),
             "SWITCHES": function_body(
@@ -113,6 +115,13 @@ class KernelEquations:
         bodies = "\n".join(texts.values())
         called = [text for name, text in FUNCTIONS.items() if f"{name}(" in bodies]
         return filled(template("simulate", "equations.c.txt"), {"FUNCTIONS": "\n".join(called), **texts})
+
+    def input_fragments(self) -> dict[str, str]:
+        """Return which recorded input each input of the equations is, and its delay, by key in the template."""
+        return {
+            "INPUT_COLUMNS": ", ".join(str(column) for column, _ in self._read_inputs),
+            "INPUT_DELAYS": ", ".join(str(delay) for _, delay in self._read_inputs),
+        }
 
     def lane_fragments(self) -> dict[str, str]:
         """Return the equations for parameter sets side by side, by their key in the template."""
@@ -172,9 +181,26 @@ class KernelEquations:
         return self._groups["outputs"]
 
     @property
-    def delay(self) -> list[sp.Expr]:
-        """The delay of the input, a constant."""
-        return self._groups["delay"]
+    def delays(self) -> list[sp.Expr]:
+        """The delays with which inputs arrive, constants."""
+        return self._groups["arrivals"]
+
+    @property
+    def _read_inputs(self) -> list[tuple[int, int]]:
+        """Column and delay of each input that the equations read; the delay is -1 for an input that is not late."""
+        n, by_history = self.structure.n_inputs, bool(self.structure.histories)
+        late = [(column, delay) for delay, (column, _) in enumerate(self._arriving)]
+        if by_history:
+            return [*((column, -1) for column in range(n)), *late]
+        return [*late, *((column, -1) for column in range(len(late), n))]
+
+    @property
+    def arriving(self) -> list[tuple[sp.Symbol, sp.Symbol]]:
+        """Symbols of the inputs that arrive late, and of their time derivatives."""
+        if not self._arriving:
+            return []
+        histories = [history.symbol for history in self.structure.histories]
+        return list(zip(histories, self._late_rates, strict=True)) if histories else [input_symbols(0)[:2]]
 
     @cached_property
     def lane_rates(self) -> list[sp.Expr]:
@@ -207,14 +233,26 @@ class KernelEquations:
         return {
             **inputs,
             TIME: "now->time",
-            **{history.symbol: f"now->late[{i}]" for i, history in enumerate(self.structure.histories)},
-            **{rate: f"now->late_rate[{i}]" for i, rate in enumerate(self._late_rates)},
+            **self._late_names,
             **{
                 FrozenStructure.friction_sign(i): f"s[{own.mode}]"
                 for i, own in enumerate(self.frozen.frictions)
             },
             **{s: f"{array}[{i}]" for array, symbols in numbered.items() for i, s in enumerate(symbols)},
         }
+
+    @property
+    def _late_names(self) -> dict[sp.Symbol, str]:
+        """Name in C of each delayed signal and of its rate."""
+        names = {}
+        for i, (history, rate) in enumerate(zip(self.structure.histories, self._late_rates, strict=True)):
+            n = self.structure.n_inputs + i
+            names |= (
+                {history.symbol: f"now->late[{i}]", rate: f"now->late_rate[{i}]"}
+                if self._remembered
+                else {history.symbol: f"now->u[{n}]", rate: f"now->du[{n}]"}
+            )
+        return names
 
     @staticmethod
     def _plus_own(names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Expr]) -> dict[sp.Symbol, str]:
@@ -233,10 +271,9 @@ class KernelEquations:
     @property
     def reads_late(self) -> str:
         """A C array with, for each delayed signal, the flags of the delayed signals that it depends on."""
-        histories = self.structure.histories
         rows = [
-            ", ".join(str(int(other.symbol in own.signal.free_symbols)) for other in histories)
-            for own in histories
+            ", ".join(str(int(other.symbol in own.signal.free_symbols)) for other in self._remembered)
+            for own in self._remembered
         ]
         return ", ".join(f"{{{row}}}" for row in rows)
 

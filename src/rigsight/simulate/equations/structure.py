@@ -178,6 +178,16 @@ class Structure:
         return arriving[-1] if arriving else None
 
     @cached_property
+    def late_inputs(self) -> tuple[tuple[int, sp.Expr], ...] | None:
+        """Index and delay of each input that arrives late, in the order of `histories`; None if another signal is delayed."""
+        if not self.histories:
+            return () if self.delay is None else ((0, self.delay),)
+        indices = {input_symbols(index)[0]: index for index in range(self.n_inputs)}
+        if any(history.signal not in indices for history in self.histories):
+            return None
+        return tuple((indices[history.signal], history.delay) for history in self.histories)
+
+    @cached_property
     def observed_delays(self) -> dict[str, sp.Expr]:
         """Delays of the sensors of an observer as expressions in parameters; sensors without a delay are left out."""
         symbols = dict(zip(self.names, self.parameter_symbols, strict=True))

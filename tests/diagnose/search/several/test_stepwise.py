@@ -17,10 +17,12 @@ from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.stepwise import Stepwise, each_once, refit_singles, several_effects
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
+from rigsight.diagnose.search.single_models import SingleModels
 from rigsight.diagnose.search.worth_fitting import WorthFitting
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
 from rigsight.identify import characteristic_scales
+from rigsight.identify.fit.windows import Windowing
 from rigsight.records.record import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
@@ -198,6 +200,10 @@ def test_a_step_that_closes_less_than_half_ends_the_search(monkeypatch: pytest.M
     assert asked == [2, 3], "three may explain together what no two do"
 
 
+def single_models(reidentified: FittedModel, single: FittedModel, worth: WorthFitting) -> SingleModels:
+    return SingleModels(Windowing(), None, reidentified, reidentified, [single], None, None, (), worth, None)
+
+
 @pytest.mark.parametrize(
     ("single", "pair", "adequate", "competes"),
     [
@@ -214,19 +220,9 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
     found = [scored(("periodic_disturbance", "cubic_stiffness"), error_over_noise=pair)]
     monkeypatch.setattr(Stepwise, "found", lambda *_: found)
     alone = scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))
-    kept = several_effects(
-        None,
-        scored((), error_over_noise=40.0),
-        [alone],
-        [],
-        WorthFitting(),
-        None,
-        lambda _: None,
-        None,
-        SimpleNamespace(is_adequate=lambda _: adequate),
-        adequate is not None,
-        None,
-    )
+    checks = SimpleNamespace(is_adequate=lambda _: adequate)
+    models = single_models(scored((), error_over_noise=40.0), alone, WorthFitting())
+    kept = several_effects(models, lambda _: None, None, checks, adequate is not None, None)
     assert kept == (found if competes else [])
 
 
@@ -255,38 +251,17 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
         return []
 
     monkeypatch.setattr(Stepwise, "found", found)
-    several_effects(
-        None,
-        scored((), error_over_noise=40.0),
-        [scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))],
-        [],
-        WorthFitting(),
-        None,
-        lambda _: None,
-        None,
-        SimpleNamespace(is_adequate=lambda _: adequate),
-        lower_bound,
-        None,
-    )
+    alone = scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))
+    checks = SimpleNamespace(is_adequate=lambda _: adequate)
+    models = single_models(scored((), error_over_noise=40.0), alone, WorthFitting())
+    several_effects(models, lambda _: None, None, checks, lower_bound, None)
     assert asked == [nothing_remains]
 
 
 def test_a_residual_of_the_size_of_a_law_error_asks_for_no_second_effect(scored) -> None:
     single = scored(("cubic_stiffness",), error_over_noise=1.9, residuals=np.ones(8))
-    kept = several_effects(
-        None,
-        scored((), error_over_noise=40.0),
-        [single],
-        [],
-        WorthFitting(is_shown=True),
-        None,
-        lambda _: None,
-        None,
-        None,
-        False,
-        None,
-    )
-    assert kept == []
+    models = single_models(scored((), error_over_noise=40.0), single, WorthFitting(is_shown=True))
+    assert several_effects(models, lambda _: None, None, None, False, None) == []
 
 
 def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:

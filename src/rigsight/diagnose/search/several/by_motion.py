@@ -1,7 +1,7 @@
 """Several effects where the motion shows the missing force: the families that it names, fitted together.
 
-The regression along the motion finds several causes at once, each with its numbers. Here they are added to the best single effect
-at once: where a simulation drifts until the last of them is there, one alone seems to be of no use. The motion does not judge a
+The regression along the motion finds several causes at once, each with its numbers. They are fitted at once: where a simulation
+drifts until the last of them is there, one alone seems to be of no use. The motion does not judge a
 resonance: so effects whose push explains the larger part of the residual of the simulation are added after them. Each must lower
 the held-out error; those that the others make needless are dropped, and other forms of each family are tried in their place.
 """
@@ -19,10 +19,9 @@ from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
-from rigsight.diagnose.search.several.parts import fitted_from, part_of
+from rigsight.diagnose.search.several.parts import part_of, with_causes
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, refine
-from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal, ProposedCause, ProposedForm
 
@@ -40,6 +39,7 @@ class NamedByMotion:
     context: FitContext  # records, scales and noise
     singles: Sequence[FittedModel]  # every effect alone that could be simulated, best first
     proposal: Proposal  # the families that the motion names
+    named: FittedModel | None  # all causes that it names, fitted together
     effects: Sequence[Effect]  # candidates for a further cause
     prepare: Prepare | None  # compiles structures that are about to be fitted side by side
     together: Together  # sets of the effects that may be the main cause
@@ -68,15 +68,15 @@ class NamedByMotion:
         pairs = zip(model.effects, parts, strict=True)
         forms = [form for effect, part in pairs for form in self._other_forms(model, effect, part)]
         competing = refine(self.context, [finished(self.context, model), *forms, *models, *parts])
-        return [found for found in in_lowest_basins(self.context, competing) if len(found.effects) > 1]
+        if min(found.error_over_noise for found in competing) > self.settled:
+            competing = in_lowest_basins(self.context, competing)
+        return [found for found in competing if len(found.effects) > 1]
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
-        """Yield a model with all causes that the motion names, then with each further one that lowers its error."""
-        if taken := self._new(self.proposal, model):
-            larger = self._with(model, taken, self.proposal)
-            if self._is_worth(larger, model):
-                model = larger
-                yield model
+        """Yield the causes that the motion names, where they explain more, then with each further one that lowers the error."""
+        if self.named is not None and self._is_worth(self.named, model):
+            model = self.named
+            yield model
         unjudged = [effect for effect in self.effects if effect.name not in self.proposal.judged]
         for _ in range(SEARCH.most_unnamed):
             if model.error_over_noise <= self.settled:
@@ -90,7 +90,7 @@ class NamedByMotion:
                 self.context, model, further, [], self.singles, self.prepare, VERDICT.larger_part
             )
             if beside is not None and (new := self._new(beside, model)):
-                larger_ones.append(self._with(model, new, beside))
+                larger_ones.append(with_causes(self.context, model, new, beside))
             best = min(larger_ones, key=lambda one: one.error_over_noise, default=model)
             if not self._is_worth(best, model):
                 break
@@ -108,18 +108,6 @@ class NamedByMotion:
 
     def _key(self, effect: Effect) -> Key:
         return effect.family, self.context.rig.where(effect)
-
-    def _with(self, model: FittedModel, causes: Sequence[ProposedCause], found: Proposal) -> FittedModel:
-        """Return a model with further causes, fitted from the values that the motion gives them and the equations."""
-        numbers = {name: value for name, value in found.numbers.items() if name in model.fit.free}
-        effects, fit = model.effects, replace(model.fit, values={**model.fit.values, **numbers})
-        for cause in causes:
-            effects = (*effects, cause.effect)
-            structure = self.context.simplest(effects, fit.structure)
-            declared = next(start_values(self.context, structure, cause.effect, fit, {}))
-            values = {**declared, **with_own_values(structure, cause.effect, fit, cause.values)}
-            fit = replace(fit, values=values, structure=structure)
-        return fitted_from(self.context, model, effects, fit.structure, dict(fit.values))
 
     def _parts(self, model: FittedModel) -> list[FittedModel]:
         """Return a model without each of its effects, fitted from where the others are in it."""
@@ -148,7 +136,7 @@ class NamedByMotion:
         forms = [
             e for e in self.effects if self._key(e) == key and e not in model.effects and e.name not in known
         ]
-        found = [self._with(part, [cause], self.proposal) for cause in causes]
+        found = [with_causes(self.context, part, [cause], self.proposal) for cause in causes]
         if forms and model.error_over_noise > self.settled:
             of_model = (replaced, model.fit)
             found += with_one_more(

@@ -1,13 +1,16 @@
-"""A model of several effects without some of them, from where the others are in it."""
+"""A model without some of its effects, or with causes that the motion names, fitted from where the others are in it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.first_look import FirstLook
 from rigsight.diagnose.search.single_effects import followed
+from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect
+from rigsight.inverse import Proposal, ProposedCause
 from rigsight.simulate import Structure, carried_over
 
 
@@ -39,3 +42,18 @@ def fitted_from(
     start, free = replace(model.fit, values=values), tuple(context.free_parameters(structure))
     look = FirstLook(effects, structure, free, (start,), float("inf"))
     return followed(context, look, promising=True, finish=False)
+
+
+def with_causes(
+    context: FitContext, model: FittedModel, causes: Sequence[ProposedCause], found: Proposal
+) -> FittedModel:
+    """Return a model with further causes, fitted from the values that the motion gives them and the equations."""
+    numbers = {name: value for name, value in found.numbers.items() if name in model.fit.free}
+    effects, fit = model.effects, replace(model.fit, values={**model.fit.values, **numbers})
+    for cause in causes:
+        effects = (*effects, cause.effect)
+        structure = context.simplest(effects, fit.structure)
+        declared = next(start_values(context, structure, cause.effect, fit, {}))
+        values = {**declared, **with_own_values(structure, cause.effect, fit, cause.values)}
+        fit = replace(fit, values=values, structure=structure)
+    return fitted_from(context, model, effects, fit.structure, dict(fit.values))

@@ -33,9 +33,8 @@ from rigsight.diagnose.search.several.one_more_effect import with_one_more
 from rigsight.diagnose.search.several.parts import part_of, reduced
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, followed, refine
-from rigsight.diagnose.search.worth_fitting import WorthFitting
+from rigsight.diagnose.search.single_models import SingleModels
 from rigsight.effects import Effect
-from rigsight.inverse import Proposal
 from rigsight.simulate import carried_over
 
 
@@ -191,12 +190,7 @@ class Stepwise:
 
 
 def several_effects(
-    context: FitContext,
-    reidentified: FittedModel,
-    singles: Sequence[FittedModel],
-    effects: Sequence[Effect],
-    worth: WorthFitting,
-    proposal: Proposal | None,
+    models: SingleModels,
     ask: Ask,
     forms: OtherForms,
     checks: Checks,
@@ -205,25 +199,36 @@ def several_effects(
 ) -> list[FittedModel]:
     """Return models of several effects if a single effect does not explain everything.
 
-    `worth` says what the motion shows and leaves as main causes; `ask` what it shows of the force that a model leaves.
+    `ask` says what the motion shows of the force that a model leaves.
     Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
     bound. Where errors of laws are larger than noise, a residual of the size of the error of one law asks for no second one.
     """
+    context, reidentified, worth = models.context, models.reidentified, models.worth
     usable = sorted(
-        (model for model in singles if model.residuals and np.isfinite(model.error_over_noise)),
+        (model for model in models.singles if model.residuals and np.isfinite(model.error_over_noise)),
         key=lambda model: model.error_over_noise,
     )
     if not usable:
         return []
     best = usable[0]
-    together = Together(context, reidentified, effects, prepare)
-    settled = max(VERDICT.at_floor, SEARCH.law_error * reidentified.error_over_noise)
-    if worth.is_shown and best.error_over_noise <= settled:
+    enough = settled(reidentified)
+    if worth.is_shown and best.error_over_noise <= enough:
         return []
-    if worth.is_shown and proposal is not None:
+    if worth.is_shown and models.proposal is not None:
         sets = Together(context, reidentified, worth.alone, prepare)
-        enough = larger_part_closed(reidentified)
-        named = NamedByMotion(context, usable, proposal, effects, prepare, sets, ask, enough, settled).found()
+        closed = larger_part_closed(reidentified)
+        named = NamedByMotion(
+            context,
+            usable,
+            models.proposal,
+            models.together,
+            models.effects,
+            prepare,
+            sets,
+            ask,
+            closed,
+            enough,
+        ).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
     is_excused = lower_bound and best.error_over_noise <= VERDICT.at_lower_bound
     if is_excused and checks.is_adequate(best):
@@ -231,9 +236,15 @@ def several_effects(
     # A floor is known to a few percent. Within these, the residual of the best effect is tested for being noise.
     is_near = not lower_bound and VERDICT.exact < best.error_over_noise <= VERDICT.at_floor
     at_floor = VERDICT.exact if is_near and not checks.is_adequate(best) else VERDICT.at_floor
-    search = Stepwise(context, usable, effects, forms, together, prepare)
+    together = Together(context, reidentified, models.effects, prepare)
+    search = Stepwise(context, usable, models.effects, forms, together, prepare)
     found = search.found(at_floor, None if lower_bound else checks)
     return [model for model in found if not is_excused or model.error_over_noise <= VERDICT.at_floor]
+
+
+def settled(reidentified: FittedModel) -> float:
+    """Return the error at which nothing remains to explain, or no more than a law errs, in units of the noise floor."""
+    return max(VERDICT.at_floor, SEARCH.law_error * reidentified.error_over_noise)
 
 
 def larger_part_closed(reidentified: FittedModel) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.search.persistent_line import persistent_line
 from rigsight.excitation import linear_sweep
+from rigsight.frequency.persistent_line import persistent_line
 
 DT = 0.01
 
