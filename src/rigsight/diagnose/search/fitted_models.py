@@ -180,14 +180,14 @@ def with_several_effects(
         return propose(beside, {**campaign.constants, **model.fit.values}, models.effects, noise)
 
     found = several_effects(models, ask, forms, checks, lower_bound, prepare)
-    known = {model.names for model in models.singles}
-    for model in found:
+    for model in found[:1]:
         # The parts of a set compete with it, and tell the share of each.
+        known = {single.names for single in models.singles}
         alone = [(effect,) for effect in model.effects if (effect.name,) not in known]
         parts = context.threads.side_by_side(partial(part_of, context, model), alone)
-        known |= {part.names for part in parts}
         models = replace(models, singles=[*models.singles, *parts])
-    models = replace(models, singles=refit_singles(context, models.singles, found))
+    if not models.worth.is_shown:
+        models = replace(models, singles=refit_singles(context, models.singles, found))
     if whole and not is_predictable(context, models.reidentified, found, allowed, rng):
         cut = cut or _in_windows(campaign, noise, models)
         pairs = pairs_in_windows(context, cut.context, models.reidentified, found)

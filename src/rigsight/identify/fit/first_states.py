@@ -23,6 +23,10 @@ _RESTING = 1e-3
 """Share of its range within which an input counts as resting."""
 _PULL = 1e-3
 """Weight of the equilibrium relative to that of a sensor: it determines only what the sensors do not."""
+_BENT = 5
+"""Number of samples from which a path that is bent can be told from noise."""
+_SURELY = 3.0
+"""Curvature of a path in standard deviations from which it is bent."""
 _MOST_EVALUATIONS = 100
 _HUGE = 1e6
 
@@ -69,13 +73,13 @@ def rig_state(
     """Return the state of a rig without effects that agrees best with the first samples of its sensors."""
     # States that they do not determine are those of the static equilibrium under the first input.
     if not equations.shows_all_states(set(record.signals)):
-        return _rig_state(equations, record, values, resting, equations.sensor_names)
+        return _rig_state(equations, record, values, resting, equations.sensor_names, _PULL)
     # The state then does not depend on the values, so it is cached for all candidates.
     moving = [name for name in equations.sensor_names if name not in equations.of_own_states]
     known = _known.setdefault(record, {})
     key = (equations, resting)
     if key not in known:
-        known[key] = _rig_state(equations, record, values, resting, moving)
+        known[key] = _rig_state(equations, record, values, resting, moving, 0.0)
     return known[key].copy()
 
 
@@ -88,8 +92,12 @@ def _rig_state(
     values: Mapping[str, float],
     resting: int | None,
     moving: Sequence[str],
+    pull: float,
 ) -> Floats:
-    """Return the state that agrees best with the readings of all sensors, and with the slopes of those that are `moving`."""
+    """Return the state that agrees best with the readings of all sensors, and with the slopes of those that are `moving`.
+
+    `pull` is the weight of the equilibrium, for states that the sensors do not show.
+    """
     p = equations.parameters(values, record)
     u = equations.inputs_of(record.slice(0, min(record.n_samples, _FIRST_SAMPLES)))[1][:, :1]
     begin = _equilibrium(equations, u, p)
@@ -113,9 +121,9 @@ def _rig_state(
         z = full(moved)[:, None]
         level = (equations.readings(z, u, p)[seen, 0] - shown[:, 0]) / sizes[:, 0]
         if still:
-            return np.concatenate([level, _PULL * moved])
+            return np.concatenate([level, pull * moved])
         slope = (equations.reading_slopes(z, u, p)[seen, 0] - shown[:, 1]) / sizes[:, 1]
-        return _finite(np.concatenate([level, slope[sloping], _PULL * moved]))
+        return _finite(np.concatenate([level, slope[sloping], pull * moved]))
 
     return full(least_squares(remainder, np.zeros(begin.size), max_nfev=_MOST_EVALUATIONS).x)
 
@@ -213,7 +221,13 @@ def _level_and_slope(signal: Floats, dt: float, resting: int | None) -> tuple[fl
     count = min(_FIRST_SAMPLES, signal.size)
     if count < 2:
         return float(signal[0]), 0.0
-    slope, level = np.polyfit(np.arange(count) * dt, signal[:count], 1)
+    time = np.arange(count) * dt
+    slope, level = np.polyfit(time, signal[:count], 1)
+    if count > _BENT:
+        # A straight line through a bent path errs more than noise does: half the acceleration times its length.
+        bent, covariance = np.polyfit(time, signal[:count], 2, cov=True)
+        if abs(bent[0]) > _SURELY * np.sqrt(covariance[0, 0]):
+            _, slope, level = bent
     return float(level), float(slope)
 
 

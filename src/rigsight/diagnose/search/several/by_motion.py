@@ -19,7 +19,7 @@ from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
-from rigsight.diagnose.search.several.parts import part_of, with_causes
+from rigsight.diagnose.search.several.parts import part_of, reduced, with_causes
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, refine
 from rigsight.effects import Effect, Family
@@ -133,10 +133,15 @@ class NamedByMotion:
             if form.effect not in model.effects and SEARCH.near_force * form.left <= 1.0
         ]
         known = self.proposal.judged if of_family else frozenset()
+        # They start from where the others are beside the form that they replace.
+        kept = tuple(effect for effect in model.effects if effect is not replaced)
+        structure, values = reduced(self.context, model, kept)
+        beside = replace(part, fit=replace(part.fit, structure=structure, values=values))
+        as_fitted = replace(self.proposal, numbers={})
         forms = [
             e for e in self.effects if self._key(e) == key and e not in model.effects and e.name not in known
         ]
-        found = [with_causes(self.context, part, [cause], self.proposal) for cause in causes]
+        found = [with_causes(self.context, beside, [cause], as_fitted) for cause in causes]
         if forms and model.error_over_noise > self.settled:
             of_model = (replaced, model.fit)
             found += with_one_more(
