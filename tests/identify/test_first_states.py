@@ -68,6 +68,25 @@ def test_it_is_found_once_and_right(run: Record) -> None:
     np.testing.assert_array_equal(rig_state(equations, run, {**VALUES, "R": 5.0}), found)
 
 
+@pytest.mark.parametrize("begin", [40, 200])
+def test_in_the_middle_of_a_bent_path_its_speed_is_right(run: Record, begin: int) -> None:
+    """A straight line through seven samples would err by the acceleration times three samples."""
+    own = run.slice(begin, run.n_samples)
+    speed = rig_state(equations_of(rig_of_text(MOTOR, "motor")), own, VALUES)[1]
+    around = run["angle"][begin - 1 : begin + 2]
+    assert speed == pytest.approx((around[2] - around[0]) / 2e-3, rel=1e-2)
+
+
+def test_a_far_equilibrium_does_not_move_what_the_sensors_show(run: Record) -> None:
+    spring = MOTOR.replace('damping = "d"', 'damping = "d"\nstiffness = "k"\nforce = "T"').replace(
+        "[coordinates.phi]",
+        '[parameters.k]\nunit = "N m/rad"\n[parameters.T]\nunit = "N m"\n[coordinates.phi]',
+    )
+    values = {**VALUES, "k": 1e-9, "T": 1.0}
+    state = rig_state(equations_of(rig_of_text(spring, "motor")), run.slice(40, 400), values)
+    assert state[0] == pytest.approx(run["angle"][40], abs=1e-6)
+
+
 def test_without_a_sensor_of_the_current_it_goes_by_the_parameters(run: Record) -> None:
     equations = equations_of(rig_of_text(MOTOR, "motor.toml"))
     record = Record("run", run.dt, {"u": run["u"], "angle": run["angle"]}, {})

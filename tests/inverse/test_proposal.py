@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import sympy as sp
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import candidates_on
 from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.effects.symbols import v
 from rigsight.inverse import Proposal, propose
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
@@ -96,6 +98,43 @@ def test_beside_a_known_delay_friction_is_named() -> None:
     assert found is not None
     assert found.alone[0].family == "dry_friction"
     assert found.alone[0].share > 0.8
+
+
+def test_a_tone_and_a_spring_law_are_named_together() -> None:
+    hidden = [effect_named("periodic_disturbance"), effect_named("cubic_stiffness")]
+    values = {**AXIS_VALUES, "T_p": 6.0, "w_p": 37.0, "k_3": 1e5}
+    found = proposed(campaign(AXIS, values, hidden, (10.0, 20.0)))
+    of = {cause.effect.name: cause for cause in found.taken}
+    assert set(of) == {"periodic_disturbance", "cubic_stiffness"}
+    assert of["periodic_disturbance"].values["w_p"] == pytest.approx(37.0, rel=5e-3)
+    assert found.explained > 0.9
+
+
+def test_in_a_motion_of_one_frequency_an_overtone_is_no_tone() -> None:
+    structure = compose(AXIS, [effect_named("cubic_stiffness")])
+    runs = [
+        simulate(
+            structure,
+            {**AXIS_VALUES, "k_3": 2e5},
+            Record("r", DT, {"u": a * np.sin(9.0 * T)}, {}, hold="foh"),
+        )
+        for a in (20.0, 40.0)
+    ]
+    given = {name: value for name, value in AXIS_VALUES.items() if name != "gain"}
+    own = Campaign("one frequency", AXIS, {"gain": 1.0}, given, tuple(runs))
+    assert "periodic_disturbance" not in proposed(own).judged
+
+
+@pytest.mark.parametrize("sharp", [None, 0.02])
+def test_a_family_is_proposed_in_its_plainest_form(sharp: float | None) -> None:
+    """A sign that is rounded over a small speed is no other law of friction."""
+    friction = effect_named("coulomb_friction")
+    if sharp is not None:
+        torque = sp.Symbol("T_c", real=True) * sp.tanh(v / sharp)
+        friction = replace(friction, name="rounded", torque=torque)
+    (cause,) = proposed(campaign(AXIS, {**AXIS_VALUES, "T_c": 1.0}, [friction], (20.0, 40.0))).taken
+    assert cause.effect.name == "coulomb_friction"
+    assert {form.effect.name for form in cause.forms} >= {"stribeck_friction", "directional_friction"}
 
 
 def test_a_cause_comes_with_its_numbers() -> None:

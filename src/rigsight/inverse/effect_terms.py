@@ -102,14 +102,24 @@ class EffectTerms:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term."""
         if is_late(effect):
             yield from self._of_late(effect)
-        elif effect.pulsation is not None:
-            yield from _of_tone(effect, self.fit, self.values)
         elif effect.place is Place.SENSOR:
             yield from _of_sensor(effect, self.fit, self.values, self.scales, self._by_motion)
         elif effect.place is Place.ACTUATOR:
             yield from _of_drive(effect, self.fit, self.values, self.scales)
         elif is_joint_force(effect) and not _is_resonance(effect):
             yield from _of_joint(effect, self.fit, self.values, self.scales, self._motion_of(effect))
+
+    def of_tone(self, effect: Effect, residuals: Sequence[Floats]) -> Iterator[Term]:
+        """Yield a tone at the line that the residuals along all motions share; nothing where they share none.
+
+        Parameters
+        ----------
+        effect
+            A tone.
+        residuals
+            Of each record, filtered and thinned, shape (n_equations, n_rows) each.
+        """
+        yield from _of_tone(effect, self.fit, self.values, residuals)
 
     def acting(self, effect: Effect, own: Mapping[str, float]) -> tuple[Floats, ...] | None:
         """Return what an effect that acts would add to what the equations need, along each motion, filtered and thinned.
@@ -218,16 +228,16 @@ def _of_joint(
             yield Term(effect, inner, tuple(p.name for p in linear), tuple(units), columns, one_sided)
 
 
-def _of_tone(effect: Effect, fit: EquationFit, values: Mapping[str, float]) -> Iterator[Term]:
-    """Yield a tone at the line of the residual that all records share, with a phase of its own in each record.
-
-    Nothing where the motion has one frequency and this is an overtone: what follows from the motion and a tone are one.
-    """
+def _of_tone(
+    effect: Effect, fit: EquationFit, values: Mapping[str, float], rows: Sequence[Floats]
+) -> Iterator[Term]:
+    # Each record has a phase of its own. Where the motion has one frequency and this is an overtone, what follows from the motion
+    # and a tone are one.
     motions, joint = fit.motions, joint_of(fit.rig, effect)
     pushes = [per_force(motion, joint, values) for motion in motions]
     row = int(np.argmax(sum(np.sum(push**2, axis=1) for push in pushes)))
-    residuals = [m.inner(fit.residual(m, values))[row] for m in motions]
-    steps = [motion.record.dt for motion in motions]
+    residuals = [own[row] for own in rows]
+    steps = [motion.record.dt * motion.stride for motion in motions]
     line = persistent_line(residuals, steps)
     inputs = [signal - np.mean(signal) for motion in motions for signal in motion.u[::3]]
     if line is None or len(motions) > _MOST_PHASES:
@@ -236,7 +246,7 @@ def _of_tone(effect: Effect, fit: EquationFit, values: Mapping[str, float]) -> I
     near = line + spacing * np.arange(-_FINER, _FINER + 1) / _FINER
     power = [sum(line_power(r, dt, w) for r, dt in zip(residuals, steps, strict=True)) for w in near]
     pulsation = float(near[int(np.argmax(power))])
-    of_inputs = zip(inputs, np.repeat(steps, len(motions[0].u) // 3), strict=True)
+    of_inputs = zip(inputs, np.repeat([m.record.dt for m in motions], len(motions[0].u) // 3), strict=True)
     if any(
         line_power(signal, dt, pulsation / overtone) > _OWN_LINE * float(signal @ signal)
         for signal, dt in of_inputs

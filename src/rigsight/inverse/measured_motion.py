@@ -199,7 +199,12 @@ class RecordMotion:
 
     def thinned(self, rows: Floats) -> Floats:
         """Return inner filtered rows at those samples only that are nearly independent."""
-        return self.inner(rows)[..., :: max(1, int(1.0 / (_ABOVE * self.band)))]
+        return self.inner(rows)[..., :: self.stride]
+
+    @property
+    def stride(self) -> int:
+        """Samples from one of these to the next."""
+        return max(1, int(1.0 / (_ABOVE * self.band)))
 
 
 def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> RecordMotion | None:

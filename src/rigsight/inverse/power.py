@@ -65,8 +65,7 @@ def named_sizes(
         Called with the name of each effect that is done.
     """
     rig = terms_of.fit.rig
-    # A tone is sought where the residual has a line: one that is hidden elsewhere would not be asked for.
-    terms = [term for effect in effects if effect.pulsation is None for term in terms_of.of(effect)]
+    terms = [term for effect in effects for term in terms_of.of(effect)]
     judged = {term.effect.name for term in terms}
     if not terms:
         return [_none(terms_of, effect, _NOT_ASKED) for effect in effects]

@@ -129,6 +129,7 @@ class Selection:
     ) -> None:
         self.fit, self.values, self.terms = fit, values, terms
         rows, slopes, columns, stretch = [], [], [], []
+        self.shapes: list[tuple[int, int]] = []
         unit = fit.tolerance(values, noise)[:, None]
         # Together all rows have RMS one, for the ridge of the regression.
         self.unit = unit = unit * np.sqrt(np.mean((fit.rms(values)[:, None] / unit) ** 2))
@@ -139,6 +140,7 @@ class Selection:
             slopes.append(_as_columns(motion.thinned(fit.slopes(motion, values)) / unit))
             columns.append([_as_columns(term.columns[i] / unit) for term in terms])
             n_equations, n = own.shape
+            self.shapes.append((n_equations, n))
             stretch.append(np.tile(i * per_record + (np.arange(n) * per_record) // n, n_equations))
         target = -np.concatenate(rows)
         regressors = [
@@ -262,6 +264,13 @@ class Selection:
             (key, t, self.remainder(own)) for (key, _, _), t, own in zip(found, terms, columns, strict=True)
         ]
 
+    def residuals(self, found: Sequence[tuple[Key, int, float]]) -> list[Floats]:
+        """Return what selected terms leave along each motion, filtered and thinned, shape (n_equations, n_rows) each."""
+        columns = [*self.own, *self.columns_of(found)]
+        left = self.matrix[:, -1] - self.matrix[:, columns] @ self._solved(self.whole, columns)
+        parts = np.split(left, np.cumsum([np.prod(shape) for shape in self.shapes])[:-1])
+        return [part.reshape(shape) * self.unit for part, shape in zip(parts, self.shapes, strict=True)]
+
     def columns_of(self, found: Sequence[tuple[Key, int, float]]) -> list[int]:
         """Return the columns of selected terms."""
         return [column for _, i, _ in found for column in self.places[i]]
@@ -269,7 +278,7 @@ class Selection:
     def is_worth(self, after: float, before: float) -> bool:
         """Return whether a further family removes enough: of what was left before, and beside what the laws taken before err."""
         of_laws = LAW_ERROR**2 * max(self.remainder([]) - before, 0.0)
-        return before - after > max(max(_WORTH, self.by_chance) * before, of_laws)
+        return bool(before - after > max(max(_WORTH, self.by_chance) * before, of_laws))
 
     def names(self, rig: Rig, key: Key, known: Sequence[tuple[Key, int, float]]) -> bool:
         """Return whether a family at a place is taken first beside known ones."""

@@ -68,11 +68,15 @@ def propose(
         variance = np.diag(covariance)
         weight = 1.0 / fit.tolerance(values, variance) ** 2
         by_noise = min(1.0, float(np.sum(variance * weight) / np.sum(fit.rms(values) ** 2 * weight)))
-    found = (
-        Selection(fit, values, terms, variance).proposal(campaign.rig)
-        if terms
-        else Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
-    )
+    found = Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
+    if terms:
+        selection = Selection(fit, values, terms, variance)
+        # A tone is a line of what the others leave.
+        left = selection.residuals(selection.selected(campaign.rig))
+        tones = [t for e in effects if e.pulsation is not None for t in terms_of.of_tone(e, left)]
+        if tones:
+            selection = Selection(fit, values, [*terms, *tones], variance)
+        found = selection.proposal(campaign.rig)
     return replace(found, noise=by_noise, forces=missing_forces(fit, values, covariance))
 
 

@@ -88,3 +88,22 @@ def test_an_effect_by_itself_is_its_law() -> None:
     structure, column = alone(placed(effect_named("input_saturation"), "motor"))
     out = simulate(structure, {"u_max": 0.1}, Record("reported", DT, {"signal": x}, {}))
     np.testing.assert_allclose(out[structure.rig.outputs[column].name], np.clip(x, -0.1, 0.1), atol=1e-12)
+
+
+def test_a_push_beside_a_late_drive_needs_no_history() -> None:
+    """The command and the push arrive late together, so that sets of parameters still run side by side."""
+    late = compose(with_probes(TRAIN), [placed(effect_named("input_delay"), TRAIN.mechanism.drives[0].name)])
+    assert late.late_inputs is not None
+    assert {own.index for own in late.late_inputs} == {
+        late.rig.mechanism.inputs.index("u"),
+        late.rig.mechanism.inputs.index(push(TRAIN.mechanism.drives[0].name)),
+    }
+    u = np.sin(3.0 * T)
+    rest = {signal.name: np.zeros(N) for signal in late.rig.inputs}
+    values = {**VALUES, PUSH_SIZE: 1.0}
+    column = push(TRAIN.mechanism.drives[0].name)
+    shifted = np.r_[np.zeros(4), u[:-4]]
+    found = simulate(late, {**values, "T_d": 4 * DT}, Record("late", DT, {**rest, "u": u, column: u}, {}))
+    expected = simulate(PROBED, values, Record("later", DT, {**rest, "u": shifted, column: shifted}, {}))
+    for sensor in TRAIN.outputs:
+        np.testing.assert_allclose(found[sensor.name], expected[sensor.name], atol=1e-8)

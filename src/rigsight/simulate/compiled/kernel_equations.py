@@ -11,7 +11,7 @@ from rigsight.effects.symbols import derivative
 from rigsight.libraries.templates import filled, template
 from rigsight.simulate.equations.kinks import FrozenStructure, freeze
 from rigsight.simulate.equations.straight_line import gathered, hoist_constants
-from rigsight.simulate.equations.structure import TIME, Structure, input_symbols
+from rigsight.simulate.equations.structure import TIME, LateInput, Structure, input_symbols
 from rigsight.simulate.printing.language import FUNCTIONS, elements, function_body, limited, real
 
 
@@ -42,10 +42,10 @@ class KernelEquations:
             "limits": [e.limit for e in structure.remembering_equations if e.limit is not None],
             "signals": [history.signal for history in self._remembered],
             "delays": [history.delay for history in self._remembered],
-            "arrivals": [delay for _, delay in self._arriving],
+            "arrivals": self._delays,
         }
         flat, hoisted = hoist_constants(
-            [expression for group in groups.values() for expression in group],
+            [expression.xreplace(self._as_arriving) for group in groups.values() for expression in group],
             set(structure.parameter_symbols),
         )
         self.constants: dict[sp.Symbol, sp.Expr] = hoisted
@@ -84,7 +84,7 @@ class KernelEquations:
             or "-1",
             "FRICTION_IS_SHOWN": int(self.friction_is_shown),
             "VELOCITY": (structure.velocity_index or 0) if single is None else single.velocity,
-            "N_ARRIVING": len(self._arriving),
+            "N_ARRIVING": len(self._delays),
             "ARRIVE": self._body("q by", "by", self.delays),
             "N_LATE": len(self._remembered),
             "READS_LATE_RATE": int(
@@ -185,22 +185,48 @@ class KernelEquations:
         """The delays with which inputs arrive, constants."""
         return self._groups["arrivals"]
 
+    @cached_property
+    def _delays(self) -> list[sp.Expr]:
+        """Each delay of inputs once."""
+        return list(dict.fromkeys(late.delay for late in self._arriving))
+
     @property
     def _read_inputs(self) -> list[tuple[int, int]]:
         """Column and delay of each input that the equations read; the delay is -1 for an input that is not late."""
-        n, by_history = self.structure.n_inputs, bool(self.structure.histories)
-        late = [(column, delay) for delay, (column, _) in enumerate(self._arriving)]
-        if by_history:
-            return [*((column, -1) for column in range(n)), *late]
-        return [*late, *((column, -1) for column in range(len(late), n))]
+        late = [(own.index, self.delay_of(own)) for own in self._arriving]
+        on_time = [(column, -1) for column in range(self.structure.n_inputs)]
+        # The only input of a rig is not read without its delay.
+        return [*on_time, *late] if self.structure.histories else late or on_time
 
     @property
-    def arriving(self) -> list[tuple[sp.Symbol, sp.Symbol]]:
-        """Symbols of the inputs that arrive late, and of their time derivatives."""
-        if not self._arriving:
-            return []
-        histories = [history.symbol for history in self.structure.histories]
-        return list(zip(histories, self._late_rates, strict=True)) if histories else [input_symbols(0)[:2]]
+    def arriving(self) -> tuple[LateInput, ...]:
+        """The inputs that arrive late."""
+        return self._arriving
+
+    def delay_of(self, late: LateInput) -> int:
+        """Return the number of the delay of an input."""
+        return self._delays.index(late.delay)
+
+    @cached_property
+    def _as_arriving(self) -> dict[sp.Symbol, sp.Expr]:
+        """Each delayed signal of inputs, and its rate, in terms of the inputs that arrive late."""
+        found: dict[sp.Symbol, sp.Expr] = {}
+        if self._remembered or not self._arriving:
+            return found
+        for history, rate in zip(self.structure.histories, self._late_rates, strict=True):
+            own = {
+                input_symbols(late.index)[0]: late for late in self._arriving if late.delay == history.delay
+            }
+            late_values = {symbol: late.value for symbol, late in own.items()}
+            found[history.symbol] = history.signal.xreplace(late_values)
+            found[rate] = sp.Add(
+                *(
+                    derivative(history.signal, symbol).xreplace(late_values) * late.rate
+                    for symbol, late in own.items()
+                    if symbol in history.signal.free_symbols
+                )
+            )
+        return found
 
     @cached_property
     def lane_rates(self) -> list[sp.Expr]:
@@ -244,15 +270,19 @@ class KernelEquations:
     @property
     def _late_names(self) -> dict[sp.Symbol, str]:
         """Name in C of each delayed signal and of its rate."""
-        names = {}
-        for i, (history, rate) in enumerate(zip(self.structure.histories, self._late_rates, strict=True)):
-            n = self.structure.n_inputs + i
-            names |= (
-                {history.symbol: f"now->late[{i}]", rate: f"now->late_rate[{i}]"}
-                if self._remembered
-                else {history.symbol: f"now->u[{n}]", rate: f"now->du[{n}]"}
-            )
-        return names
+        if self._remembered:
+            late = zip(self._remembered, self._late_rates, strict=True)
+            return {
+                symbol: name
+                for i, (history, rate) in enumerate(late)
+                for symbol, name in ((history.symbol, f"now->late[{i}]"), (rate, f"now->late_rate[{i}]"))
+            }
+        first = self.structure.n_inputs if self.structure.histories else 0
+        return {
+            symbol: name
+            for i, late in enumerate(self._arriving, first)
+            for symbol, name in ((late.value, f"now->u[{i}]"), (late.rate, f"now->du[{i}]"))
+        }
 
     @staticmethod
     def _plus_own(names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Expr]) -> dict[sp.Symbol, str]:

@@ -163,13 +163,15 @@ def tangent_fragments(equations: KernelEquations) -> dict[str, str]:
     structure, n = equations.structure, len(equations.structure.states)
     of_states = dict(zip(structure.states, symbols("z", n), strict=True))
     of_constants = dict(zip(equations.constants, symbols("dq", len(equations.constants)), strict=True))
-    earlier = {symbol: sp.Symbol(f"{symbol.name} earlier", real=True) for symbol, _ in equations.arriving}
-    arriving = {symbol: symbol + earlier[symbol] * rate for symbol, rate in equations.arriving}
+    earlier = [sp.Symbol(f"delay {i} shorter", real=True) for i in range(len(equations.delays))]
+    arriving = {
+        late.value: late.value + earlier[equations.delay_of(late)] * late.rate for late in equations.arriving
+    }
     rates, outputs = (
         [e.xreplace(arriving) for e in own] for own in (equations.lane_rates, equations.outputs)
     )
     steps = {symbol: step.xreplace(arriving) for symbol, step in equations.lane_steps.items()}
-    by_earlier = {own: real(f"(earlier[{i}])") for i, own in enumerate(earlier.values())}
+    by_earlier = {own: real(f"(earlier[{i}])") for i, own in enumerate(earlier)}
     groups: dict[str, tuple[Sequence[str], Sequence[sp.Expr], Mapping[sp.Symbol, sp.Symbol]]] = {
         "RATE": (elements("r", n), rates, {**of_states, **by_earlier}),
         "OUTPUT": (elements("r", len(outputs)), outputs, {**of_states, **by_earlier}),

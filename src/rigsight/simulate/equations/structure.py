@@ -41,6 +41,16 @@ class History:
     delay: sp.Expr  # the delay as an expression in parameters
 
 
+@dataclass(frozen=True)
+class LateInput:
+    """An input that arrives late."""
+
+    index: int  # of the input
+    delay: sp.Expr  # as an expression in parameters
+    value: sp.Symbol  # what arrives
+    rate: sp.Symbol  # its time derivative
+
+
 @dataclass(frozen=True, eq=False)
 class Structure:
     """The equations of a rig with its effects.
@@ -178,14 +188,23 @@ class Structure:
         return arriving[-1] if arriving else None
 
     @cached_property
-    def late_inputs(self) -> tuple[tuple[int, sp.Expr], ...] | None:
-        """Index and delay of each input that arrives late, in the order of `histories`; None if another signal is delayed."""
+    def late_inputs(self) -> tuple[LateInput, ...] | None:
+        """Inputs that arrive late; None if a delayed signal depends on anything but inputs and parameters."""
         if not self.histories:
-            return () if self.delay is None else ((0, self.delay),)
+            return () if self.delay is None else (LateInput(0, self.delay, INPUT, INPUT_RATE),)
+        found, known = [], set(self.parameter_symbols)
         indices = {input_symbols(index)[0]: index for index in range(self.n_inputs)}
-        if any(history.signal not in indices for history in self.histories):
-            return None
-        return tuple((indices[history.signal], history.delay) for history in self.histories)
+        for number, history in enumerate(self.histories):
+            read = history.signal.free_symbols - known
+            if not read <= set(indices):
+                return None
+            for index in sorted(indices[symbol] for symbol in read):
+                value, rate = (
+                    sp.Symbol(f"{symbol.name} late by delay {number}", real=True)
+                    for symbol in input_symbols(index)[:2]
+                )
+                found.append(LateInput(index, history.delay, value, rate))
+        return tuple(found)
 
     @cached_property
     def observed_delays(self) -> dict[str, sp.Expr]:
