@@ -157,7 +157,11 @@ class EffectTerms:
     def _of_late(self, effect: Effect) -> Iterator[Term]:
         """Yield a delay or a lag at each length of a grid."""
         (parameter,) = (p for p in effect.parameters if p.fitted)
-        lengths = _usual(effect, parameter, self.scales) * np.geomspace(_LEAST_SHARE, _LATEST, _GRID[1])
+        usual = _usual(effect, parameter, self.scales)
+        if self.fit.motions[0].equations.n_coordinates == 1:
+            # A joint that turns on and on has a long time of its own, but its speed may change fast.
+            usual = min(usual, *(self.scales[f"time@{s.name}"] for s in self.fit.rig.outputs))
+        lengths = usual * np.geomspace(_LEAST_SHARE, _LATEST, _GRID[1])
         if parameter.lower < 0.0:
             lengths = np.concatenate([-lengths, lengths])
         for length in map(float, lengths):

@@ -149,9 +149,9 @@ class RecordMotion:
 
     def ahead(self, time: float) -> tuple[Floats, Floats]:
         """Return the changes of `z` and `a` if the whole motion were ahead by so much time."""
+        # Speeds by themselves: a position that stands still beyond the end of the record would stop there.
         n, dt = self.equations.n_coordinates, self.record.dt
         change = np.array([shifted(row, dt, time) - row for row in self.filtered(self.z)])
-        change[n : 2 * n] = slope(change[:n], dt)
         return change, slope(change[n : 2 * n], dt)
 
     def by_motion(self, values: Mapping[str, float]) -> Floats:

@@ -224,12 +224,19 @@ class Selection:
     def _remainders(
         self, chosen: Sequence[int], asked: Sequence[int] | None = None
     ) -> Iterator[tuple[int, float]]:
-        """Yield each (asked) term that can have the sign that it needs beside chosen columns, and what it leaves."""
+        """Yield each (asked) term that can have the sign and order that it needs beside chosen columns, and what it leaves."""
         for i in range(len(self.terms)) if asked is None else asked:
             term = self.terms[i]
             columns = [*chosen, *self.places[i]]
             own = self._solved(self.whole, [*self.own, *columns])[-len(self.places[i]) :]
-            if all(number >= 0.0 or not sided for sided, number in zip(term.one_sided, own, strict=True)):
+            numbers = dict(zip(term.names, own / self.size[self.places[i]] * term.units, strict=False))
+            if all(
+                number >= 0.0 or not sided for sided, number in zip(term.one_sided, own, strict=True)
+            ) and all(
+                numbers[larger] >= numbers[smaller]
+                for larger, smaller in term.effect.ordered
+                if {larger, smaller} <= set(numbers)
+            ):
                 yield i, self.remainder(columns)
 
     def selected(self, rig: Rig) -> list[tuple[Key, int, float]]:
