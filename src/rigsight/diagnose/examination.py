@@ -165,14 +165,15 @@ def _ranked(
 ) -> tuple[Ranking, tuple[FittedModel, ...]]:
     """Return the ranking of all models with effects, and those that do not compete because other laws fit equally well."""
     context, reidentified, singles = models.alone.context, models.alone.reidentified, models.alone.singles
-    several, imitations = split_distinguishable(models.several, singles, allowed, models.checks.is_adequate)
+    # Families that the motion names were judged beside each other, on stretches to which they were not fitted.
+    named = models.alone.named
+    by_motion = [m for m in models.several if named.issuperset(keys_of(context.rig, m.effects))]
+    others = [model for model in models.several if model not in by_motion]
+    others, imitations = split_distinguishable(others, singles, allowed, models.checks.is_adequate)
+    several = [*by_motion, *others]
     best_single = min(contenders(singles), key=lambda model: model.error_over_noise, default=reidentified)
     evidence = Evidence(context, reidentified, best_single)
     if not models.are_in_windows:
-        # Families that the motion names were judged beside each other, on stretches to which they were not fitted.
-        named = models.alone.named
-        by_motion = [model for model in several if named.issuperset(keys_of(context.rig, model.effects))]
-        others = [model for model in several if model not in by_motion]
         stand = beyond_disturbance(evidence, singles, models.forms.with_own_evidence(singles, others))
         several = with_parts([*by_motion, *stand], several)
     fitted = [*singles, *several]
