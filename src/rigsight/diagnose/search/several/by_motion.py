@@ -67,9 +67,12 @@ class NamedByMotion:
             parts = self._parts(model)
         pairs = zip(model.effects, parts, strict=True)
         forms = [form for effect, part in pairs for form in self._other_forms(model, effect, part)]
-        competing = refine(self.context, [finished(self.context, model), *forms, *models, *parts])
-        if min(found.error_over_noise for found in competing) > self.settled:
-            competing = in_lowest_basins(self.context, competing)
+        best, others = finished(self.context, model), [*forms, *models, *parts]
+        if best.error_over_noise <= self.settled:
+            # What remains is of the size of what laws err: more digits of the others would not tell them apart.
+            competing = [*refine(self.context, [best]), *others]
+        else:
+            competing = in_lowest_basins(self.context, refine(self.context, [best, *others]))
         return [found for found in competing if len(found.effects) > 1]
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
