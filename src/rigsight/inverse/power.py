@@ -15,6 +15,7 @@ import numpy as np
 from rigsight.effects import Effect, Family, kind_of, placed_dimension
 from rigsight.inverse.effect_terms import EffectTerms
 from rigsight.inverse.proposal import Key, Selection
+from rigsight.inverse.propose import selection_of
 from rigsight.units import characteristic_value
 
 NAMED_IN = 0.8
@@ -65,18 +66,18 @@ def named_sizes(
         Called with the name of each effect that is done.
     """
     rig = terms_of.fit.rig
-    terms = [term for effect in effects for term in terms_of.of(effect)]
-    judged = {term.effect.name for term in terms}
-    if not terms:
+    selection = selection_of(terms_of, effects)
+    if selection is None:
         return [_none(terms_of, effect, _NOT_ASKED) for effect in effects]
-    selection = Selection(terms_of.fit, terms_of.values, terms)
+    # A tone is sought where the residual has a line: one that is hidden elsewhere would not be asked for.
+    judged = {term.effect.name for term in selection.terms if term.effect.pulsation is None}
     known = selection.selected(rig)
     found = []
     for effect in effects:
-        if effect.name not in judged:
-            found.append(_none(terms_of, effect, _NOT_ASKED))
-        elif (effect.family, rig.where(effect)) in [key for key, _, _ in known]:
+        if (effect.family, rig.where(effect)) in [key for key, _, _ in known]:
             found.append(_none(terms_of, effect, "These records show this family there already."))
+        elif effect.name not in judged:
+            found.append(_none(terms_of, effect, _NOT_ASKED))
         else:
             found.append(_smallest(terms_of, selection, known, effect, seed))
         say(effect.name)

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigsight.campaign import Campaign
 from rigsight.effects import Effect, Place
@@ -33,6 +34,8 @@ from rigsight.inverse.missing_force import missing_forces, noise_of_rows
 from rigsight.inverse.proposal import Proposal, Selection
 from rigsight.inverse.smooth_signals import shifted
 from rigsight.simulate import compose
+
+Floats = NDArray[np.float64]
 
 
 def propose(
@@ -61,23 +64,40 @@ def propose(
     if terms_of is None:
         return None
     fit, values = terms_of.fit, terms_of.values
-    terms = [term for effect in effects for term in terms_of.of(effect)]
     covariance = noise_of_rows(fit, values, noise or {})
     by_noise, variance = None, None
     if covariance is not None:
         variance = np.diag(covariance)
         weight = 1.0 / fit.tolerance(values, variance) ** 2
         by_noise = min(1.0, float(np.sum(variance * weight) / np.sum(fit.rms(values) ** 2 * weight)))
-    found = Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
-    if terms:
-        selection = Selection(fit, values, terms, variance)
-        # A tone is a line of what the others leave.
-        left = selection.residuals(selection.selected(campaign.rig))
-        tones = [t for e in effects if e.pulsation is not None for t in terms_of.of_tone(e, left)]
-        if tones:
-            selection = Selection(fit, values, [*terms, *tones], variance)
-        found = selection.proposal(campaign.rig)
+    selection = selection_of(terms_of, effects, variance)
+    nothing = Proposal((), (), frozenset(), explained=0.0, by_chance=1.0)
+    found = nothing if selection is None else selection.proposal(campaign.rig)
     return replace(found, noise=by_noise, forces=missing_forces(fit, values, covariance))
+
+
+def selection_of(
+    terms_of: EffectTerms, effects: Sequence[Effect], noise: Floats | None = None
+) -> Selection | None:
+    """Return the selection among effects, with tones at the lines of what the others leave; None where no effect is a term.
+
+    Parameters
+    ----------
+    terms_of
+        Effects as terms along the motions.
+    effects
+        Candidates at their places.
+    noise
+        Variance of each equation by noise of the sensors.
+    """
+    fit, values = terms_of.fit, terms_of.values
+    terms = [term for effect in effects for term in terms_of.of(effect)]
+    if not terms:
+        return None
+    selection = Selection(fit, values, terms, noise)
+    left = selection.residuals(selection.selected(fit.rig))
+    tones = [term for e in effects if e.pulsation is not None for term in terms_of.of_tone(e, left)]
+    return Selection(fit, values, [*terms, *tones], noise) if tones else selection
 
 
 def along_motion(campaign: Campaign, known: Mapping[str, float]) -> EffectTerms | None:
