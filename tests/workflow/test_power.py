@@ -44,11 +44,12 @@ def families(friction: float) -> set[str]:
 
 @pytest.fixture(scope="module")
 def power() -> Power:
-    return power_of(campaign(), [effect_named("coulomb_friction"), effect_named("flexible_mode")])
+    names = ("coulomb_friction", "flexible_mode", "periodic_disturbance")
+    return power_of(campaign(), [effect_named(name) for name in names])
 
 
 def test_friction_of_twice_the_size_is_found_in_records_and_a_quarter_is_not(power: Power) -> None:
-    (friction, _) = power.sizes
+    friction = power.sizes[0]
     value, unit = friction.parameters["T_c"]
     assert unit == "N"
     assert "dry_friction" in families(2.0 * value)
@@ -61,6 +62,7 @@ def test_what_the_motion_does_not_judge_has_a_reason_in_place_of_a_size(power: P
     assert entries[0]["reason"] is None
     assert entries[1]["size"] is None
     assert "Not judged" in entries[1]["reason"]
+    assert "already" in entries[2]["reason"], "the ripple of the drive is a tone"
 
 
 def test_records_that_do_not_show_the_motion_are_refused() -> None:
