@@ -95,12 +95,13 @@ def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:
 
 
 @pytest.mark.slow
-def test_the_others_follow_where_none_explains_the_records() -> None:
-    tried = ("quadratic_damping", "input_saturation", "sensor_lag", "free_play", "coulomb_friction")
+def test_what_the_motion_rules_out_is_not_fitted_for_a_remainder() -> None:
+    """Free play is no exact form of a cubic spring, but no friction or late sensor explains the force along the motion."""
+    tried = ("quadratic_damping", "sensor_lag", "free_play", "coulomb_friction")
     found = diagnosed(["cubic_stiffness"], {"k_3": 5e6}, tried)
     fitted = {name for candidate in found.candidates for name in candidate.effects}
-    # What explains much less than free play along the motion itself is not fitted alone.
-    assert fitted >= {"free_play", "input_saturation", "sensor_lag"}
+    assert "free_play" in fitted
+    assert not fitted & {"quadratic_damping", "coulomb_friction", "sensor_lag"}
 
 
 @pytest.mark.slow
