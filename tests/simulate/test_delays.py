@@ -223,6 +223,22 @@ def test_two_late_drives_that_arrive_between_samples() -> None:
         assert np.max(np.abs(derivatives[:, :, 1 + i] - slope)) < 1e-4 * np.max(np.abs(slope))
 
 
+def test_a_late_input_beside_a_late_sensor_with_kinks(tmp_path: Path) -> None:
+    """Dry friction bends a speed, so its late reading needs a history; the input is late all the same."""
+    path = tmp_path / "train.toml"
+    more = '[sensors.load_speed]\nreads = "d(phi_m)"\nunit = "rad/s"\n'
+    path.write_text((FILES / "drive_train.toml").read_text("utf-8") + more, "utf-8")
+    rig, values = read_rig_file(path), {**TRAIN, "T_c": 5e-3, "T_s": 0.011}
+    friction, sensor = at("coulomb_friction@motor_bearing"), at("sensor_delay@load_speed")
+    motor = at(f"input_delay@{rig.mechanism.drives[0].name}")
+    u = np.sin(20.0 * T)
+    given = Record("run", DT, {"u": u}, {}, hold="zoh")
+    later = Record("run", DT, {"u": np.r_[np.full(4, u[0]), u[:-4]]}, {}, hold="zoh")
+    found = simulate(compose(rig, [friction, sensor, motor]), {**values, "T_d": 4 * DT}, given, np.zeros(4))
+    expected = simulate(compose(rig, [friction, sensor]), values, later, np.zeros(4))
+    assert_same(found["load_speed"], expected["load_speed"])
+
+
 def test_outputs_move_smoothly_with_a_delay_however_short() -> None:
     """A fit moves a delay to zero: shorter than any step it is the derivative of a delay that counts."""
     structure = compose(RIGS["servo"], [at("input_delay@motor")])

@@ -146,7 +146,9 @@ class EquationTree:
         # These are all but two kinds: the delayed only input of a rig, where the whole record is shifted; and a reading that is
         # only recorded, which is shifted after the simulation if its rate has no jumps between samples.
         delayed = [d.symbol for d in self.definitions if isinstance(d.expression, late)]
-        return tuple(s for s in delayed if not self._is_arrival(s) and not self._is_shown_late(s))
+        within = [s for s in delayed if not self._is_arrival(s) and not self._is_shown_late(s)]
+        # Beside a history the record cannot be shifted as a whole.
+        return tuple(s for s in delayed if s in within or (within and self._is_arrival(s)))
 
     def _readers(self, symbol: sp.Symbol) -> tuple[list[sp.Symbol], bool, bool]:
         """Return the definitions that contain a symbol, whether the motion or a state does, and whether an output does."""
