@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from rigsight.diagnose.policy import FAMILIES
+from rigsight.diagnose.policy import SEARCH
 
 HERE = Path(__file__).parent
 BINS = (0.0, 0.3, 0.5, 0.7, 0.9, 1.0)
@@ -21,9 +21,9 @@ SMALLEST = 1e-6
 
 def probabilities(trial: dict[str, Any], power: float, others: float) -> np.ndarray:
     """Return the probability of each family of a trial, then that of any other cause."""
-    shares = np.clip([share for *_, share in trial["alone"]], 0.0, FAMILIES.most_share)
+    remains = 1.0 - np.clip([share for *_, share in trial["alone"]], 0.0, 1.0) + SEARCH.law_error**2
     power *= 1.0 - trial["by_chance"]
-    weights = np.append((1.0 - shares) ** -power, others)
+    weights = np.append((remains / (1.0 + SEARCH.law_error**2)) ** -power, others)
     return np.asarray(weights / np.sum(weights))
 
 

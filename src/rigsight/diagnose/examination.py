@@ -105,7 +105,8 @@ def examine(
     ranking, imitations = _ranked(models, alone.effects, vector, allowed, rng)
     is_usable = bool(ranking.order) and bool(ranking.order[0].residuals) and ranking.probabilities[0] > 0.0
     best, tied = (ranking.order[0], ranking.tied) if is_usable else (reidentified, ())
-    if len(best.effects) > 1 and best.error_over_noise > allowed and not checks.is_adequate(best):
+    is_reached = best.error_over_noise <= allowed and not lower_bound
+    if len(best.effects) > 1 and not (is_reached or checks.is_adequate(best)):
         best = probable_part(campaign.rig, reidentified, best, ranking.order)
     judgement = judge(
         before.error_over_noise,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.policy import FAMILIES
+from rigsight.diagnose.policy import FAMILIES, SEARCH
 from rigsight.diagnose.verdict.families import (
     families_at_places,
     probable_part,
@@ -103,7 +103,8 @@ def test_a_family_that_explains_the_force_along_the_motion_is_more_probable(scor
     )
     by_family = {own.family: own for own in found}
     friction, spring = by_family[Family.DRY_FRICTION], by_family[Family.SPRING_LAW]
-    expected = 0.5 ** (-FAMILIES.per_motion * (1.0 - by_chance))
+    of_law = SEARCH.law_error**2
+    expected = ((1.0 + of_law) / (0.5 + of_law)) ** (FAMILIES.per_motion * (1.0 - by_chance))
     assert friction.probability / spring.probability == pytest.approx(expected, rel=1e-6)
     assert (friction.along_motion, spring.along_motion) == (0.5, None)
     assert friction.to_json()["along_motion"] == 0.5
@@ -121,3 +122,15 @@ def test_a_further_family_is_named_only_where_it_removes_most_of_the_remainder(
     friction = scored(("coulomb_friction",), error_over_noise=60.0, residuals=left)
     reidentified = scored((), error_over_noise=60.0)
     assert probable_part(AXIS, reidentified, both, [both, alone, friction]).names == kept
+
+
+def test_two_families_that_add_what_laws_err_are_not_named_although_no_set_with_one_of_them_was_fitted(
+    scored,
+) -> None:
+    left = np.ones(8)
+    names = ("asymmetric_stiffness", "presliding_friction", "iwan_hysteresis", "time_shift")
+    all_of_them = scored(names, error_over_noise=2.6, residuals=left)
+    pair = scored(names[:2], error_over_noise=3.2, residuals=left)
+    spring = scored(names[:1], error_over_noise=8.0, residuals=left)
+    reidentified = scored((), error_over_noise=20.1)
+    assert probable_part(AXIS, reidentified, all_of_them, [all_of_them, pair, spring]) is pair

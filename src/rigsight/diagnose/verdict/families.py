@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
-from rigsight.diagnose.policy import FAMILIES
+from rigsight.diagnose.policy import FAMILIES, SEARCH
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
@@ -134,9 +134,8 @@ def families_at_places(
         listed = math.fsum(usable[i][1] for i in members)
         beyond = main.get(key, 0.0)
         if key in own_keys and len(own_keys) > 1:
-            others = of_sets.get(frozenset(own_keys) - {key}, ())
-            beside = max((float(explained[i]) for i in others), default=0.0)
-            beyond = max(beyond, _second_cause(_explained_by(diagnosed, models, explained), beside))
+            without = _best(frozenset(own_keys) - {key}, explained, of_sets)
+            beyond = max(beyond, _second_cause(_explained_by(diagnosed, models, explained), without))
         # Where the motion decides, no law is exact: that one of the forms tried is the true one explains nothing.
         probability = beyond if by_motion else min(1.0, listed + outside * beyond)
         if key in own_keys and by_motion and key in causes:
@@ -202,31 +201,20 @@ def probable_part(
 ) -> FittedModel:
     """Return a model without the families that are less probable than not beside its other ones."""
     gap = reidentified.error_over_noise**2
-    while len(keys := keys_of(rig, model.effects)) > 1:
-        parts = {
-            key: [
-                own for own in others if own.residuals and set(keys_of(rig, own.effects)) == set(keys) - {key}
-            ]
-            for key in keys
-        }
-        best = {key: min(own, key=_error, default=None) for key, own in parts.items()}
-        together = 1.0 - model.error_over_noise**2 / gap
-        chances = {
-            key: _second_cause(together, max(0.0, 1.0 - part.error_over_noise**2 / gap))
-            for key, part in best.items()
-            if part is not None
-        }
-        least = min(chances, key=lambda key: chances[key], default=None)
-        if least is None or chances[least] >= FAMILIES.probable:
+    usable = [(frozenset(keys_of(rig, own.effects)), own) for own in others if own.residuals]
+    while len(keys := frozenset(keys_of(rig, model.effects))) > 1:
+        chances = []
+        for key in sorted(keys):
+            parts = [own for its_keys, own in usable if its_keys and its_keys <= keys - {key}]
+            if parts:
+                part = min(parts, key=lambda own: own.error_over_noise)
+                without = 1.0 - part.error_over_noise**2 / gap
+                chances.append((_second_cause(1.0 - model.error_over_noise**2 / gap, without), part))
+        least, smaller = min(chances, key=lambda own: own[0], default=(1.0, model))
+        if least >= FAMILIES.probable:
             break
-        smaller = best[least]
-        assert smaller is not None
         model = smaller
     return model
-
-
-def _error(model: FittedModel) -> float:
-    return model.error_over_noise
 
 
 def _weighed(
@@ -245,14 +233,14 @@ def _weighed(
     of_motion: dict[Key, float] = {}
     if proposal is not None:
         per_share = FAMILIES.per_motion * (1.0 - proposal.by_chance)
-        of_motion = {(own.family, own.where): _evidence(own.share, per_share) for own in proposal.alone}
+        of_motion = {(own.family, own.where): _evidence(own.share, 0.0, per_share) for own in proposal.alone}
     weights = {}
     for key in dict.fromkeys(itertools.chain(*map(sorted, keys))):
         share = math.fsum(own for own, having in zip(of_rank, keys, strict=True) if key in having)
         alone = [float(e) for e, having in zip(explained, keys, strict=True) if having == {key}]
         simulated = max(alone, default=0.0)
         weights[key] = max(share, FAMILIES.least_rank) ** counts * math.exp(
-            _evidence(simulated, FAMILIES.per_simulation) + of_motion.get(key, 0.0)
+            _evidence(simulated, 0.0, FAMILIES.per_simulation) + of_motion.get(key, 0.0)
         )
     whole = math.fsum(weights.values()) + FAMILIES.other_causes
     return {key: weight / whole for key, weight in weights.items()}
@@ -260,15 +248,18 @@ def _weighed(
 
 def _second_cause(together: float, without: float) -> float:
     """Return how probable a family is as a further cause, from what a model explains with it and without it."""
-    if not without < 1.0:
-        return 0.0
-    weight = math.exp(_evidence((together - without) / (1.0 - without), FAMILIES.per_simulation))
+    weight = math.exp(_evidence(together, without, FAMILIES.per_simulation))
     return weight / (weight + FAMILIES.other_causes)
 
 
-def _evidence(share: float, per_share: float) -> float:
-    """Return the evidence of a share that is explained [nats]."""
-    return -per_share * math.log1p(-min(max(share, 0.0), FAMILIES.most_share))
+def _evidence(explained: float, without: float, per_share: float) -> float:
+    """Return the evidence [nats] of a family, from the shares that are explained with it and without it.
+
+    What a law errs remains in both.
+    """
+    of_law = SEARCH.law_error**2
+    with_it, without_it = (1.0 - min(max(own, 0.0), 1.0) + of_law for own in (explained, without))
+    return per_share * math.log(without_it / with_it)
 
 
 def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: NDArray[np.float64]) -> float:
@@ -286,21 +277,20 @@ def _share(
     explained: NDArray[np.float64],
     of_sets: Mapping[frozenset[Key], Sequence[int]],
 ) -> float:
-    """Return what a family adds to what the others of its model explain, averaged over the orders of adding them.
-
-    A set that was not fitted explains as much as the best part of it that was (Shapley's value, as in `effect_shares`).
-    """
-
-    def worth(keys: frozenset[Key]) -> float:
-        return max(
-            (float(explained[i]) for own, at in of_sets.items() if own <= keys for i in at), default=0.0
-        )
-
+    """Return what a family adds to what the others explain, averaged over the orders of adding them: Shapley's value."""
     steps = []
     for order in itertools.permutations(of_model):
         earlier = frozenset(order[: order.index(key)])
-        steps.append(max(0.0, worth(earlier | {key})) - max(0.0, worth(earlier)))
+        steps.append(_best(earlier | {key}, explained, of_sets) - _best(earlier, explained, of_sets))
     return float(np.mean(steps))
+
+
+def _best(
+    keys: frozenset[Key], explained: NDArray[np.float64], of_sets: Mapping[frozenset[Key], Sequence[int]]
+) -> float:
+    """Return what a set of families explains: at least what the best part of it does that was fitted."""
+    found = (float(explained[i]) for own, at in of_sets.items() if own <= keys for i in at)
+    return max(0.0, max(found, default=0.0))
 
 
 def _forms(rig: Rig, key: Key, members: Sequence[tuple[FittedModel, float, float]]) -> tuple[Form, ...]:

@@ -14,7 +14,8 @@ from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several import stepwise
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.stepwise import Stepwise, each_once, refit_singles, several_effects
+from rigsight.diagnose.search.several.parts import each_once
+from rigsight.diagnose.search.several.stepwise import Stepwise, refit_singles, several_effects
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
 from rigsight.diagnose.search.single_models import SingleModels

@@ -19,7 +19,7 @@ from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
-from rigsight.diagnose.search.several.parts import part_of, reduced, with_causes
+from rigsight.diagnose.search.several.parts import each_once, part_of, reduced, with_causes
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, refine
 from rigsight.effects import Effect, Family
@@ -49,31 +49,44 @@ class NamedByMotion:
 
     def found(self) -> list[FittedModel]:
         """Return the models of several effects and their parts."""
+        models = self._begun()
+        taken_apart = set[tuple[str, ...]]()
+        # A fit that ends lower than the best one so far may have causes that the others make needless, too.
+        while models and (best := min(models, key=_error)).names not in taken_apart:
+            taken_apart.add(best.names)
+            larger, parts = self._reduced(best)
+            model = larger[-1]
+            if len(model.effects) < 2:
+                return []
+            pairs = zip(model.effects, parts, strict=True)
+            forms = [form for effect, part in pairs for form in self._other_forms(model, effect, part)]
+            models = self._compared(finished(self.context, model), [*forms, *models, *larger[:-1], *parts])
+        return [found for found in models if len(found.effects) > 1]
+
+    def _begun(self) -> list[FittedModel]:
+        """Return the causes that the motion names, with further ones, and sets of those that it does not judge."""
         models = list(self._grown(self.singles[0]))
         # A delay and a resonance may hide each other: neither lowers the error without the other.
-        if min((model.error_over_noise for model in models), default=np.inf) > self.settled:
+        if min(map(_error, models), default=np.inf) > self.settled:
             for size in (2, 3):
                 sets = self.together.fitted(size, VERDICT.larger_part)
                 models += [one for one in sets if self._is_worth(one, self.singles[0])]
-        if not models:
-            return []
-        model = min(models, key=lambda one: one.error_over_noise)
-        parts = self._parts(model)
-        while needless := [part for part in parts if not self._is_worth(model, part)]:
-            model = min(needless, key=lambda part: part.error_over_noise)
-            if len(model.effects) < 2:
-                return []
-            models.append(model)
-            parts = self._parts(model)
-        pairs = zip(model.effects, parts, strict=True)
-        forms = [form for effect, part in pairs for form in self._other_forms(model, effect, part)]
-        best, others = finished(self.context, model), [*forms, *models, *parts]
+        return models
+
+    def _reduced(self, model: FittedModel) -> tuple[list[FittedModel], list[FittedModel]]:
+        """Return a model and what remains of it each time that a needless effect is dropped, and the parts of the last."""
+        found, parts = [model], self._parts(model)
+        while needless := [part for part in parts if not self._is_worth(found[-1], part)]:
+            found.append(min(needless, key=_error))
+            parts = self._parts(found[-1])
+        return found, parts
+
+    def _compared(self, best: FittedModel, others: Sequence[FittedModel]) -> list[FittedModel]:
+        """Return the models, each set once, with those fitted to the last digit that this may tell apart."""
         if best.error_over_noise <= self.settled:
             # What remains is of the size of what laws err: more digits of the others would not tell them apart.
-            competing = [*refine(self.context, [best]), *others]
-        else:
-            competing = in_lowest_basins(self.context, refine(self.context, [best, *others]))
-        return [found for found in competing if len(found.effects) > 1]
+            return each_once([*refine(self.context, [best]), *others])
+        return in_lowest_basins(self.context, refine(self.context, each_once([best, *others])))
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
         """Yield the causes that the motion names, where they explain more, then with each further one that lowers the error."""
@@ -94,7 +107,7 @@ class NamedByMotion:
             )
             if beside is not None and (new := self._new(beside, model)):
                 larger_ones.append(with_causes(self.context, model, new, beside))
-            best = min(larger_ones, key=lambda one: one.error_over_noise, default=model)
+            best = min(larger_ones, key=_error, default=model)
             if not self._is_worth(best, model):
                 break
             model = best
@@ -151,3 +164,7 @@ class NamedByMotion:
                 self.context, part, forms, [], self.singles, self.prepare, replaced=of_model
             )
         return found
+
+
+def _error(model: FittedModel) -> float:
+    return model.error_over_noise

@@ -1,4 +1,4 @@
-"""A model without some of its effects, or with causes that the motion names, fitted from where the others are in it."""
+"""Sets of effects beside each other: a part of a model, or one with causes that the motion names, fitted from where it is."""
 
 from __future__ import annotations
 
@@ -57,3 +57,11 @@ def with_causes(
         values = {**declared, **with_own_values(structure, cause.effect, fit, cause.values)}
         fit = replace(fit, values=values, structure=structure)
     return fitted_from(context, model, effects, fit.structure, dict(fit.values))
+
+
+def each_once(models: Sequence[FittedModel]) -> list[FittedModel]:
+    """Return of the models with the same effects the best, best first."""
+    found: dict[frozenset[str], FittedModel] = {}
+    for model in sorted(models, key=lambda model: model.error_over_noise):
+        found.setdefault(frozenset(model.names), model)
+    return list(found.values())

@@ -30,7 +30,7 @@ from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.several.by_motion import Ask, NamedByMotion
 from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
-from rigsight.diagnose.search.several.parts import part_of, reduced
+from rigsight.diagnose.search.several.parts import each_once, part_of, reduced
 from rigsight.diagnose.search.several.together import Together
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.diagnose.search.single_models import SingleModels
@@ -255,14 +255,6 @@ def larger_part_closed(reidentified: FittedModel) -> float:
 def half_closed(remainder: float) -> float:
     """Return the error that one more effect may leave, in units of the noise floor."""
     return remainder - VERDICT.larger_part * (remainder - 1.0)
-
-
-def each_once(models: Sequence[FittedModel]) -> list[FittedModel]:
-    """Return of the models with the same effects the best, best first."""
-    found: dict[frozenset[str], FittedModel] = {}
-    for model in sorted(models, key=lambda model: model.error_over_noise):
-        found.setdefault(frozenset(model.names), model)
-    return list(found.values())
 
 
 def larger_first(models: Sequence[FittedModel], singles: Sequence[FittedModel]) -> list[FittedModel]:
