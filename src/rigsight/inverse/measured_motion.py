@@ -244,3 +244,8 @@ def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> Reco
         else:
             z[i], z[n + i], a[i] = accelerated_motion(z[i], record.dt)
     return RecordMotion(equations, complete, z, a, u)
+
+
+def along_change(by_motion: Floats, change: tuple[Floats, Floats]) -> Floats:
+    """Return the change of the equations by small changes of `z` and `a`, shape (n_equations, n_samples)."""
+    return np.asarray(np.einsum("ekt,kt->et", by_motion, np.concatenate(change)))

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.effects import Effect, Family, kind_of
-from rigsight.inverse.effect_terms import Term
 from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.missing_force import MissingForce
+from rigsight.inverse.term import Term
 from rigsight.rigs import Rig
 
 Floats = NDArray[np.float64]

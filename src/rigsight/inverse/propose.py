@@ -33,6 +33,7 @@ from rigsight.inverse.equation_fit import (
 from rigsight.inverse.missing_force import missing_forces, noise_of_rows
 from rigsight.inverse.proposal import Proposal, Selection
 from rigsight.inverse.smooth_signals import shifted
+from rigsight.inverse.tone_terms import of_tone
 from rigsight.simulate import compose
 
 Floats = NDArray[np.float64]
@@ -96,7 +97,12 @@ def selection_of(
         return None
     selection = Selection(fit, values, terms, noise)
     left = selection.residuals(selection.selected(fit.rig))
-    tones = [term for e in effects if e.pulsation is not None for term in terms_of.of_tone(e, left)]
+    tones = [
+        term
+        for e in effects
+        if e.pulsation is not None
+        for term in of_tone(e, terms_of.fit, terms_of.values, left)
+    ]
     return Selection(fit, values, [*terms, *tones], noise) if tones else selection
 
 

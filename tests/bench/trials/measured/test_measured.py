@@ -138,6 +138,13 @@ def _spot(base: Base, kind: str) -> Spot:
     return next(spot for spot in spots(base) if spot.effect.name == kind)
 
 
+def test_an_encoder_never_reads_backwards(base: Base, campaign: Campaign) -> None:
+    spot, steep = _spot(base, "encoder_eccentricity"), {"e_sin": 4e-3, "e_cos": 0.0, "kappa": 300.0}
+    with pytest.raises(SimulationError, match="run backwards"):
+        spiked(base, spot, steep, campaign.records[0])
+
+
+
 @pytest.mark.parametrize("kind", ADDED)
 def test_a_changed_record_is_one_of_the_rig_with_the_effect(
     campaign: Campaign, base: Base, kind: str

@@ -15,7 +15,7 @@ import sympy as sp
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from rigsight.effects import kind_of
+from rigsight.effects import Effect, kind_of
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import SimulationError
@@ -102,11 +102,7 @@ def _changed(base: Base, spot: Spot, values: Mapping[str, float], record: Record
     if kind == "sensor_lag":
         return _slow(record, spot.signal, signal, values["T_m"])
     if spot.way == "reading":
-        assert spot.effect.measured is not None
-        names = list(values)
-        own = [sp.Symbol(name, real=True) for name in names]
-        reading = sp.lambdify([canonical.reading, *own], spot.effect.measured, "numpy")
-        return record.with_signals(**{spot.signal: reading(signal, *(values[name] for name in names))})
+        return record.with_signals(**{spot.signal: _read(spot.effect, values, signal)})
     motion = record_motion(base.rig, record, base.values)
     if motion is None:
         raise SimulationError(f"The sensors of the record '{record.name}' do not show the motion.")
@@ -121,6 +117,17 @@ def _changed(base: Base, spot: Spot, values: Mapping[str, float], record: Record
         # An input that is held until the next sample: the mean of the force until then.
         added = 0.5 * (added + np.append(added[1:], added[-1]))
     return _driven(record, spot.signal, signal + added)
+
+
+def _read(effect: Effect, values: Mapping[str, float], signal: Floats) -> Floats:
+    """Return what a sensor with an error reads, shape (n_samples,)."""
+    own = [sp.Symbol(name, real=True) for name in values]
+    assert effect.measured is not None
+    both = [effect.measured, derivative(effect.measured, canonical.reading)]
+    reading, slope = sp.lambdify([canonical.reading, *own], both, "numpy")(signal, *values.values())
+    if not np.all(slope > 0.0):
+        raise SimulationError(f"{effect.name} would let the reading run backwards.")
+    return np.asarray(reading)
 
 
 def _per_force(base: Base, spot: Spot, motion: RecordMotion) -> Floats:

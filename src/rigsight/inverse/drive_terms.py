@@ -1,0 +1,103 @@
+"""Effects of a drive along measured motions.
+
+They are functions of the force that the motion requires, not of the logged input: a clip of the logged input would explain that
+input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.effects import Effect
+from rigsight.effects import symbols as canonical
+from rigsight.effects.symbols import derivative
+from rigsight.inverse.equation_fit import EquationFit
+from rigsight.inverse.measured_motion import RecordMotion, along_change
+from rigsight.inverse.parameter_grid import usual
+from rigsight.inverse.term import Term, compiled
+from rigsight.rigs import Drive, evaluated
+
+Floats = NDArray[np.float64]
+
+_SMALL_PART = 0.05
+"""Parameters of a drive effect in characteristic sizes: small, and above the noise of the force."""
+
+
+def late_drive(
+    name: str, late: float, motion: RecordMotion, by_motion: Floats, values: Mapping[str, float]
+) -> Floats | None:
+    """Return what a late drive takes from the equations, as `late_reading`: what is required of it now was commanded earlier."""
+    if not motion.equations.n_coordinates:
+        return None
+    along, more = _through_drive(name, motion, values, along_change(by_motion, motion.ahead(late)))
+    return np.asarray(along * more)
+
+
+def of_drive(
+    effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
+) -> Iterator[Term]:
+    """Yield what the input must give beyond what reaches the motion, a function of what the motion requires.
+
+    To first order in small parameters. With large ones nearly all of the required force is lost, and this force holds the
+    residual that it would explain.
+    """
+    drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
+    per_input = [_force_per_input(drive, {**values, **motion.record.constants}) for motion in fit.motions]
+    own = [sp.Symbol(p.name, real=True) for p in effect.parameters]
+    is_function = effect.drive is not None and effect.drive.free_symbols <= {canonical.u, *own}
+    vanishes = all(p.null == 0.0 for p in effect.parameters)
+    if not (is_function and vanishes and fit.motions[0].equations.n_coordinates and all(per_input)):
+        return
+    inner = {p.name: _SMALL_PART * usual(effect, p, scales) for p in effect.parameters}
+    columns = [
+        motion.thinned(lost(drive, effect, inner, fit, motion, values))[None] for motion in fit.motions
+    ]
+    if all(np.all(np.isfinite(column)) for column in columns):
+        yield Term(effect, inner, (), (), tuple(columns), (True,))
+
+
+def lost(
+    drive: Drive,
+    effect: Effect,
+    own: Mapping[str, float],
+    fit: EquationFit,
+    motion: RecordMotion,
+    values: Mapping[str, float],
+) -> Floats:
+    """Return the force that a drive effect takes from what the motion requires, shape (n_equations, n_samples)."""
+    assert effect.drive is not None
+    gain = _force_per_input(drive, {**values, **motion.record.constants})
+    along, force = _required(drive, fit, motion, values)
+    reaching = compiled(effect.drive, (canonical.u, *(sp.Symbol(name, real=True) for name in own)))
+    return np.asarray(along * (force - gain * reaching(force / gain, *own.values())))
+
+
+def _force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
+    gain = derivative(drive.force, sp.Symbol(drive.name, real=True))
+    known = {symbol.name for symbol in gain.free_symbols} <= numbers.keys()
+    return float(evaluated(gain, numbers)) if known else 0.0
+
+
+def _required(
+    drive: Drive, fit: EquationFit, motion: RecordMotion, values: Mapping[str, float]
+) -> tuple[Floats, Floats]:
+    """Return how a drive enters the equations, shape (n_equations, n_samples), and the force that the motion requires of it."""
+    equations = motion.equations
+    along, missing = _through_drive(drive.name, motion, values, fit.residual(motion, values))
+    p = equations.parameters(values, motion.record)
+    given = equations.at_places(motion.z, motion.u, p)[f"force@{drive.name}"]
+    return along, motion.filtered(missing + given)
+
+
+def _through_drive(
+    name: str, motion: RecordMotion, values: Mapping[str, float], rows: Floats
+) -> tuple[Floats, Floats]:
+    """Return how a drive enters the equations, shape (n_equations, n_samples), and the force of the drive nearest to rows."""
+    p = motion.equations.parameters(values, motion.record)
+    along = motion.equations.slopes_along(motion.z, motion.u, p)[name]
+    size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
+    return along, np.sum(along * rows, axis=0) / size

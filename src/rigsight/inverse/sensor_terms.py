@@ -1,0 +1,73 @@
+"""Effects of a sensor along measured motions: what a small change of its reading changes in the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.effects import Effect
+from rigsight.effects import symbols as canonical
+from rigsight.effects.symbols import derivative
+from rigsight.inverse.equation_fit import EquationFit
+from rigsight.inverse.measured_motion import RecordMotion, along_change
+from rigsight.inverse.parameter_grid import grid_of
+from rigsight.inverse.smooth_signals import shifted
+from rigsight.inverse.term import Term, compiled
+
+Floats = NDArray[np.float64]
+
+
+def late_reading(
+    name: str, late: float, motion: RecordMotion, by_motion: Floats, values: Mapping[str, float]
+) -> Floats | None:
+    """Return what a late reading takes from the equations, shape (n_equations, n_samples); None where it takes nothing."""
+    if name not in motion.record:
+        return None
+    reading = motion.filtered(motion.record[name])
+    return influence(motion, by_motion, values, name, shifted(reading, motion.record.dt, late) - reading)
+
+
+def of_sensor(
+    effect: Effect,
+    fit: EquationFit,
+    values: Mapping[str, float],
+    scales: Mapping[str, float],
+    by_motion: Sequence[Floats],
+) -> Iterator[Term]:
+    """Yield what small changes of the reading, which undo a unit of each linear parameter, change in the equations."""
+    name = fit.rig.acts_at(effect)
+    if effect.measured is None or effect.states or any(name not in motion.record for motion in fit.motions):
+        return
+    fitted = [p for p in effect.parameters if p.fitted]
+    slopes = {p: derivative(effect.measured, sp.Symbol(p.name, real=True)) for p in fitted}
+    linear = [p for p in fitted if not slopes[p].has(sp.Symbol(p.name, real=True))]
+    if any(slopes[p].has(sp.Symbol(other.name, real=True)) for p in linear for other in linear):
+        return
+    for inner in grid_of(effect, linear, scales):
+        arguments = (canonical.reading, *(sp.Symbol(own, real=True) for own in inner))
+        columns = []
+        for motion, by in zip(fit.motions, by_motion, strict=True):
+            changes = [-compiled(slopes[p], arguments)(motion.record[name], *inner.values()) for p in linear]
+            parts = [influence(motion, by, values, name, change) for change in changes]
+            if any(part is None for part in parts):
+                return
+            columns.append(motion.thinned(np.array(parts)))
+        names, sided = tuple(p.name for p in linear), tuple(p.lower >= 0.0 for p in linear)
+        yield Term(effect, inner, names, (1.0,) * len(linear), tuple(columns), sided)
+
+
+def influence(
+    motion: RecordMotion, by_motion: Floats, values: Mapping[str, float], name: str, change: Floats
+) -> Floats | None:
+    """Return the change of the residual of the rig's equations by a small change of a reading; None where it has none."""
+    if not np.any(change):
+        return None
+    if not motion.equations.n_states:
+        rows = np.zeros((len(motion.sensors), change.size))
+        rows[[motion.equations.sensor_names[i] for i in motion.sensors].index(name)] = -change
+        return rows
+    moved = motion.with_reading_changed(name, change, values)
+    return None if moved is None else along_change(by_motion, moved)
