@@ -116,7 +116,7 @@ def examine(
         lambda: main_cause(campaign.rig, reidentified, best, tied, vector, rng),
         lower_bound,
     )
-    if models.alone.worth.is_shown and not is_exact(judgement, best, allowed, checks.is_adequate):
+    if not is_exact(judgement, best, allowed, checks.is_adequate):
         judgement = by_motion(judgement, campaign.rig, reidentified, ranking, vector, models.alone.proposal)
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)

@@ -5,9 +5,9 @@ from rigsight.inverse.equation_fit import EquationFit as EquationFit
 from rigsight.inverse.equation_fit import generalized as generalized
 from rigsight.inverse.equation_fit import held_numbers as held_numbers
 from rigsight.inverse.equation_fit import identifiable as identifiable
-from rigsight.inverse.equation_fit import of_undriven as of_undriven
 from rigsight.inverse.equation_fit import record_motions as record_motions
 from rigsight.inverse.equation_fit import size_in as size_in
+from rigsight.inverse.equation_fit import undriven_inertias as undriven_inertias
 from rigsight.inverse.equation_fit import with_all_inputs as with_all_inputs
 from rigsight.inverse.joint_force import JointMotion as JointMotion
 from rigsight.inverse.joint_force import effect_force as effect_force

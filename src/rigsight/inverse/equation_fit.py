@@ -75,8 +75,8 @@ def identifiable(
     return EquationFit(rig, motions, modelled, ordered).independent(values)
 
 
-def of_undriven(motions: Sequence[RecordMotion], values: Mapping[str, float]) -> set[str]:
-    """Return the names of the parameters in equations of motion that no drive enters."""
+def undriven_inertias(motions: Sequence[RecordMotion], values: Mapping[str, float]) -> set[str]:
+    """Return the names of the parameters of the kinetic energy in equations that no drive enters: they set their scale."""
     motion = motions[0]
     equations, rig = motion.equations, motion.equations.rig
     if not equations.n_coordinates:
@@ -84,7 +84,8 @@ def of_undriven(motions: Sequence[RecordMotion], values: Mapping[str, float]) ->
     p = equations.parameters(values, motion.record)
     along = equations.slopes_along(motion.z, motion.u, p)
     driven = np.any([np.any(along[drive.name], axis=1) for drive in rig.mechanism.drives], axis=0)
-    names = [parameter.name for parameter in rig.parameters]
+    moved = {symbol.name for symbol in rig.mechanism.kinetic.free_symbols}
+    names = [parameter.name for parameter in rig.parameters if parameter.name in moved]
     slopes = motion.slopes(values, names)
     return {name for name, own in zip(names, slopes, strict=True) if np.any(own[~driven])}
 
@@ -102,7 +103,7 @@ class EquationFit:
 
     def rows(self, values: Mapping[str, float]) -> list[Floats]:
         """Return the residual of each equation along each motion, in the band of the motion."""
-        return [motion.inner(self.residual(motion, values)) for motion in self.motions]
+        return [motion.moving(self.residual(motion, values)) for motion in self.motions]
 
     def residual(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
         """Return the residual of each equation along one motion in its whole band, shape (n_equations, n_samples)."""
@@ -126,7 +127,7 @@ class EquationFit:
             Variance of each equation by noise of the sensors.
         """
         parts = zip(*(motion.forces(values) for motion in self.motions), strict=True)
-        filtered = [[m.inner(own) for m, own in zip(self.motions, part, strict=True)] for part in parts]
+        filtered = [[m.moving(own) for m, own in zip(self.motions, part, strict=True)] for part in parts]
         size = np.max([_rms(part) for part in filtered], axis=0)
         error = np.sqrt((LAW_ERROR * size) ** 2 + (0.0 if noise is None else noise))
         return np.asarray(np.maximum(error, _DEPENDENT * np.max(error)))
@@ -184,7 +185,7 @@ class EquationFit:
 
     def _influences(self, values: Mapping[str, float], weight: Floats) -> tuple[Floats, Floats]:
         """Return the derivatives of all residuals by the free numbers as columns of RMS one, and the RMS that they had."""
-        slopes = [motion.inner(self.slopes(motion, values)) / weight for motion in self.motions]
+        slopes = [motion.moving(self.slopes(motion, values)) / weight for motion in self.motions]
         matrix = np.concatenate([own.reshape(len(self.free), -1) for own in slopes], axis=1).T
         size = np.sqrt(np.mean(matrix**2, axis=0))
         size[size == 0.0] = 1.0
@@ -205,7 +206,7 @@ class EquationFit:
         weight = unit[:, None]
         # In the band of the motion that was measured: a changed one may have another.
         changes = [
-            before.inner(changed.residual(after, values) - self.residual(before, values)) / weight
+            before.moving(changed.residual(after, values) - self.residual(before, values)) / weight
             for before, after in zip(self.motions, changed.motions, strict=True)
         ]
         target = _joined(changes)

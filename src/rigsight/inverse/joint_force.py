@@ -16,16 +16,13 @@ from rigsight.effects import Effect, Place, kind_of
 from rigsight.effects import symbols as canonical
 from rigsight.effects.placed import ByIdentity
 from rigsight.identify.rig_equations import FUNCTIONS
-from rigsight.inverse.measured_motion import RecordMotion
+from rigsight.inverse.measured_motion import RecordMotion, speed_at_rest
 from rigsight.records import Record
 from rigsight.rigs import Joint, Rig, evaluated, rig_of_tables
 from rigsight.simulate import compose, simulate
 
 Floats = NDArray[np.float64]
 
-_AT_REST = 0.01
-"""Share of a large velocity (98th percentile) below which a velocity is noise and has no direction."""
-_LARGE = 98.0
 _ROUNDS = 60
 """Rounds in which friction and the load that it depends on settle; each shortens the difference by the friction coefficient."""
 _ACCURACY = 1e-7
@@ -60,7 +57,7 @@ class JointMotion:
     @cached_property
     def directed(self) -> Floats:
         """The velocity; where it is noise, small and in the direction of the motion before, until the next one begins."""
-        least = _AT_REST * float(np.percentile(np.abs(self.v), _LARGE))
+        least = speed_at_rest(self.v)
         signs = np.sign(self.v)
         moving = np.flatnonzero(np.abs(self.v) >= least)
         for left, right in pairwise(moving):

@@ -34,6 +34,10 @@ An assumption: at 1 the noise of the ends still dominates the rows of an arm, at
 """
 _SMALL = 1e-3
 """Change of a state, in units of its deviation, from which its influence on the equations is taken."""
+_AT_REST, _LARGE = 0.01, 98.0
+"""Share of a large velocity (98th percentile) below which a velocity is noise and has no direction."""
+_STILL = 0.5
+"""Share of the length of the filter from which on a coordinate stands still there."""
 _ABOVE = 1.2
 """Sampling rate of filtered rows, in units of twice the end of their band."""
 
@@ -197,6 +201,24 @@ class RecordMotion:
         n_end = min(max(1, int(_END / self.band)), rows.shape[-1] // 10)
         return self.filtered(rows)[..., n_end : rows.shape[-1] - n_end]
 
+    @cached_property
+    def counts(self) -> Floats:
+        """Weight of each inner row of an equation (n_equations or 1, n_rows), RMS one: zero where its coordinate stands still.
+
+        There dry friction holds any force up to its limit, and the equation says nothing. A prescribed motion leaves no such
+        force open.
+        """
+        n = self.equations.n_coordinates
+        speeds = np.abs(self.z[n : 2 * n])
+        moves = [speed >= speed_at_rest(speed) for speed in speeds] or [np.ones(self.record.n_samples)]
+        moving = self.inner(np.array(moves, dtype=np.float64)) > 1.0 - _STILL
+        moving |= ~np.any(moving, axis=1, keepdims=True)
+        return np.asarray(moving / np.sqrt(np.mean(moving, axis=1, keepdims=True)))
+
+    def moving(self, rows: Floats) -> Floats:
+        """Return inner filtered rows of equations (.., n_equations, n_samples) where these count, zero elsewhere."""
+        return np.asarray(self.inner(rows) * self.counts)
+
     def thinned(self, rows: Floats) -> Floats:
         """Return inner filtered rows at those samples only that are nearly independent."""
         return self.inner(rows)[..., :: self.stride]
@@ -205,6 +227,11 @@ class RecordMotion:
     def stride(self) -> int:
         """Samples from one of these to the next."""
         return max(1, int(1.0 / (_ABOVE * self.band)))
+
+
+def speed_at_rest(speed: Floats) -> float:
+    """Return the size up to which a speed along a record is noise and has no direction."""
+    return _AT_REST * float(np.percentile(np.abs(speed), _LARGE))
 
 
 def record_motion(rig: Rig, record: Record, values: Mapping[str, float]) -> RecordMotion | None:

@@ -130,15 +130,18 @@ class Selection:
         self.fit, self.values, self.terms = fit, values, terms
         rows, slopes, columns, stretch = [], [], [], []
         self.shapes: list[tuple[int, int]] = []
+        self.weights: list[Floats] = []
         unit = fit.tolerance(values, noise)[:, None]
         # Together all rows have RMS one, for the ridge of the regression.
         self.unit = unit = unit * np.sqrt(np.mean((fit.rms(values)[:, None] / unit) ** 2))
         per_record = max(1, round(2 * _STRETCHES / len(fit.motions)))
         for i, motion in enumerate(fit.motions):
+            weight = motion.counts[:, :: motion.stride] / unit
             own = motion.thinned(fit.residual(motion, values))
-            rows.append(np.ravel(own / unit))
-            slopes.append(_as_columns(motion.thinned(fit.slopes(motion, values)) / unit))
-            columns.append([_as_columns(term.columns[i] / unit) for term in terms])
+            rows.append(np.ravel(own * weight))
+            slopes.append(_as_columns(motion.thinned(fit.slopes(motion, values)) * weight))
+            columns.append([_as_columns(term.columns[i] * weight) for term in terms])
+            self.weights.append(weight)
             n_equations, n = own.shape
             self.shapes.append((n_equations, n))
             stretch.append(np.tile(i * per_record + (np.arange(n) * per_record) // n, n_equations))
@@ -178,7 +181,7 @@ class Selection:
 
     def with_added(self, rows: Sequence[Floats]) -> Selection:
         """Return the selection for records in which a further force acts: what `EffectTerms.acting` gives."""
-        own = np.concatenate([np.ravel(part / self.unit) for part in rows])
+        own = np.concatenate([np.ravel(w * part) for w, part in zip(self.weights, rows, strict=True)])
         added = copy(self)
         added.products = self.products.copy()
         for g in range(_STRETCHES):
@@ -229,14 +232,7 @@ class Selection:
             term = self.terms[i]
             columns = [*chosen, *self.places[i]]
             own = self._solved(self.whole, [*self.own, *columns])[-len(self.places[i]) :]
-            numbers = dict(zip(term.names, own / self.size[self.places[i]] * term.units, strict=False))
-            if all(
-                number >= 0.0 or not sided for sided, number in zip(term.one_sided, own, strict=True)
-            ) and all(
-                numbers[larger] >= numbers[smaller]
-                for larger, smaller in term.effect.ordered
-                if {larger, smaller} <= set(numbers)
-            ):
+            if term.allows(own / self.size[self.places[i]]):
                 yield i, self.remainder(columns)
 
     def selected(self, rig: Rig) -> list[tuple[Key, int, float]]:

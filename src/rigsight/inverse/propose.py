@@ -26,8 +26,8 @@ from rigsight.inverse.equation_fit import (
     EquationFit,
     held_numbers,
     identifiable,
-    of_undriven,
     record_motions,
+    undriven_inertias,
     with_all_inputs,
 )
 from rigsight.inverse.missing_force import missing_forces, noise_of_rows
@@ -170,7 +170,7 @@ def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit
     start = {p.name: p.default if p.default is not None else 1.0 for p in rig.parameters}
     start |= {**campaign.constants, **known}
     motions = record_motions(rig, campaign.estimation, start)
-    held |= of_undriven(motions, start)
+    held |= undriven_inertias(motions, start)
     free = identifiable(rig, motions, campaign.modelled, start, held)
     fit = EquationFit(rig, motions, campaign.modelled, free)
     return fit, fit.settled(start)[0]

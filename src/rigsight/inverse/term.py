@@ -28,6 +28,18 @@ class Term:
     columns: tuple[Floats, ...]
     one_sided: tuple[bool, ...]  # whether a coefficient cannot be negative
 
+    def allows(self, coefficients: Floats) -> bool:
+        """Return whether coefficients, shape (n_parts,), have the sign and order that the effect needs."""
+        if any(sided and own < 0.0 for sided, own in zip(self.one_sided, coefficients, strict=True)):
+            return False
+        numbers = {
+            name: own * unit for name, own, unit in zip(self.names, coefficients, self.units, strict=False)
+        }
+        if self.effect.holds_constant_force and sum(numbers.values()) < 0.0:
+            return False  # Beside a constant force friction may push one way, but not both.
+        pairs = [pair for pair in self.effect.ordered if set(pair) <= numbers.keys()]
+        return all(numbers[larger] >= numbers[smaller] for larger, smaller in pairs)
+
 
 @lru_cache(maxsize=256)
 def compiled(expression: sp.Expr, arguments: tuple[sp.Symbol, ...]) -> Callable[..., Floats]:

@@ -365,7 +365,10 @@ class Rig:
         return not self.mechanism.moves_inertia(joint_of(self, effect).motion)
 
     def _suits(self, effect: Effect) -> bool:
-        """Return False for an effect of a spring or of a mass at a joint that has none."""
+        """Return False for an effect of a spring or of a mass at a joint that has none, or of a position at a sensor of speed."""
+        if effect.place is Place.SENSOR and effect.wave_number is not None:
+            sensor = next(own for own in self.mechanism.sensors if own.name == self.acts_at(effect))
+            return not any(c.rate in sensor.reads.free_symbols for c in self.mechanism.coordinates)
         if effect.at is None or effect.place not in (Place.DYNAMICS, Place.DISTURBANCE):
             return True
         mechanism = self.mechanism

@@ -9,7 +9,7 @@ import pytest
 
 from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
-from rigsight.diagnose.verdict.families import families_at_places, shares_of_force
+from rigsight.diagnose.verdict.families import families_at_places, main_causes, shares_of_force
 from rigsight.diagnose.verdict.judgement import Judgement
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 from rigsight.effects import Family, effect_named
@@ -104,11 +104,16 @@ def test_a_force_that_no_family_removes_stays_unknown(reidentified, models) -> N
     assert named(before, proposal(cause("coulomb_friction", 0.45)), order, reidentified) is before
 
 
-def test_two_families_that_remove_as_much_leave_it_open(reidentified, models) -> None:
-    order = ranking((models["cubic_stiffness"], 0.5), (models["coulomb_friction"], 0.5))
+def test_of_two_families_that_remove_as_much_the_more_probable_one_is_named_with_its_probability(
+    reidentified, models
+) -> None:
+    order = ranking((models["cubic_stiffness"], 0.6), (models["coulomb_friction"], 0.4))
     before = Judgement("unknown", reidentified, "")
     seen = proposal(cause("coulomb_friction", 0.8), cause("cubic_stiffness", 0.8))
-    assert named(before, seen, order, reidentified) is before
+    found = named(before, seen, order, reidentified)
+    assert found.model.names == ("cubic_stiffness",)
+    main = main_causes(AXIS, reidentified, list(zip(order.order, (0.6, 0.4), strict=True)), np.ones(1), seen)
+    assert main[Family.SPRING_LAW, "dynamics"] == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_named_family_is_kept_where_the_motion_names_it_too(reidentified, models) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -98,9 +100,10 @@ def test_a_family_that_explains_the_force_along_the_motion_is_more_probable(scor
     seen = ProposedCause(effect_named("coulomb_friction"), Family.DRY_FRICTION, "dynamics", 0.5, {})
     proposal = Proposal((seen,), (seen,), frozenset({"coulomb_friction", "cubic_stiffness"}), 0.5, by_chance)
     rng = np.random.default_rng(1)
-    found = families_at_places(
-        AXIS, scored((), residuals=GAP), models[0][0], models, 1.0, np.ones(1), rng, proposal
-    )
+    equations = scored((), residuals=GAP)
+    # Both fits lower the cost: effects of no size would not count.
+    equations = replace(equations, fit=replace(equations.fit, cost=100.0 * equations.fit.cost))
+    found = families_at_places(AXIS, equations, models[0][0], models, 1.0, np.ones(1), rng, proposal)
     by_family = {own.family: own for own in found}
     friction, spring = by_family[Family.DRY_FRICTION], by_family[Family.SPRING_LAW]
     of_law = SEARCH.law_error**2

@@ -43,7 +43,7 @@ class FamilyNumbers:
     probable: float = number(
         0.5,
         "convention",
-        "Probability from which a family is named by the motion: it is more probable than all others together.",
+        "Probability from which a further family of a model is named: it is more probable than not.",
     )
     listed: float = number(
         0.01,

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.policy import FAMILIES, VERDICT
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.verdict.families import keys_of, main_causes
 from rigsight.diagnose.verdict.judgement import Judgement
-from rigsight.diagnose.verdict.plausibility import has_size_of_zero
+from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
@@ -42,14 +42,14 @@ def by_motion(
     noise: NDArray[np.float64],
     proposal: Proposal | None,
 ) -> Judgement:
-    """Return the judgement with the family that the motion names, where it is another one and more probable than all others."""
+    """Return the judgement with the most probable family, where it is another one and explains most of the missing force."""
     if proposal is None:
         return judgement
     shares = [grounds.share for grounds in ranking.grounds]
     main = main_causes(rig, reidentified, list(zip(ranking.order, shares, strict=True)), noise, proposal)
     key = max(main, key=lambda own: main[own], default=None)
     along = {(cause.family, cause.where): cause.share for cause in proposal.alone}
-    if key is None or main[key] < FAMILIES.probable or along.get(key, 0.0) < VERDICT.larger_part:
+    if key is None or along.get(key, 0.0) < VERDICT.larger_part:
         return judgement
     if judgement.verdict == "effect" and key in keys_of(rig, judgement.model.effects):
         return judgement
@@ -58,7 +58,7 @@ def by_motion(
         for model in ranking.order
         if model.residuals
         and keys_of(rig, model.effects) == (key,)
-        and not has_size_of_zero(model, [reidentified, *ranking.order])
+        and stands(model, reidentified, ranking.order)
     ]
     if not forms:
         return judgement

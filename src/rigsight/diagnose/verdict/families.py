@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import FAMILIES, SEARCH
+from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal
 from rigsight.rigs import Rig
@@ -127,7 +128,7 @@ def families_at_places(
     own_keys = keys_of(rig, diagnosed.effects)
     of_sets = {key_set: [i for i, own in enumerate(keys) if own == key_set] for key_set in set(keys)}
     causes = {} if proposal is None else {(c.family, c.where): c for c in proposal.alone}
-    main = _weighed(keys, [own[2] for own in usable], explained, proposal)
+    main = _weighed(rig, reidentified, models, [own[2] for own in usable], explained, proposal)
     found = []
     for key in dict.fromkeys(itertools.chain(own_keys, *keys)):
         members = [i for i, own in enumerate(keys) if key in own]
@@ -192,8 +193,8 @@ def main_causes(
         return {}
     squares = squared_errors([reidentified.residuals, *(model.residuals for model, _ in usable)], noise)
     explained = np.asarray(1.0 - squares.mean[1:] / squares.mean[0])
-    keys = [frozenset(keys_of(rig, model.effects)) for model, _ in usable]
-    return _weighed(keys, [share for _, share in usable], explained, proposal)
+    models, shares = [model for model, _ in usable], [share for _, share in usable]
+    return _weighed(rig, reidentified, models, shares, explained, proposal)
 
 
 def probable_part(
@@ -218,7 +219,9 @@ def probable_part(
 
 
 def _weighed(
-    keys: Sequence[frozenset[Key]],
+    rig: Rig,
+    reidentified: FittedModel,
+    models: Sequence[FittedModel],
     of_rank: Sequence[float],
     explained: NDArray[np.float64],
     proposal: Proposal | None,
@@ -227,18 +230,23 @@ def _weighed(
 
     A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
     number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
-    the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap.
+    the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap. The
+    motion says nothing of a family all of whose fits end at a size of zero.
     """
     counts = float(np.clip(np.max(explained, initial=0.0), 0.0, 1.0))
+    keys = [frozenset(keys_of(rig, model.effects)) for model in models]
+    standing = [own for model, own in zip(models, keys, strict=True) if stands(model, reidentified, models)]
     of_motion: dict[Key, float] = {}
     if proposal is not None:
         per_share = FAMILIES.per_motion * (1.0 - proposal.by_chance)
-        of_motion = {(own.family, own.where): _evidence(own.share, 0.0, per_share) for own in proposal.alone}
+        alone = [own for own in proposal.alone if any((own.family, own.where) in key for key in standing)]
+        of_motion = {(own.family, own.where): _evidence(own.share, 0.0, per_share) for own in alone}
     weights = {}
     for key in dict.fromkeys(itertools.chain(*map(sorted, keys))):
         share = math.fsum(own for own, having in zip(of_rank, keys, strict=True) if key in having)
-        alone = [float(e) for e, having in zip(explained, keys, strict=True) if having == {key}]
-        simulated = max(alone, default=0.0)
+        simulated = max(
+            (float(e) for e, having in zip(explained, keys, strict=True) if having == {key}), default=0.0
+        )
         weights[key] = max(share, FAMILIES.least_rank) ** counts * math.exp(
             _evidence(simulated, 0.0, FAMILIES.per_simulation) + of_motion.get(key, 0.0)
         )

@@ -80,6 +80,11 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     return any(map(is_zero, model.effects))
 
 
+def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[FittedModel]) -> bool:
+    """Return True for a model whose effects have a size, compared with the equations and the other models."""
+    return not has_size_of_zero(model, [reidentified, *models])
+
+
 def is_beyond_records(model: FittedModel, scales: Mapping[str, float]) -> bool:
     """Return True if an effect is periodic in the position with a wave longer than the motion shows: it is another spring."""
 

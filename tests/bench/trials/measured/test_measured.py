@@ -144,7 +144,6 @@ def test_an_encoder_never_reads_backwards(base: Base, campaign: Campaign) -> Non
         spiked(base, spot, steep, campaign.records[0])
 
 
-
 @pytest.mark.parametrize("kind", ADDED)
 def test_a_changed_record_is_one_of_the_rig_with_the_effect(
     campaign: Campaign, base: Base, kind: str

@@ -18,9 +18,9 @@ from rigsight.inverse import (
     RecordMotion,
     held_numbers,
     identifiable,
-    of_undriven,
     record_motions,
     size_in,
+    undriven_inertias,
     with_all_inputs,
 )
 from rigsight.records import Record
@@ -129,7 +129,7 @@ def base_of(campaign: Campaign) -> Base:
     start = {p.name: p.default if p.default is not None else 1.0 for p in rig.parameters} | known
     motions = record_motions(rig, campaign.estimation, known)
     # An equation that no drive enters is solved by zeros: noise would pull its numbers there.
-    held |= of_undriven(motions, start)
+    held |= undriven_inertias(motions, start)
     undriven = sorted(name for name in held if name not in known and name in start and start[name] != 0.0)
     if undriven:
         raise SimulationError(f"The campaign does not give {', '.join(undriven)}.")
