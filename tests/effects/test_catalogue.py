@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import rigsight.effects
-from rigsight.effects import CATALOGUE, Effect, Energy, GainTrend, Place, effect_named
+from rigsight.effects import CATALOGUE, Effect, Energy, GainTrend, Place, effect_named, placed
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS, RIGS
 from rigsight.simulate import compose, simulate
@@ -140,3 +140,9 @@ def test_units_render_on_every_rig_that_offers_the_effect(effect, rig):
 def test_unknown_effect_names_the_nearest():
     with pytest.raises(InputError, match="Did you mean 'coulomb_friction'"):
         effect_named("colomb_friction")
+
+
+def test_an_encoder_of_speed_has_no_error_over_position() -> None:
+    car, eccentric = RIGS["quarter_car"], effect_named("encoder_eccentricity")
+    assert car.offers(placed(eccentric, "travel"))
+    assert not car.offers(placed(eccentric, "body"))

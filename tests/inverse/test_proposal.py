@@ -14,6 +14,7 @@ from rigsight.diagnose import candidates_on
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.symbols import v
 from rigsight.inverse import Proposal, propose
+from rigsight.inverse.term import Term
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate
@@ -74,6 +75,41 @@ def test_friction_is_found_at_its_joint() -> None:
     friction = effect_named("coulomb_friction@motor_bearing")
     found = proposed(campaign(rig, {**TRAIN, "T_c": 0.02}, [friction], (0.8, 1.5)))
     assert (found.taken[0].family, found.taken[0].where) == ("dry_friction", "motor_bearing")
+
+
+def test_friction_that_holds_a_mass_at_rest_does_not_hide_itself() -> None:
+    """At rest friction is any force up to its limit: these rows would speak against every law."""
+    values, rng = {**AXIS_VALUES, "k": 0.0, "T_c": 3.0}, np.random.default_rng(0)
+    structure = compose(AXIS, [effect_named("coulomb_friction")])
+    records = []
+    for i in range(2):
+        wave = np.sin(np.pi * T + i)
+        pulses = 8.0 * np.sign(wave) * (np.abs(wave) > 0.6) + 2.0 * np.sin(1.3 * T)
+        run = simulate(structure, values, Record(f"run {i}", DT, {"u": pulses}, {}, hold="foh"))
+        records.append(run.with_signals(x=run["x"] + 1e-4 * rng.standard_normal(T.size)))
+    found = proposed(Campaign("test", AXIS, {"gain": 1.0}, {"m": 1.0, "d": 4.0, "k": 0.0}, tuple(records)))
+    assert (found.taken[0].family, found.alone[0].family) == ("dry_friction", "dry_friction")
+    assert found.alone[0].share > 0.9
+    assert found.taken[0].values["T_c"] == pytest.approx(3.0, rel=0.1)
+    assert found.numbers["m"] == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_wrong_spring_between_two_masses_is_fitted_and_no_cause() -> None:
+    rig = RIGS["drive_train"]
+    own = campaign(rig, TRAIN, [], (0.8, 1.5))
+    found = propose(
+        own, {**own.constants, **own.given, "k_s": 1.6, "d_s": 3e-3}, candidates_on(rig, CATALOGUE)
+    )
+    assert found is not None
+    assert found.taken == ()
+    assert found.numbers["k_s"] == pytest.approx(TRAIN["k_s"], rel=0.02)
+
+
+def test_friction_beside_a_constant_force_does_not_drive_both_ways() -> None:
+    effect = effect_named("directional_friction")
+    term = Term(effect, {}, ("T_fwd", "T_bwd"), (1.0, 1.0), (), (False, False))
+    assert term.allows(np.array([-1.0, 2.0]))
+    assert not term.allows(np.array([-1.0, -2.0]))
 
 
 @pytest.mark.parametrize(
