@@ -50,10 +50,10 @@ class NamedByMotion:
     def found(self) -> list[FittedModel]:
         """Return the models of several effects and their parts."""
         models = self._begun()
-        taken_apart = set[tuple[str, ...]]()
+        taken_apart = set[frozenset[Key]]()
         # A fit that ends lower than the best one so far may have causes that the others make needless, too.
-        while models and (best := min(models, key=_error)).names not in taken_apart:
-            taken_apart.add(best.names)
+        while models and (keys := self._keys(best := min(models, key=_error))) not in taken_apart:
+            taken_apart.add(keys)
             larger, parts = self._reduced(best)
             model = larger[-1]
             if len(model.effects) < 2:
@@ -115,7 +115,7 @@ class NamedByMotion:
 
     def _new(self, proposal: Proposal, model: FittedModel) -> list[ProposedCause]:
         """Return the causes that were taken of families that a model does not have at their places."""
-        known = set(map(self._key, model.effects))
+        known = self._keys(model)
         return [cause for cause in proposal.taken if (cause.family, cause.where) not in known]
 
     def _is_worth(self, larger: FittedModel, model: FittedModel) -> bool:
@@ -124,6 +124,9 @@ class NamedByMotion:
 
     def _key(self, effect: Effect) -> Key:
         return effect.family, self.context.rig.where(effect)
+
+    def _keys(self, model: FittedModel) -> frozenset[Key]:
+        return frozenset(map(self._key, model.effects))
 
     def _parts(self, model: FittedModel) -> list[FittedModel]:
         """Return a model without each of its effects, fitted from where the others are in it."""
