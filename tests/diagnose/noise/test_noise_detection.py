@@ -278,6 +278,24 @@ def test_a_floor_from_rest_has_an_interval_that_holds_the_truth() -> None:
     assert 0.7 * SIGMA < low < SIGMA < high < 1.3 * SIGMA
 
 
+def test_a_filtered_output_counts_no_more_than_the_others() -> None:
+    """Only the top of the spectrum is seen, and a filter has taken the noise of one output away there."""
+    t, rng = DT * np.arange(4000), np.random.default_rng(5)
+    signals = {
+        "tau_m": np.sin(2.0 * np.pi * (0.2 + 0.1 * t) * t),
+        "phi_m": np.sin(2.0 * np.pi * 0.5 * t) + 1e-4 * rng.standard_normal(t.size),
+        "phi_l": 0.1 * np.sin(2.0 * np.pi * 0.5 * t + 0.2),
+    }
+    rig = RIGS["drive_train"]
+    names = dict(zip(signals, [s.name for s in (*rig.inputs, *rig.outputs)], strict=True))
+    record = Record("r", DT, {names[name]: signal for name, signal in signals.items()}, {})
+    motor, load = noise_floors(rig, [record])
+    assert motor.lower_bound
+    assert load.lower_bound
+    assert load.std == pytest.approx(0.1 * motor.std, rel=0.01)
+    assert load.interval == (load.std, np.inf)
+
+
 def test_of_a_lower_bound_nobody_knows_the_upper_limit() -> None:
     rng = np.random.default_rng(6)
     u = multisine(4000, rng)

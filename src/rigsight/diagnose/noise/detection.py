@@ -12,6 +12,7 @@ to that floor.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,8 +36,12 @@ _WHITE_ONLY = "top of the spectrum (white noise only)"
 def noise_floors(
     rig: Rig, records: Sequence[Record], drifts: bool = False, at_rest: bool = True
 ) -> tuple[NoiseFloor, ...]:
-    """Return the noise floor of every output that the records hold."""
-    floors = []
+    """Return the noise floor of every output that the records hold.
+
+    A lower bound must not decide which output counts: a filter may have taken the noise away from one of them. So lower bounds
+    have the same share of what their outputs read, the largest.
+    """
+    floors, sizes = list[NoiseFloor](), list[float]()
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]
         if holding:
@@ -55,7 +60,13 @@ def noise_floors(
                     stretches=stretches,
                 )
             )
-    return tuple(floors)
+            sizes.append(size)
+    shares = [floor.std / size for floor, size in zip(floors, sizes, strict=True) if floor.lower_bound]
+    least = max(shares, default=0.0)
+    return tuple(
+        replace(floor, std=least * size, interval=(least * size, np.inf)) if floor.lower_bound else floor
+        for floor, size in zip(floors, sizes, strict=True)
+    )
 
 
 def _interval(
