@@ -184,3 +184,12 @@ def test_a_separation_far_above_the_noise_is_not_told_as_a_number(
     (sentence,) = advice_sentences(far)
     assert "9364682" not in sentence
     assert "100" in sentence
+
+
+def test_effects_at_several_places_are_each_called_with_their_own(
+    variant: Callable[[str], Diagnosis],
+) -> None:
+    found = replace(
+        variant("effect"), effects=("quadratic_damping", "time_shift@gyro"), where=("bearing", "gyro")
+    )
+    assert "quadratic damping at bearing and time shift at gyro" in verdict_sentence(found)

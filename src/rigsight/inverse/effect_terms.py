@@ -64,7 +64,12 @@ class EffectTerms:
         self._of_lateness: dict[tuple[str, float], tuple[Floats, ...] | None] = {}
 
     def of(self, effect: Effect) -> Iterator[Term]:
-        """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term."""
+        """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term.
+
+        What one of more sensors than the motion needs does wrong shows beside the others, not in the equations.
+        """
+        if effect.place is Place.SENSOR and self._is_redundant:
+            return
         if is_late(effect):
             yield from self._of_late(effect)
         elif effect.place is Place.SENSOR:
@@ -140,6 +145,11 @@ class EffectTerms:
         found = [m.thinned(own) for m, own in zip(self.fit.motions, rows, strict=True) if own is not None]
         finite = len(found) == len(rows) and all(np.all(np.isfinite(own)) for own in found)
         return tuple(found) if finite else None
+
+    @property
+    def _is_redundant(self) -> bool:
+        n = self.fit.motions[0].equations.n_coordinates
+        return n > 0 and any(len(motion.sensors) > n for motion in self.fit.motions)
 
     @cached_property
     def _by_motion(self) -> list[Floats]:

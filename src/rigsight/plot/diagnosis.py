@@ -152,7 +152,7 @@ def gap_budget(
         ax.set_title((labels or {}).get(output, output), pad=14)
         ax.grid(axis="x")
     axes[-1].set_xlabel("gap [% of the measured RMS]")
-    names = ["Given simulation", "Re-identified", after_label]
+    names = ["Refitting its parameters" if is_given else "Identified", after_label]
     set_margins(figure, 0.14 + text_width(names, _NAMES), 0.1, 0.48, 0.42, between=(0.0, 0.66))
     return figure
 

@@ -198,9 +198,7 @@ def _first(diagnosis: Diagnosis) -> str:
 
 
 def _effect_sentence(diagnosis: Diagnosis) -> str:
-    # An effect of a rig with several places is called with its place.
-    named = [w for e, w in zip(diagnosis.effects, diagnosis.where, strict=False) if AT not in e]
-    places = listed(dict.fromkeys(map(place_label, named)))
+    cause = _cause_label(diagnosis)
     sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
     it = "them" if len(diagnosis.effects) > 1 else "it"
     refitted, after = error_over_noise(diagnosis, "reidentified"), error_over_noise(diagnosis, "after")
@@ -210,15 +208,27 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
         sure = "mainly, most likely," if diagnosis.ambiguous_with else "mainly"
         share = percent(max(own.share for own in diagnosis.families))
         return (
-            f"The force that the equations lack along the measured motion is {sure} that of {effects_label(diagnosis.effects)}"
-            f"{' ' if places else ''}{places}: it explains {share} of the square of that force. Simulated, adding {it} "
+            f"The force that the equations lack along the measured motion is {sure} that of {cause}: "
+            f"it explains {share} of the square of that force. Simulated, adding {it} "
             f"{_shrinks(refitted, after, of)}; with {it} {times_floor(after)} remains."
         )
     if _leaves_more(diagnosis):
         sure = "mainly caused, most likely," if diagnosis.ambiguous_with else "mainly caused"
     return (
-        f"The gap is {sure} by {effects_label(diagnosis.effects)}{' ' if places else ''}{places}; "
-        f"adding {it} {_shrinks(refitted, after, of)}, down to {times_floor(after)}."
+        f"The gap is {sure} by {cause}; adding {it} {_shrinks(refitted, after, of)}, "
+        f"down to {times_floor(after)}."
+    )
+
+
+def _cause_label(diagnosis: Diagnosis) -> str:
+    """Return the named effects with their places, once for effects that all have none in their names."""
+    pairs = list(zip(diagnosis.effects, diagnosis.where, strict=False))
+    if not any(AT in effect for effect, _ in pairs):
+        places = listed(dict.fromkeys(place_label(where) for _, where in pairs))
+        return f"{effects_label(diagnosis.effects)}{' ' if places else ''}{places}"
+    return listed(
+        effect_label(effect) if AT in effect else f"{effect_label(effect)} {place_label(where)}"
+        for effect, where in pairs
     )
 
 

@@ -267,16 +267,24 @@ def known_constant_forces(
 def candidates_on(rig: Rig, effects: Iterable[Effect], modelled: Iterable[Effect] = ()) -> list[Effect]:
     """Return effects at the places of a rig, in the order of the effects, without those that the simulation has already.
 
-    An effect that has a place keeps it. On one mass or one element each effect has only one place, so its name needs no place.
+    An effect that has a place keeps it. On one mass or one element each effect has only one place, so its name needs no place;
+    only of several sensors the further ones are named.
     """
     there = {effect.name for effect in modelled}
     found = []
     for effect in effects:
-        if rig.has_one_motion or effect.at is not None:
+        if effect.at is not None:
             found.append(effect)
+        elif rig.has_one_motion:
+            found += [effect, *(placed(effect, place) for place in _further_sensors(rig, effect))]
         else:
             found += [placed(effect, place) for place in _places(rig, effect)]
     return [effect for effect in found if rig.offers(effect) and effect.name not in there]
+
+
+def _further_sensors(rig: Rig, effect: Effect) -> tuple[str, ...]:
+    """Return the sensors of the one motion beside the first; others have effects of what follows the motion."""
+    return rig.motion_alone().places(Place.SENSOR)[1:] if effect.place is Place.SENSOR else ()
 
 
 def _places(rig: Rig, effect: Effect) -> tuple[str, ...]:
