@@ -1,4 +1,4 @@
-"""One motion that two sensors read: what the second one does wrong is a candidate, and the motion of the first does not judge it."""
+"""One motion that two sensors read: what the second one does wrong is a candidate, and the equations do not judge it."""
 
 from __future__ import annotations
 

@@ -17,7 +17,6 @@ import numpy as np
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.several.one_more_effect import with_one_more
 from rigsight.diagnose.search.several.parts import each_once, part_of, reduced, with_causes
 from rigsight.diagnose.search.several.together import Together
@@ -86,7 +85,8 @@ class NamedByMotion:
         if best.error_over_noise <= self.settled:
             # What remains is of the size of what laws err: more digits of the others would not tell them apart.
             return each_once([*refine(self.context, [best]), *others])
-        return in_lowest_basins(self.context, refine(self.context, each_once([best, *others])))
+        # No other starts are tried: those along the motion are the lowest of all.
+        return each_once(refine(self.context, each_once([best, *others])))
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
         """Yield the causes that the motion names, where they explain more, then with each further one that lowers the error."""
