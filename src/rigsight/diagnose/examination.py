@@ -30,9 +30,9 @@ from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
 from rigsight.diagnose.verdict.main_cause import main_cause
 from rigsight.diagnose.verdict.plausibility import (
     doubts,
-    has_size_of_zero,
     is_beyond_records,
     plausible_first,
+    stands,
 )
 from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
 from rigsight.effects import Effect
@@ -180,9 +180,10 @@ def _ranked(
     fitted = [*singles, *several]
     candidates: list[FittedModel] = []
     not_shown: list[FittedModel] = []
+    duration = max(record.duration for record in context.records)
     for model in fitted:
-        is_shown = not (
-            has_size_of_zero(model, [reidentified, *fitted]) or is_beyond_records(model, context.scales)
+        is_shown = stands(model, reidentified, fitted) and not is_beyond_records(
+            model, context.scales, duration
         )
         (candidates if is_shown else not_shown).append(model)
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)

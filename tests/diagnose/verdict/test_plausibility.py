@@ -90,15 +90,21 @@ def test_a_model_that_is_far_worse_or_elsewhere_does_not(models, scored) -> None
     assert plausible_first(ranked(stribeck, lag, worse), reidentified, PLACES).order[0] is stribeck
 
 
-@pytest.mark.parametrize(("wave_number", "beyond"), [(3.0, True), (6.0, False)])
-def test_a_wave_of_which_the_motion_shows_less_than_one_and_a_half_periods_is_no_ripple(
-    scored, wave_number: float, beyond: bool
+@pytest.mark.parametrize(
+    ("effect", "values", "beyond"),
+    [
+        # Less than one and a half periods of a ripple lie in the motion.
+        ("torque_ripple", {"T_sin": 1.0, "T_cos": 0.1, "kappa": 3.0}, True),
+        ("torque_ripple", {"T_sin": 1.0, "T_cos": 0.1, "kappa": 6.0}, False),
+        ("maxwell_branch", {"k_m": 1.0, "tau_m": 30.0}, True),
+        ("maxwell_branch", {"k_m": 1.0, "tau_m": 3.0}, False),
+        ("flexible_mode", {"m_a": 78000.0, "w_a": 0.2, "zeta_a": 0.1}, True),
+        ("presliding_friction", {"T_c": 1.0, "x_p": 20900.0}, True),
+        ("coulomb_friction", {"T_c": 1.0}, False),
+    ],
+)
+def test_what_is_slower_or_longer_than_the_records_is_no_candidate(
+    scored, effect: str, values: dict[str, float], beyond: bool
 ) -> None:
-    values = {"T_sin": 1.0, "T_cos": 0.1, "kappa": wave_number}
-    model = with_numbers(scored(("torque_ripple",)), values, dict.fromkeys(values, 0.1))
-    assert is_beyond_records(model, {"x": 1.0}) is beyond
-    assert not is_beyond_records(model_without_waves(scored), {"x": 1.0})
-
-
-def model_without_waves(scored) -> FittedModel:
-    return with_numbers(scored(("coulomb_friction",)), {"T_c": 1.0}, {"T_c": 0.1})
+    model = with_numbers(scored((effect,)), values, dict.fromkeys(values, 0.1))
+    assert is_beyond_records(model, {"x": 1.0, "time": 1.0}, 20.0) is beyond

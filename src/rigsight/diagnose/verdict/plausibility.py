@@ -15,6 +15,7 @@ from rigsight.diagnose.search.basins import is_lower
 from rigsight.diagnose.search.starts import ENDLESS
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.effects import Effect, placed_dimension
+from rigsight.parameters import Parameter
 from rigsight.units import characteristic_value
 
 _AT_BOUND = 1e-6
@@ -85,19 +86,31 @@ def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[Fitte
     return not has_size_of_zero(model, [reidentified, *models])
 
 
-def is_beyond_records(model: FittedModel, scales: Mapping[str, float]) -> bool:
-    """Return True if an effect is periodic in the position with a wave longer than the motion shows: it is another spring."""
+def is_beyond_records(model: FittedModel, scales: Mapping[str, float], duration: float) -> bool:
+    """Return True if an effect is slower, longer or coarser than the records can show: it is another spring.
 
-    def is_too_long(effect: Effect) -> bool:
-        wave = next((p for p in effect.parameters if p.name == effect.wave_number), None)
-        if wave is None:
-            return False
-        fitted = model.fit.values[model.fit.structure.parameter_name(effect, wave.name)]
-        return fitted < wave.search[0] * characteristic_value(
-            placed_dimension(effect, wave.dimension), scales
-        )
+    Its wave is longer than the motion, a time constant or a period longer than every record [s], or the length over which it
+    yields beyond its search.
+    """
+    fit = model.fit
 
-    return any(map(is_too_long, model.effects))
+    def is_too_long(effect: Effect, parameter: Parameter) -> bool:
+        value = fit.values[fit.structure.parameter_name(effect, parameter.name)]
+        if parameter.dimension == "time":
+            return value > duration
+        if parameter.dimension == "time^-1":
+            return value * duration < 2.0 * math.pi
+        size = characteristic_value(placed_dimension(effect, parameter.dimension), scales)
+        if parameter.name == effect.wave_number:
+            return value < parameter.search[0] * size
+        return parameter.dimension == "x" and value > parameter.search[1] * size
+
+    return any(
+        is_too_long(effect, parameter)
+        for effect in model.effects
+        for parameter in effect.parameters
+        if parameter.fitted and parameter.null is None
+    )
 
 
 def _is_within_errors(model: FittedModel, effect: Effect) -> bool:
