@@ -52,9 +52,9 @@ class NamedByMotion:
         taken_apart = set[frozenset[Key]]()
         # A fit that ends lower than the best one so far may have causes that the others make needless, too.
         while models and (keys := self._keys(best := min(models, key=_error))) not in taken_apart:
-            taken_apart.add(keys)
             larger, parts = self._reduced(best)
             model = larger[-1]
+            taken_apart |= {keys, self._keys(model)}
             if len(model.effects) < 2:
                 return []
             pairs = zip(model.effects, parts, strict=True)
