@@ -109,7 +109,7 @@ def is_beyond_records(model: FittedModel, scales: Mapping[str, float], duration:
         is_too_long(effect, parameter)
         for effect in model.effects
         for parameter in effect.parameters
-        if parameter.fitted and parameter.null is None
+        if parameter.null is None and fit.structure.parameter_name(effect, parameter.name) in fit.free
     )
 
 
