@@ -101,7 +101,19 @@ def test_a_fit_that_ends_at_no_friction_is_not_named(reidentified, models) -> No
 def test_a_force_that_no_family_removes_stays_unknown(reidentified, models) -> None:
     order = ranking(*((model, 1.0 / 3.0) for model in models.values()))
     before = Judgement("unknown", reidentified, "")
-    assert named(before, proposal(cause("coulomb_friction", 0.45)), order, reidentified) is before
+    seen = proposal(cause("coulomb_friction", 0.2))
+    assert named(before, seen, order, reidentified) is before
+
+
+def test_a_family_that_is_more_probable_than_not_is_named_although_it_removes_less_than_half(
+    reidentified, models
+) -> None:
+    order = ranking(*((model, 1.0 / 3.0) for model in models.values()))
+    before = Judgement("unknown", reidentified, "")
+    seen = proposal(cause("coulomb_friction", 0.47))
+    found = named(before, seen, order, reidentified)
+    assert found.verdict == "effect"
+    assert "47%" in found.reason
 
 
 def test_of_two_families_that_remove_as_much_the_more_probable_one_is_named_with_its_probability(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.policy import FAMILIES, VERDICT
 from rigsight.diagnose.verdict.families import keys_of, main_causes
 from rigsight.diagnose.verdict.judgement import Judgement
 from rigsight.diagnose.verdict.plausibility import stands
@@ -42,14 +42,19 @@ def by_motion(
     noise: NDArray[np.float64],
     proposal: Proposal | None,
 ) -> Judgement:
-    """Return the judgement with the most probable family, where it is another one and explains most of the missing force."""
+    """Return the judgement with the most probable family, where it is another one.
+
+    It is more probable than not, or explains the larger part of the missing force.
+    """
     if proposal is None:
         return judgement
     shares = [grounds.share for grounds in ranking.grounds]
     main = main_causes(rig, reidentified, list(zip(ranking.order, shares, strict=True)), noise, proposal)
     key = max(main, key=lambda own: main[own], default=None)
     along = {(cause.family, cause.where): cause.share for cause in proposal.alone}
-    if key is None or along.get(key, 0.0) < VERDICT.larger_part:
+    share = 0.0 if key is None else along.get(key, 0.0)
+    is_probable = key is not None and main[key] >= FAMILIES.probable and share > proposal.by_chance
+    if key is None or not (is_probable or share >= VERDICT.larger_part):
         return judgement
     if judgement.verdict == "effect" and key in keys_of(rig, judgement.model.effects):
         return judgement
