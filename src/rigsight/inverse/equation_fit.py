@@ -103,7 +103,7 @@ class EquationFit:
 
     def rows(self, values: Mapping[str, float]) -> list[Floats]:
         """Return the residual of each equation along each motion, in the band of the motion."""
-        return [motion.moving(self.residual(motion, values)) for motion in self.motions]
+        return [motion.where_moving(self.residual(motion, values)) for motion in self.motions]
 
     def residual(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
         """Return the residual of each equation along one motion in its whole band, shape (n_equations, n_samples)."""
@@ -127,7 +127,9 @@ class EquationFit:
             Variance of each equation by noise of the sensors.
         """
         parts = zip(*(motion.forces(values) for motion in self.motions), strict=True)
-        filtered = [[m.moving(own) for m, own in zip(self.motions, part, strict=True)] for part in parts]
+        filtered = [
+            [m.where_moving(own) for m, own in zip(self.motions, part, strict=True)] for part in parts
+        ]
         size = np.max([_rms(part) for part in filtered], axis=0)
         error = np.sqrt((LAW_ERROR * size) ** 2 + (0.0 if noise is None else noise))
         return np.asarray(np.maximum(error, _DEPENDENT * np.max(error)))
@@ -185,7 +187,7 @@ class EquationFit:
 
     def _influences(self, values: Mapping[str, float], weight: Floats) -> tuple[Floats, Floats]:
         """Return the derivatives of all residuals by the free numbers as columns of RMS one, and the RMS that they had."""
-        slopes = [motion.moving(self.slopes(motion, values)) / weight for motion in self.motions]
+        slopes = [motion.where_moving(self.slopes(motion, values)) / weight for motion in self.motions]
         matrix = np.concatenate([own.reshape(len(self.free), -1) for own in slopes], axis=1).T
         size = np.sqrt(np.mean(matrix**2, axis=0))
         size[size == 0.0] = 1.0
@@ -206,7 +208,7 @@ class EquationFit:
         weight = unit[:, None]
         # In the band of the motion that was measured: a changed one may have another.
         changes = [
-            before.moving(changed.residual(after, values) - self.residual(before, values)) / weight
+            before.where_moving(changed.residual(after, values) - self.residual(before, values)) / weight
             for before, after in zip(self.motions, changed.motions, strict=True)
         ]
         target = _joined(changes)

@@ -35,9 +35,9 @@ An assumption: at 1 the noise of the ends still dominates the rows of an arm, at
 _SMALL = 1e-3
 """Change of a state, in units of its deviation, from which its influence on the equations is taken."""
 _AT_REST, _LARGE = 0.01, 98.0
-"""Share of a large velocity (98th percentile) below which a velocity is noise and has no direction."""
-_STILL = 0.5
-"""Share of the length of the filter from which on a coordinate stands still there."""
+"""Share of a large velocity (98th percentile) below which a velocity is noise and has no direction (an assumption)."""
+_MOVES = 0.5
+"""Share of the length of the filter in which a coordinate must move for its row to count: most of it (a convention)."""
 _ABOVE = 1.2
 """Sampling rate of filtered rows, in units of twice the end of their band."""
 
@@ -202,7 +202,7 @@ class RecordMotion:
         return self.filtered(rows)[..., n_end : rows.shape[-1] - n_end]
 
     @cached_property
-    def counts(self) -> Floats:
+    def row_weights(self) -> Floats:
         """Weight of each inner row of an equation (n_equations or 1, n_rows), RMS one: zero where its coordinate stands still.
 
         There dry friction holds any force up to its limit, and the equation says nothing. A prescribed motion leaves no such
@@ -211,13 +211,13 @@ class RecordMotion:
         n = self.equations.n_coordinates
         speeds = np.abs(self.z[n : 2 * n])
         moves = [speed >= speed_at_rest(speed) for speed in speeds] or [np.ones(self.record.n_samples)]
-        moving = self.inner(np.array(moves, dtype=np.float64)) > 1.0 - _STILL
+        moving = self.inner(np.array(moves, dtype=np.float64)) > _MOVES
         moving |= ~np.any(moving, axis=1, keepdims=True)
         return np.asarray(moving / np.sqrt(np.mean(moving, axis=1, keepdims=True)))
 
-    def moving(self, rows: Floats) -> Floats:
-        """Return inner filtered rows of equations (.., n_equations, n_samples) where these count, zero elsewhere."""
-        return np.asarray(self.inner(rows) * self.counts)
+    def where_moving(self, rows: Floats) -> Floats:
+        """Return inner filtered rows of equations (.., n_equations, n_samples), weighed: zero where the coordinate stands still."""
+        return np.asarray(self.inner(rows) * self.row_weights)
 
     def thinned(self, rows: Floats) -> Floats:
         """Return inner filtered rows at those samples only that are nearly independent."""

@@ -85,7 +85,8 @@ def named_sizes(
 
 
 _NOT_ASKED = (
-    "Not judged along the motion: only fits of the simulation find resonances, tones and limits of drives."
+    "Not judged along the motion: only fits of the simulation find resonances, tones, limits of drives, "
+    "and errors of sensors of which there are more than the motion needs."
 )
 
 

@@ -136,7 +136,7 @@ class Selection:
         self.unit = unit = unit * np.sqrt(np.mean((fit.rms(values)[:, None] / unit) ** 2))
         per_record = max(1, round(2 * _STRETCHES / len(fit.motions)))
         for i, motion in enumerate(fit.motions):
-            weight = motion.counts[:, :: motion.stride] / unit
+            weight = motion.row_weights[:, :: motion.stride] / unit
             own = motion.thinned(fit.residual(motion, values))
             rows.append(np.ravel(own * weight))
             slopes.append(_as_columns(motion.thinned(fit.slopes(motion, values)) * weight))
@@ -268,7 +268,7 @@ class Selection:
         ]
 
     def residuals(self, found: Sequence[tuple[Key, int, float]]) -> list[Floats]:
-        """Return what selected terms leave along each motion, filtered and thinned, shape (n_equations, n_rows) each."""
+        """Return what selected terms leave along each motion, shape (n_equations, n_rows) each; zero where nothing moves."""
         columns = [*self.own, *self.columns_of(found)]
         left = self.matrix[:, -1] - self.matrix[:, columns] @ self._solved(self.whole, columns)
         parts = np.split(left, np.cumsum([np.prod(shape) for shape in self.shapes])[:-1])

@@ -224,10 +224,15 @@ class Rig:
             units["length"] = mechanism.states[0].unit
         return units
 
+    @cached_property
+    def sensors_of_motion(self) -> tuple[Sensor, ...]:
+        """Sensors that read no state which follows the motion."""
+        followers = {state.symbol for state in self.mechanism.states}
+        return tuple(s for s in self.mechanism.sensors if not s.reads.free_symbols & followers)
+
     def motion_alone(self) -> Rig:
         """Return the rig without the states that follow its motion, their sensors and their parameters in the equations."""
-        followers = {state.symbol for state in self.mechanism.states}
-        sensors = tuple(s for s in self.mechanism.sensors if not s.reads.free_symbols & followers)
+        sensors = self.sensors_of_motion
         kept = {sensor.name for sensor in sensors} | {drive.name for drive in self.mechanism.drives}
         order = tuple(name for name in self.mechanism.order if name in kept)
         own = {part.name: getattr(self, part.name) for part in fields(Rig)}
@@ -324,7 +329,8 @@ class Rig:
         effect
             At its place, or of no place.
         """
-        if effect.at is not None or not self.has_one_motion:
+        is_one_of_several = effect.place is Place.SENSOR and len(self.sensors_of_motion) > 1
+        if effect.at is not None or not self.has_one_motion or is_one_of_several:
             return self.acts_at(effect)
         return self.place_name(effect.place)
 

@@ -74,6 +74,11 @@ def campaign() -> Campaign:
 def test_of_several_sensors_the_further_ones_are_places() -> None:
     names = {effect.name for effect in candidates_on(FLYWHEEL, CATALOGUE)}
     assert {"sensor_delay", "sensor_delay@gyro", "encoder_eccentricity", "quadratic_damping"} <= names
+    places = [
+        FLYWHEEL.where(effect)
+        for effect in (effect_named("sensor_delay"), placed(effect_named("sensor_delay"), "gyro"))
+    ]
+    assert places == ["angle", "gyro"]
     # The gyro shows no position, and what follows the motion of the running gear has effects of its own.
     assert "encoder_eccentricity@gyro" not in names
     assert not any("@" in effect.name for effect in candidates_on(RIGS["running_gear"], CATALOGUE))

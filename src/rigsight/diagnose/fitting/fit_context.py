@@ -276,15 +276,11 @@ def candidates_on(rig: Rig, effects: Iterable[Effect], modelled: Iterable[Effect
         if effect.at is not None:
             found.append(effect)
         elif rig.has_one_motion:
-            found += [effect, *(placed(effect, place) for place in _further_sensors(rig, effect))]
+            further = rig.sensors_of_motion[1:] if effect.place is Place.SENSOR else ()
+            found += [effect, *(placed(effect, sensor.name) for sensor in further)]
         else:
             found += [placed(effect, place) for place in _places(rig, effect)]
     return [effect for effect in found if rig.offers(effect) and effect.name not in there]
-
-
-def _further_sensors(rig: Rig, effect: Effect) -> tuple[str, ...]:
-    """Return the sensors of the one motion beside the first; others have effects of what follows the motion."""
-    return rig.motion_alone().places(Place.SENSOR)[1:] if effect.place is Place.SENSOR else ()
 
 
 def _places(rig: Rig, effect: Effect) -> tuple[str, ...]:

@@ -43,7 +43,7 @@ class FamilyNumbers:
     probable: float = number(
         0.5,
         "convention",
-        "Probability from which a further family of a model is named: it is more probable than not.",
+        "Probability from which the motion names a family, or a model a further one: it is more probable than not.",
     )
     listed: float = number(
         0.01,

@@ -48,7 +48,7 @@ class NamedByMotion:
 
     def found(self) -> list[FittedModel]:
         """Return the models of several effects and their parts."""
-        models = self._begun()
+        models = self._pool()
         taken_apart = set[frozenset[Key]]()
         # A fit that ends lower than the best one so far may have causes that the others make needless, too.
         while models and (keys := self._keys(best := min(models, key=_error))) not in taken_apart:
@@ -62,7 +62,7 @@ class NamedByMotion:
             models = self._compared(finished(self.context, model), [*forms, *models, *larger[:-1], *parts])
         return [found for found in models if len(found.effects) > 1]
 
-    def _begun(self) -> list[FittedModel]:
+    def _pool(self) -> list[FittedModel]:
         """Return the causes that the motion names, with further ones, and sets of those that it does not judge."""
         models = list(self._grown(self.singles[0]))
         # A delay and a resonance may hide each other: neither lowers the error without the other.
@@ -85,7 +85,7 @@ class NamedByMotion:
         if best.error_over_noise <= self.settled:
             # What remains is of the size of what laws err: more digits of the others would not tell them apart.
             return each_once([*refine(self.context, [best]), *others])
-        # No other starts are tried: those along the motion are the lowest of all.
+        # The regression along the motion has no other minimum to start from.
         return each_once(refine(self.context, each_once([best, *others])))
 
     def _grown(self, model: FittedModel) -> Iterator[FittedModel]:
