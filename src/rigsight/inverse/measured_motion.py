@@ -216,7 +216,7 @@ class RecordMotion:
         return np.asarray(moving / np.sqrt(np.mean(moving, axis=1, keepdims=True)))
 
     def where_moving(self, rows: Floats) -> Floats:
-        """Return inner filtered rows of equations (.., n_equations, n_samples), weighed: zero where the coordinate stands still."""
+        """Return inner filtered rows of equations (.., n_equations, n_samples), zero where the coordinate stands still."""
         return np.asarray(self.inner(rows) * self.row_weights)
 
     def thinned(self, rows: Floats) -> Floats:
