@@ -15,6 +15,7 @@ from rigsight.inverse.joint_force import joint_motion as joint_motion
 from rigsight.inverse.measured_motion import RecordMotion as RecordMotion
 from rigsight.inverse.measured_motion import record_motion as record_motion
 from rigsight.inverse.missing_force import MissingForce as MissingForce
+from rigsight.inverse.numbers_beside import NumbersBeside as NumbersBeside
 from rigsight.inverse.power import NAMED_IN as NAMED_IN
 from rigsight.inverse.power import NamedSize as NamedSize
 from rigsight.inverse.power import named_sizes as named_sizes

@@ -20,6 +20,7 @@ from rigsight.effects import Effect, Family, kind_of
 from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.missing_force import MissingForce
+from rigsight.inverse.numbers_beside import NumbersBeside
 from rigsight.inverse.term import Term
 from rigsight.rigs import Rig
 
@@ -95,8 +96,9 @@ class Proposal:
     noise: float | None = None
     # At each joint, of any shape, the one that explains most first.
     forces: tuple[MissingForce, ...] = ()
-    # Parameters of the equations beside those taken.
+    # Parameters of the equations beside those taken, and beside any others.
     numbers: Mapping[str, float] = field(default_factory=dict)
+    numbers_beside: NumbersBeside | None = field(default=None, repr=False, compare=False)
     # Parameters of every effect alone, by its name, where it can have the sign that it needs.
     starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
@@ -324,6 +326,7 @@ class Selection:
             explained,
             self.by_chance,
             numbers=numbers,
+            numbers_beside=self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()}),
             starts={name: self._values(i, []) for name, (_, i) in starts.items()},
         )
 
@@ -355,6 +358,21 @@ class Selection:
             name: float(np.clip(self.values[name] + change, *bounds))
             for name, change, bounds in zip(self.fit.free, changes, self.fit.bounds, strict=True)
         }
+
+    def _numbers_beside(self, missing: float, terms: Mapping[str, int]) -> NumbersBeside:
+        """Return the numbers of the equations beside effects, of which each has a term."""
+        of_rig = {p.name for p in self.fit.rig.parameters}
+        return NumbersBeside(
+            tuple(self.fit.free),
+            tuple(name in of_rig for name in self.fit.free),
+            np.array([self.values[name] for name in self.fit.free]),
+            self.fit.bounds,
+            self.size[self.own],
+            self.whole / self.n_rows,
+            missing / self.n_rows,
+            {name: self.places[i] for name, i in terms.items()},
+            _SMOOTH,
+        )
 
     def _cause(self, key: Key, i: int, share: float, chosen: Sequence[int]) -> ProposedCause:
         return ProposedCause(self.terms[i].effect, *key, share, self._values(i, chosen))

@@ -12,7 +12,9 @@ from rigsight.diagnose.policy import HORIZON
 from rigsight.effects import Effect, Place, placed
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads, free_names
+from rigsight.identify.fit.prior import Prior
 from rigsight.identify.fit.windows import cut, strongest
+from rigsight.inverse import NumbersBeside
 from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, joint_of
@@ -78,6 +80,9 @@ class FitContext:
     modelled: tuple[Effect, ...] = ()
     memory: FitMemory | None = None  # where the outcomes of fits are kept
     threads: IdleThreads = field(default_factory=IdleThreads)  # threads that help with the records of a fit
+    # Where simulations track the sensors and the motion shows the forces: fits must hold along the motion, too.
+    along_motion: NumbersBeside | None = None
+    error_of_force: float = 0.0  # what the missing force causes in a simulation, in units of the noise floor
 
     @cached_property
     def records(self) -> tuple[Record, ...]:
@@ -119,7 +124,17 @@ class FitContext:
         self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY
     ) -> GreyBoxFit:
         """Return the fit of a structure to records, with the bench's scales and noise."""
-        return GreyBoxFit(structure, records, self.scales, self.noise, accuracy, self.memory, self.threads)
+        prior = self._along_motion(structure)
+        return GreyBoxFit(
+            structure, records, self.scales, self.noise, accuracy, self.memory, self.threads, prior
+        )
+
+    def _along_motion(self, structure: Structure) -> Prior | None:
+        """Return what the measured motion says of the numbers: the force that they leave costs what it causes in a simulation."""
+        if self.along_motion is None:
+            return None
+        found = self.along_motion.beside([e for e in structure.effects if e not in self.modelled])
+        return Prior(found.names, found.values, self.error_of_force**2 * found.curvature)
 
     def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
         """Return the equations of the given simulation with effects added."""

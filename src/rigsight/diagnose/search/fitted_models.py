@@ -80,6 +80,8 @@ def single_models(
         # What a law errs does not average out: the most excited stretches say as much as whole records.
         context = replace(context, estimation=context.look)
         reidentified = reidentify(context, reidentified.fit.values)
+    if worth.is_shown and proposal is not None and windowing.observer is not None:
+        context, reidentified = _held_by_motion(context, reidentified, proposal)
     together = None
     if worth.is_shown and proposal is not None and len(proposal.taken) > 1:
         together = with_causes(context, reidentified, proposal.taken, proposal)
@@ -97,6 +99,23 @@ def single_models(
     return SingleModels(
         windowing, context, before, reidentified, singles, search, proposal, tuple(effects), worth, together
     )
+
+
+def _held_by_motion(
+    context: FitContext, reidentified: FittedModel, proposal: Proposal
+) -> tuple[FitContext, FittedModel]:
+    """Return the context whose fits must also hold along the measured motion, and the equations fitted so.
+
+    A simulation that tracks the sensors hardly leaves them where the mass is large, whatever force it lacks. Where the equations
+    follow the sensors to within noise nothing is missing.
+    """
+    found, error = proposal.numbers_beside, reidentified.error_over_noise
+    if found is None or error <= VERDICT.at_floor:
+        return context, reidentified
+    context = replace(context, along_motion=found, error_of_force=error)
+    known = found.beside(())
+    start = dict(zip(known.names, map(float, known.values), strict=True))
+    return context, reidentify(context, {**reidentified.fit.values, **start})
 
 
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:

@@ -70,15 +70,23 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named.
 
     It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
-    of that, tested together by Wald's chi square. Where these are determined only with others, the former decides alone.
+    of that, tested together by Wald's chi square, and it does not remove the larger part of the error of records that it was not
+    fitted to. Where these are determined only with others, the former decides alone.
     """
-    fits = {frozenset(other.names): other.fit for other in others}
+    models = {frozenset(other.names): other for other in others}
 
     def is_zero(effect: Effect) -> bool:
-        without = fits.get(frozenset(model.names) - {effect.name})
-        return (without is not None and not is_lower(model.fit, without)) or _is_within_errors(model, effect)
+        without = models.get(frozenset(model.names) - {effect.name})
+        if without is not None and not is_lower(model.fit, without.fit):
+            return True
+        return not (without is not None and _closes(model, without)) and _is_within_errors(model, effect)
 
     return any(map(is_zero, model.effects))
+
+
+def _closes(model: FittedModel, without: FittedModel) -> bool:
+    """Return True if a model leaves the smaller part of the squared error that another one leaves."""
+    return model.error_over_noise**2 <= (1.0 - VERDICT.larger_part) * without.error_over_noise**2
 
 
 def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[FittedModel]) -> bool:

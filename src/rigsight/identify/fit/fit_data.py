@@ -6,12 +6,14 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.fit.idle_threads import IdleThreads
+from rigsight.identify.fit.prior import Prior
 from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, Substeps, record_input, record_values, state_limits
 from rigsight.simulate.input_hold import HeldInput
@@ -131,6 +133,12 @@ class FitData:
     accuracy: float  # relative accuracy of the simulations
     # Threads among which the records are distributed.
     threads: IdleThreads = field(default_factory=IdleThreads)
+    prior: Prior | None = None  # what is known of the parameters beside the records
+
+    @cached_property
+    def n_readings(self) -> int:
+        """Number of measured samples of all outputs."""
+        return int(sum(np.count_nonzero(np.isfinite(record.measured)) for record in self.records))
 
     def of_each_record(self, one: Callable[[int], Result]) -> list[Result]:
         """Return the results of a function for the index of each record, in their order."""

@@ -134,8 +134,7 @@ class Problem:
         return False
 
     def _worth_refining(self, theta: Floats) -> float:
-        n_samples = sum(np.count_nonzero(np.isfinite(record.measured)) for record in self.data.records)
-        return _MOST_WORTH if self.at(theta).cost > _FAR**2 * n_samples else _WORTH_REFINING
+        return _MOST_WORTH if self.at(theta).cost > _FAR**2 * self.data.n_readings else _WORTH_REFINING
 
     def _removable(self, theta: Floats) -> float:
         """Return the share of the cost by which a full Gauss-Newton step would lower it in the linear approximation."""
@@ -170,12 +169,20 @@ class Problem:
             products = np.array(self._products(theta))
             cost = float(np.sum(products[:, 0, 0]))
             normal, gradient = self._put_together(products[:, 1:, 1:], products[:, 0, 1:])
+            cost += self.add_prior(theta, normal, gradient)
         if not (cost < _DIVERGED and np.all(np.abs(normal) < _DIVERGED)):
             cost = float("inf")
         self._best = min(self._best, cost)
         self._last = Evaluation(theta.copy(), cost, normal, gradient)
         self.n_evaluations += 1
         return self._last
+
+    def add_prior(self, theta: Floats, normal: Floats, gradient: Floats) -> float:
+        """Add to the normal equations what is known beside the records, and return its cost."""
+        prior = self.data.prior
+        if prior is None:
+            return 0.0
+        return prior.add(self.coordinates, theta[: self.n_free], self.data.n_readings, normal, gradient)
 
     def _put_together(self, products: Floats, projections: Floats) -> tuple[Floats, Floats]:
         """Return the normal equations of all coordinates from those of each record for parameters and its own initial states."""

@@ -22,6 +22,7 @@ from rigsight.identify.fit.covariance import colored_covariance, propagated_cova
 from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
 from rigsight.identify.fit.idle_threads import IdleThreads
+from rigsight.identify.fit.prior import Prior
 from rigsight.identify.fit.search import FINE_TOLERANCE, VariableProjection, off_kinks, searched
 from rigsight.identify.fit.settled_states import SearchStart
 from rigsight.records.record import Floats, Record
@@ -44,8 +45,8 @@ class GreyBoxFit:
     A record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of them
     (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of the
     result. `scales` are those of `characteristic_scales`; residuals are divided by `output_noise`. The number of substeps
-    follows from the relative accuracy of the simulations. A fit that the memory holds is not repeated and gives the same
-    result.
+    follows from the relative accuracy of the simulations. A prior counts in the search alone: cost and covariance are those of
+    the records. A fit that the memory holds is not repeated and gives the same result.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class GreyBoxFit:
         accuracy: float = DEFAULT_ACCURACY,
         memory: FitMemory | None = None,
         threads: IdleThreads | None = None,
+        prior: Prior | None = None,
     ) -> None:
         self.structure = structure
         self.memory = memory
@@ -71,6 +73,7 @@ class GreyBoxFit:
             unlimited_sizes=np.array(sizes).reshape(-1, 1),
             accuracy=accuracy,
             threads=threads or IdleThreads(),
+            prior=prior,
         )
         self._problem: list[Any] = []
         if memory is not None:
@@ -86,8 +89,13 @@ class GreyBoxFit:
                 [record_digest(record) for record in records],
                 [d.weights.tolist() for d in self.data.records],
                 accuracy,
+                *(
+                    [prior.names, prior.values.tolist(), prior.curvature.tolist()]
+                    if prior is not None
+                    else []
+                ),
             ]
-        self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self.data.records))
+        self.n_samples = self.data.n_readings
 
     def fit(
         self,
@@ -128,7 +136,7 @@ class GreyBoxFit:
                 if not (finish and substeps is None and problem.refined(theta)):
                     break
             if finish and tolerance <= FINE_TOLERANCE and np.any(self.data.limited):
-                settled = off_kinks(problem, theta, (lower, upper), self.n_samples)
+                settled = off_kinks(problem, theta, (lower, upper))
                 if settled is not None:
                     return settled, True, "Steps from coarse finite differences have become zero."
             return theta, bool(solution.status > 0), str(solution.message)

@@ -215,12 +215,10 @@ def searched(
     )
 
 
-def off_kinks(
-    problem: Problem, theta: Floats, bounds: tuple[Floats, Floats], n_samples: int
-) -> Floats | None:
+def off_kinks(problem: Problem, theta: Floats, bounds: tuple[Floats, Floats]) -> Floats | None:
     """Return the point near the end of a search where Gauss-Newton steps from long differences vanish."""
     before = problem.at(theta)
-    variance = before.cost / max(n_samples, 1)
+    variance = before.cost / max(problem.data.n_readings, 1)
     if not (np.isfinite(before.cost) and variance > 0.0):
         return None
     problem.steps = _differences(before, bounds, variance)
@@ -281,6 +279,7 @@ def _evaluated(problem: Problem, place: Floats) -> Evaluation:
         cost += float(residuals[index] @ residuals[index])
         normal[np.ix_(columns, columns)] += derivative.T @ derivative
         gradient[columns] += derivative.T @ residuals[index]
+    cost += problem.add_prior(place, normal, gradient)
     return Evaluation(place, cost, normal, gradient)
 
 
