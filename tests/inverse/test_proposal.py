@@ -252,3 +252,20 @@ def test_a_held_input_is_no_delay() -> None:
     given = {name: value for name, value in AXIS_VALUES.items() if name != "gain"}
     own = Campaign("held", AXIS, {"gain": 1.0}, given, (run.with_signals(x=noisy),))
     assert all(cause.share < 0.1 for cause in proposed(own).alone if cause.family == "delay_or_lag")
+
+
+def test_numbers_beside_an_effect_leave_the_least_force_and_their_curvature_is_that_of_its_square() -> None:
+    effect = effect_named("coulomb_friction")
+    own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [effect], [20.0, 40.0])
+    found = proposed(own).numbers_beside
+    assert found is not None
+    with_it, without = found.beside([effect]), found.beside([])
+    truth = np.array([AXIS_VALUES[name] for name in with_it.names])
+    at_m = with_it.names.index("m")
+    assert with_it.values[at_m] == pytest.approx(1.0, rel=0.01)
+    # A change of the mass that friction cannot take over costs its squared force, in units of what is missing.
+    away = np.zeros(truth.size)
+    away[at_m] = 0.1
+    alone = away @ without.curvature @ away
+    assert 0.0 < away @ with_it.curvature @ away <= alone * (1.0 + 1e-9)
+    assert np.all(np.linalg.eigvalsh(with_it.curvature) >= -1e-9 * np.max(with_it.curvature))
