@@ -70,8 +70,8 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named.
 
     It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
-    of that, tested together by Wald's chi square, and it does not remove the larger part of the error of records that it was not
-    fitted to. Where these are determined only with others, the former decides alone.
+    of that, tested together by Wald's chi square. An effect without a state of its own has a size, too, if it removes the larger
+    part of the error of records that it was not fitted to. Where these are determined only with others, the former decides alone.
     """
     models = {frozenset(other.names): other for other in others}
 
@@ -79,7 +79,8 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
         without = models.get(frozenset(model.names) - {effect.name})
         if without is not None and not is_lower(model.fit, without.fit):
             return True
-        return not (without is not None and _closes(model, without)) and _is_within_errors(model, effect)
+        is_shown = not effect.states and without is not None and _closes(model, without)
+        return not is_shown and _is_within_errors(model, effect)
 
     return any(map(is_zero, model.effects))
 
