@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class NumbersAlongMotion:
-    """Numbers that leave the least force along the motion, and how much more others leave."""
+    """Numbers that leave the least force along the motion, in units of the parameters, and how much more others leave."""
 
     names: tuple[str, ...]
     values: Floats  # shape (n,), within their bounds
@@ -39,22 +39,28 @@ class NumbersBeside:
     products: Floats  # mean products of all columns, shape (n_columns, n_columns)
     missing: float  # mean square of the missing force of the equations alone, on stretches left out
     columns: Mapping[str, Sequence[int]]  # of each effect that the motion judges, by its name
-    ridge: float
+    ridge: float  # added to the products of each column with itself: what nothing determines stays
 
     def beside(self, effects: Sequence[Effect]) -> NumbersAlongMotion:
         """Return the numbers of the rig beside effects; those that the motion does not judge have no columns."""
-        return self.beside_columns([c for e in effects for c in self.columns.get(e.name, ())])
-
-    def beside_columns(self, chosen: Sequence[int]) -> NumbersAlongMotion:
-        """Return the numbers of the rig beside chosen columns."""
-        n = len(self.names)
-        at = np.array([*range(n), *chosen], dtype=np.int64)
-        inverse = np.linalg.inv(self.products[at[:, None], at] + self.ridge * np.eye(at.size))
-        change = (inverse @ self.products[at, -1])[:n] / self.size
-        values = np.clip(self.start + change, *np.reshape(self.bounds, (n, 2)).T)
+        chosen = [column for effect in effects for column in self.columns.get(effect.name, ())]
         kept = np.flatnonzero(self.of_rig)
         # What the numbers of effects can take over costs nothing.
-        curvature = np.linalg.inv(inverse[kept[:, None], kept]) * np.outer(self.size[kept], self.size[kept])
+        shared = np.linalg.inv(self._normal(chosen))[kept[:, None], kept]
+        curvature = np.linalg.inv(shared) * np.outer(self.size[kept], self.size[kept])
         return NumbersAlongMotion(
-            tuple(self.names[i] for i in kept), values[kept], (curvature + curvature.T) / (2.0 * self.missing)
+            tuple(self.names[i] for i in kept),
+            self.values(chosen)[kept],
+            (curvature + curvature.T) / (2.0 * self.missing),
         )
+
+    def values(self, chosen: Sequence[int]) -> Floats:
+        """Return all numbers of the equations beside chosen columns, within their bounds, shape (n,)."""
+        n = len(self.names)
+        target = self.products[[*range(n), *chosen], -1]
+        change = np.linalg.solve(self._normal(chosen), target)[:n] / self.size
+        return np.asarray(np.clip(self.start + change, *np.reshape(self.bounds, (n, 2)).T))
+
+    def _normal(self, chosen: Sequence[int]) -> Floats:
+        at = np.array([*range(len(self.names)), *chosen], dtype=np.int64)
+        return np.asarray(self.products[at[:, None], at] + self.ridge * np.eye(at.size))

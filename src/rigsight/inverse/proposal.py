@@ -314,19 +314,21 @@ class Selection:
         )
         judged = frozenset(term.effect.name for term in self.terms)
         explained = 1.0 - remainders[-1] / begun if begun > 0.0 else 0.0
-        numbers = self._numbers(self.columns_of(selected))
         starts: dict[str, tuple[float, int]] = {}
         for i, remainder in self._remainders([]):
             name = self.terms[i].effect.name
             starts[name] = min(starts.get(name, (remainder, i)), (remainder, i))
+        beside_any = self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()})
         return Proposal(
             taken,
             alone,
             judged,
             explained,
             self.by_chance,
-            numbers=numbers,
-            numbers_beside=self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()}),
+            numbers=dict(
+                zip(beside_any.names, map(float, beside_any.values(self.columns_of(selected))), strict=True)
+            ),
+            numbers_beside=beside_any,
             starts={name: self._values(i, []) for name, (_, i) in starts.items()},
         )
 
@@ -350,14 +352,6 @@ class Selection:
         squares = np.einsum("dgi,dgij,dgj->d", x, parts[..., :-1, :-1], x)
         least = np.finfo(np.float64).tiny
         return np.asarray(np.maximum(whole[:, 0, -1, -1] - 2.0 * along + squares, least))
-
-    def _numbers(self, chosen: Sequence[int]) -> dict[str, float]:
-        """Return the parameters of the equations beside chosen columns, within their bounds."""
-        changes = self._solved(self.whole, [*self.own, *chosen])[: len(self.own)] / self.size[: len(self.own)]
-        return {
-            name: float(np.clip(self.values[name] + change, *bounds))
-            for name, change, bounds in zip(self.fit.free, changes, self.fit.bounds, strict=True)
-        }
 
     def _numbers_beside(self, missing: float, terms: Mapping[str, int]) -> NumbersBeside:
         """Return the numbers of the equations beside effects, of which each has a term."""

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.verdict.plausibility import doubts, is_beyond_records, plausible_first
+from rigsight.diagnose.verdict.plausibility import (
+    doubts,
+    has_size_of_zero,
+    is_beyond_records,
+    plausible_first,
+)
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 
 PLACES = {"coulomb_friction": "dynamics", "stribeck_friction": "dynamics", "actuator_lag": "actuator"}
@@ -108,3 +113,26 @@ def test_what_is_slower_or_longer_than_the_records_is_no_candidate(
 ) -> None:
     model = with_numbers(scored((effect,)), values, dict.fromkeys(values, 0.1))
     assert is_beyond_records(model, {"x": 1.0, "time": 1.0}, 20.0) is beyond
+
+
+@pytest.mark.parametrize(
+    ("effect", "held_out", "has_none"),
+    [
+        ("coulomb_friction", 0.6, False),
+        ("coulomb_friction", 0.8, True),
+        ("maxwell_branch", 0.6, True),
+    ],
+)
+def test_errors_of_a_size_do_not_count_against_what_held_out_records_show(
+    scored, effect: str, held_out: float, has_none: bool
+) -> None:
+    """The larger part of the square is removed at 0.71; a branch has a state, which may start anywhere."""
+    without = with_numbers(scored((), error_over_noise=20.0), {"m": 1.0}, {"m": 0.1})
+    size = {"coulomb_friction": "T_c", "maxwell_branch": "k_m"}[effect]
+    model = with_numbers(
+        scored((effect,), residuals=np.full(9, held_out * 20.0)), {"m": 1.0, size: 1.0}, {"m": 0.1, size: 1.0}
+    )
+    fit = replace(model.fit, covariance=np.diag([0.01, 1.0]), cost=1.0, n_samples=100)
+    model = replace(model, fit=fit)
+    without = replace(without, fit=replace(without.fit, cost=400.0, n_samples=100))
+    assert has_size_of_zero(model, [without]) is has_none

@@ -30,7 +30,7 @@ def basis(
     )
     judged = SimpleNamespace(verdict=verdict, reason="the reason", model=None)
     found = {
-        "context": None,
+        "context": SimpleNamespace(along_motion=None),
         "windowing": SimpleNamespace(bandwidth=None, cycles=None),
         "reidentified": None,
         "judgement": judged,
@@ -68,10 +68,15 @@ def test_a_noise_floor_that_a_model_undercuts_is_told() -> None:
 
 
 def test_observers_are_told_with_the_time_over_which_errors_build_up() -> None:
-    reported = notes.observer_note(basis(windowing=SimpleNamespace(bandwidth=4.0, cycles=None)))
+    tracks = SimpleNamespace(bandwidth=4.0, cycles=None)
+    reported = notes.observer_note(basis(windowing=tracks))
     assert reported is not None
     assert "up to 4 rad/s" in reported
     assert "within 0.25 s" in reported
+    held = notes.observer_note(basis(windowing=tracks, context=SimpleNamespace(along_motion=object())))
+    assert held is not None
+    assert held.startswith(reported)
+    assert len(held) > len(reported)
 
 
 def test_windows_are_told_with_their_cycles() -> None:

@@ -81,7 +81,7 @@ def single_models(
         context = replace(context, estimation=context.look)
         reidentified = reidentify(context, reidentified.fit.values)
     if worth.is_shown and proposal is not None and windowing.observer is not None:
-        context, reidentified = _held_by_motion(context, reidentified, proposal)
+        context, reidentified = held_by_motion(context, reidentified, proposal)
     together = None
     if worth.is_shown and proposal is not None and len(proposal.taken) > 1:
         together = with_causes(context, reidentified, proposal.taken, proposal)
@@ -101,7 +101,7 @@ def single_models(
     )
 
 
-def _held_by_motion(
+def held_by_motion(
     context: FitContext, reidentified: FittedModel, proposal: Proposal
 ) -> tuple[FitContext, FittedModel]:
     """Return the context whose fits must also hold along the measured motion, and the equations fitted so.

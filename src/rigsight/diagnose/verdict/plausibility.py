@@ -70,8 +70,9 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named.
 
     It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
-    of that, tested together by Wald's chi square. An effect without a state of its own has a size, too, if it removes the larger
-    part of the error of records that it was not fitted to. Where these are determined only with others, the former decides alone.
+    of that, tested together by Wald's chi square. Where these are determined only with others, the former decides alone; so it
+    does for an effect without a state of its own that removes the larger part of the squared error of records that it was not
+    fitted to (a hidden state could do so from a free start).
     """
     models = {frozenset(other.names): other for other in others}
 

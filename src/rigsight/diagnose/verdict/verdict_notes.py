@@ -101,10 +101,11 @@ def observer_note(basis: Basis) -> str | None:
     bandwidth = basis.found.windowing.bandwidth
     if bandwidth is None:
         return None
+    held = " A large mass hardly leaves that motion, whatever force it lacks: so fits must also explain the force along it."
     return (
         f"The rig has no restoring force, so every model drifts in free run. Models are compared as observers: each tracks "
         f"the measured motion up to {bandwidth:.3g} rad/s, so the errors are those that build up within "
-        f"{1.0 / bandwidth:.2g} s."
+        f"{1.0 / bandwidth:.2g} s.{held if basis.found.context.along_motion is not None else ''}"
     )
 
 

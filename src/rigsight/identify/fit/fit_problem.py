@@ -180,7 +180,9 @@ class Problem:
     def add_prior(self, theta: Floats, normal: Floats, gradient: Floats) -> float:
         """Add to the normal equations what is known beside the records, and return its cost."""
         prior = self.data.prior
-        if prior is None:
+        if (
+            prior is None or not self.n_free
+        ):  # beside initial states alone it would only hide how far they are from settled
             return 0.0
         return prior.add(self.coordinates, theta[: self.n_free], self.data.n_readings, normal, gradient)
 

@@ -45,8 +45,8 @@ class GreyBoxFit:
     A record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of them
     (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of the
     result. `scales` are those of `characteristic_scales`; residuals are divided by `output_noise`. The number of substeps
-    follows from the relative accuracy of the simulations. A prior counts in the search alone: cost and covariance are those of
-    the records. A fit that the memory holds is not repeated and gives the same result.
+    follows from the relative accuracy of the simulations. A prior counts in the search; cost and covariance of a finished fit
+    are those of the records. A fit that the memory holds is not repeated and gives the same result.
     """
 
     def __init__(

@@ -1,4 +1,9 @@
-"""What is known of parameters beside the records of a fit: a quadratic cost of other values."""
+"""What is known of parameters beside the records of a fit: a quadratic cost of other values (regularization).
+
+References
+----------
+A. N. Tikhonov and V. Y. Arsenin, *Solutions of Ill-Posed Problems* (Winston 1977).
+"""
 
 from __future__ import annotations
 
@@ -14,7 +19,7 @@ class Prior:
 
     names: tuple[str, ...]
     values: Floats  # shape (n,), in units of the parameters
-    curvature: Floats  # C, shape (n, n), symmetric
+    curvature: Floats  # C, shape (n, n), symmetric, in reciprocal units of two parameters
 
     def add(
         self, coordinates: Coordinates, theta: Floats, n_readings: int, normal: Floats, gradient: Floats

@@ -84,6 +84,7 @@ class VariableProjection(Problem):
                 own, rest = _projected(derivative[:, :n], derivative[:, n:], residual)
                 normal += own.T @ own
                 gradient += own.T @ rest
+            cost += self.add_prior(theta, normal, gradient)
         if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
             cost = float("inf")
         self._best = min(self._best, cost)
