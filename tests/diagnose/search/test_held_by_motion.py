@@ -7,13 +7,14 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import candidates_on
+from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
 from rigsight.diagnose.search.fitted_models import held_by_motion
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.identify import IdleThreads
 from rigsight.identify.fit.windows import Observer, Windowing
-from rigsight.inverse import propose
+from rigsight.inverse import Proposal, propose
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
@@ -40,35 +41,33 @@ def servo() -> Campaign:
     return Campaign("servo", AXIS, {"gain": 1.0}, {}, tuple(records))
 
 
-def test_the_mass_is_that_of_the_measured_motion(servo: Campaign) -> None:
-    start = start_values_of(servo)
-    context = fit_context_of(
-        servo, NOISE, Windowing(observer=Observer(("x",), 10.0)), None, IdleThreads(1), start
-    )
-    before = reidentify(context, start)
-    proposal = propose(servo, {**servo.constants, **before.fit.values}, candidates_on(AXIS, CATALOGUE), NOISE)
+def fitted(servo: Campaign, noise: dict[str, float]) -> tuple[FitContext, FittedModel, Proposal]:
+    """Return the equations fitted to the sensors alone, and what the motion says of the force that they leave."""
+    start, tracking = start_values_of(servo), Windowing(observer=Observer(("x",), 10.0))
+    context = fit_context_of(servo, noise, tracking, None, IdleThreads(1), start)
+    alone = reidentify(context, start)
+    known = {**servo.constants, **alone.fit.values}
+    proposal = propose(servo, known, candidates_on(AXIS, CATALOGUE), noise)
     assert proposal is not None
-    held, after = held_by_motion(context, before, proposal)
+    return context, alone, proposal
+
+
+def test_friction_shows_beside_the_mass_of_the_measured_motion_alone(servo: Campaign) -> None:
+    context, alone, proposal = fitted(servo, NOISE)
+    held, after = held_by_motion(context, alone, proposal)
     assert held.along_motion is not None
-    assert after.fit.values["m"] < 0.3 * before.fit.values["m"], "the large mass hides the friction"
+    assert after.fit.values["m"] < 0.3 * alone.fit.values["m"], "the large mass hides the friction"
     friction = effect_named("coulomb_friction")
-    gained = [
+    left = [
         fit_candidate(own, (friction,), base.fit).error_over_noise / base.error_over_noise
-        for own, base in ((context, before), (held, after))
+        for own, base in ((context, alone), (held, after))
     ]
-    assert gained[0] > 0.9, "beside it friction seems to be of no use"
-    assert gained[1] < 0.5
+    assert left[0] > 0.9, "beside it friction seems to be of no use"
+    assert left[1] < 0.5
 
 
 def test_equations_that_follow_the_sensors_are_fitted_to_them_alone(servo: Campaign) -> None:
-    start = start_values_of(servo)
-    loose = {"x": 1.0}
-    context = fit_context_of(
-        servo, loose, Windowing(observer=Observer(("x",), 10.0)), None, IdleThreads(1), start
-    )
-    before = reidentify(context, start)
-    proposal = propose(servo, {**servo.constants, **before.fit.values}, candidates_on(AXIS, CATALOGUE), loose)
-    assert proposal is not None
-    held, after = held_by_motion(context, before, proposal)
+    context, alone, proposal = fitted(servo, {"x": 1.0})
+    held, after = held_by_motion(context, alone, proposal)
     assert held.along_motion is None
-    assert after is before
+    assert after is alone
