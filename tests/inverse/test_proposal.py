@@ -13,7 +13,8 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose import candidates_on
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.symbols import v
-from rigsight.inverse import Proposal, propose
+from rigsight.inverse import Proposal, along_motion, propose
+from rigsight.inverse.selection import Selection
 from rigsight.inverse.term import Term
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
@@ -103,6 +104,37 @@ def test_a_wrong_spring_between_two_masses_is_fitted_and_no_cause() -> None:
     assert found is not None
     assert found.taken == ()
     assert found.numbers["k_s"] == pytest.approx(TRAIN["k_s"], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "number"),
+    [
+        ("end_stop", {"k_s": 300.0, "s": 0.027}, "s"),
+        ("presliding_friction", {"T_c": 4.0, "x_p": 0.011}, "x_p"),
+        ("torque_ripple", {"kappa": 61.0, "T_sin": 2.0, "T_cos": 1.0}, "kappa"),
+    ],
+)
+def test_what_lies_between_two_points_of_the_grid_is_found(
+    effect: str, values: Mapping[str, float], number: str
+) -> None:
+    hidden = effect_named(effect)
+    found = proposed(campaign(AXIS, {**AXIS_VALUES, **values}, [hidden], (10.0, 20.0)))
+    assert found.alone[0].effect.name == effect
+    assert found.alone[0].share > 0.97
+    assert found.alone[0].values[number] == pytest.approx(values[number], rel=0.05)
+
+
+def test_a_selection_with_further_terms_is_that_of_all_terms() -> None:
+    own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [effect_named("coulomb_friction")], (10.0, 20.0))
+    terms_of = along_motion(own, {**own.constants, **own.given})
+    assert terms_of is not None
+    few, more = (list(terms_of.of(effect_named(name))) for name in ("coulomb_friction", "end_stop"))
+    whole = Selection(terms_of.fit, terms_of.values, [*few, *more])
+    grown = Selection(terms_of.fit, terms_of.values, few).with_terms(more)
+    assert grown.places == whole.places
+    assert np.allclose(grown.matrix, whole.matrix, rtol=1e-12)
+    assert np.allclose(grown.products, whole.products, rtol=1e-9)
+    assert np.allclose(grown.whole, whole.whole, rtol=1e-9)
 
 
 def test_friction_beside_a_constant_force_does_not_drive_both_ways() -> None:

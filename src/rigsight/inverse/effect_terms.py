@@ -1,8 +1,9 @@
 """Columns of effects along measured motions: what each adds to the equations of motion for a unit of its linear numbers.
 
 Parameters in which an effect is linear become coefficients; the others, such as a clearance or the length of a presliding spring,
-are tried on a grid. A delay moves the reading, or the force that the motion requires of the drive, and so does a lag: what it
-weakens cannot be told from what smoothing takes from the measured motion. One longer than a radian of the motion is no term.
+are tried on a grid, then beside its best point. A delay moves the reading, or the force that the motion requires of the drive. So
+does a lag: what it weakens cannot be told from what smoothing takes from the measured motion. One longer than a radian of the
+motion is no term.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from rigsight.errors import RigsightError
 from rigsight.inverse.drive_terms import late_drive, lost, of_drive
 from rigsight.inverse.equation_fit import EquationFit, generalized
 from rigsight.inverse.joint_force import JointMotion, joint_motion
-from rigsight.inverse.parameter_grid import LEAST_SHARE, POINTS, grid_of, usual
+from rigsight.inverse.parameter_grid import LEAST_SHARE, POINTS, beside, grid_of, usual
 from rigsight.inverse.sensor_terms import influence, late_reading, of_sensor
 from rigsight.inverse.term import Term, compiled
 from rigsight.parameters import Parameter
@@ -71,13 +72,29 @@ class EffectTerms:
         if effect.place is Place.SENSOR and self._is_redundant:
             return
         if is_late(effect):
-            yield from self._of_late(effect)
-        elif effect.place is Place.SENSOR:
-            yield from of_sensor(effect, self.fit, self.values, self.scales, self._by_motion)
+            yield from self._of_late(effect, self._lengths(effect))
         elif effect.place is Place.ACTUATOR:
             yield from of_drive(effect, self.fit, self.values, self.scales)
+        else:
+            yield from self._at(effect, None)
+
+    def beside(self, term: Term, halvings: int) -> Iterator[Term]:
+        """Yield the effect of a term on both sides of its nonlinear parameters, at a step of the grid halved so often."""
+        if not is_late(term.effect):
+            yield from self._at(term.effect, list(beside(term.effect, term.inner, self.scales, halvings)))
+            return
+        (length,), lengths = term.units, self._lengths(term.effect)
+        ratio = (lengths[-1] / lengths[-2]) ** (0.5**halvings)
+        near = (length / ratio, length * ratio)
+        yield from self._of_late(term.effect, [own for own in near if abs(own) <= lengths[-1]])
+
+    def _at(self, effect: Effect, points: Sequence[Mapping[str, float]] | None) -> Iterator[Term]:
+        """Yield an effect of a sensor or a joint at points of its nonlinear parameters, or on their grid."""
+        if effect.place is Place.SENSOR:
+            yield from of_sensor(effect, self.fit, self.values, self.scales, self._by_motion, points)
         elif is_joint_force(effect) and not _is_resonance(effect):
-            yield from _of_joint(effect, self.fit, self.values, self.scales, self._motion_of(effect))
+            moved = self._motion_of(effect)
+            yield from _of_joint(effect, self.fit, self.values, self.scales, moved, points)
 
     def acting(self, effect: Effect, own: Mapping[str, float]) -> tuple[Floats, ...] | None:
         """Return what an effect that acts would add to what the equations need, along each motion, filtered and thinned.
@@ -112,8 +129,8 @@ class EffectTerms:
             rows = [generalized(m, effect, own, values, moved) for m, moved in along]
         return self._thinned(rows)
 
-    def _of_late(self, effect: Effect) -> Iterator[Term]:
-        """Yield a delay or a lag at each length of a grid."""
+    def _lengths(self, effect: Effect) -> list[float]:
+        """Return the lengths of a delay or a lag that are tried."""
         (parameter,) = (p for p in effect.parameters if p.fitted)
         longest = usual(effect, parameter, self.scales)
         if self.fit.motions[0].equations.n_coordinates == 1:
@@ -122,7 +139,12 @@ class EffectTerms:
         lengths = longest * np.geomspace(LEAST_SHARE, _LATEST, POINTS[1])
         if parameter.lower < 0.0:
             lengths = np.concatenate([-lengths, lengths])
-        for length in map(float, lengths):
+        return [float(length) for length in lengths]
+
+    def _of_late(self, effect: Effect, lengths: Sequence[float]) -> Iterator[Term]:
+        """Yield a delay or a lag of each length."""
+        (parameter,) = (p for p in effect.parameters if p.fitted)
+        for length in lengths:
             rows = self.acting(effect, {parameter.name: length})
             if rows is None:
                 return
@@ -170,6 +192,7 @@ def _of_joint(
     values: Mapping[str, float],
     scales: Mapping[str, float],
     moved: Sequence[JointMotion],
+    points: Sequence[Mapping[str, float]] | None,
 ) -> Iterator[Term]:
     joint = joint_of(fit.rig, effect)
     springs = effect.spring is not None or effect.deflection is not None
@@ -181,9 +204,11 @@ def _of_joint(
         one_sided = (False,) * len(linear)
     else:
         one_sided = tuple(p.lower >= 0.0 for p in linear) or (True,)
-    for inner in grid_of(effect, linear, scales):
+    for inner in grid_of(effect, linear, scales) if points is None else points:
         nothing = dict.fromkeys((p.name for p in linear), 0.0)
-        own = [{**inner, **nothing, p.name: unit} for p, unit in zip(linear, units, strict=True)] or [inner]
+        own = [{**inner, **nothing, p.name: unit} for p, unit in zip(linear, units, strict=True)] or [
+            dict(inner)
+        ]
         try:
             columns = tuple(
                 motion.thinned(np.array([generalized(motion, effect, o, values, along) for o in own]))

@@ -19,13 +19,13 @@ from rigsight.identify.rig_equations import FUNCTIONS
 from rigsight.inverse.measured_motion import RecordMotion, speed_at_rest
 from rigsight.records import Record
 from rigsight.rigs import Joint, Rig, evaluated, rig_of_tables
-from rigsight.simulate import compose, simulate
+from rigsight.simulate import Structure, compose, simulate
 
 Floats = NDArray[np.float64]
 
 _ROUNDS = 60
 """Rounds in which friction and the load that it depends on settle; each shortens the difference by the friction coefficient."""
-_ACCURACY = 1e-7
+_ACCURACY = 1e-5
 _ELEMENT: dict[str, Any] = {
     "name": "measured_joint",
     "summary": "A joint moves as it was measured.",
@@ -71,6 +71,18 @@ class JointMotion:
         if moving.size:
             signs[: moving[0]], signs[moving[-1] :] = signs[moving[0]], signs[moving[-1]]
         return np.asarray(signs * np.maximum(np.abs(self.v), 1e-12 * least))
+
+    @cached_property
+    def of_spring(self) -> Floats:
+        """The force of its spring alone, simulated as effects with a history are."""
+        return self.simulated(compose(_element()), {})
+
+    def simulated(self, structure: Structure, own: Mapping[str, float]) -> Floats:
+        """Return the force of the prescribed joint, from equilibrium at the first sample on, shape (n_samples,)."""
+        signals = {"x": self.x + self.rest}
+        record = Record(name=self.record.name, dt=self.record.dt, signals=signals, units={}, hold="foh")
+        values = {"k": self.stiffness, "x_off": self.rest, "m_j": 0.0, **own}
+        return simulate(structure, values, record, accuracy=_ACCURACY)["force"]
 
 
 def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]) -> JointMotion:
@@ -195,16 +207,7 @@ def _unplaced(key: ByIdentity[Effect]) -> Effect:
 
 def _simulated(effect: Effect, values: Mapping[str, float], motion: JointMotion) -> Floats:
     """Return the force of an effect with a history, from equilibrium at the first sample on."""
-    record = Record(
-        name=motion.record.name,
-        dt=motion.record.dt,
-        signals={"x": motion.x + motion.rest},
-        units={},
-        hold="foh",
-    )
     alone = _unplaced(ByIdentity(effect))
-    structure, base = compose(_element(), [alone]), compose(_element())
-    own = {"k": motion.stiffness, "x_off": motion.rest, "m_j": 0.0}
+    structure = compose(_element(), [alone])
     named = {structure.parameter_name(alone, name): value for name, value in values.items()}
-    with_it = simulate(structure, {**own, **named}, record, accuracy=_ACCURACY)["force"]
-    return np.asarray(with_it - simulate(base, own, record, accuracy=_ACCURACY)["force"])
+    return motion.simulated(structure, named) - motion.of_spring

@@ -1,4 +1,9 @@
-"""The values of the nonlinear parameters of an effect that are tried along the measured motion."""
+"""The values of nonlinear parameters that are tried along the measured motion: a grid, then points beside its best one.
+
+References
+----------
+T. G. Kolda, R. M. Lewis and V. Torczon, SIAM Review 45 (2003) 385, for compass search.
+"""
 
 from __future__ import annotations
 
@@ -26,15 +31,35 @@ def grid_of(
     effect: Effect, linear: Sequence[Parameter], scales: Mapping[str, float]
 ) -> Iterator[dict[str, float]]:
     """Yield the values of all parameters in which an effect is not linear, by their own names."""
-    inside = [p for p in effect.parameters if p.fitted and p not in linear]
     held = {p.name: p.held_at(usual(effect, p, scales)) for p in effect.parameters if not p.fitted}
+    grids = _grids(effect, [p for p in effect.parameters if p.fitted and p not in linear], scales)
+    for values in itertools.product(*grids.values()):
+        yield {**held, **dict(zip(grids, map(float, values), strict=True))}
+
+
+def beside(
+    effect: Effect, inner: Mapping[str, float], scales: Mapping[str, float], halvings: int
+) -> Iterator[dict[str, float]]:
+    """Yield the points on both sides of one along each parameter, at a step of the grid that was halved so often."""
+    grids = _grids(effect, [p for p in effect.parameters if p.fitted and p.name in inner], scales)
+    for name, grid in grids.items():
+        if grid.size < 2:
+            continue
+        for way in (-(0.5**halvings), 0.5**halvings):
+            step = way * (grid[1] - grid[0])
+            moved = (
+                inner[name] + step if name == effect.wave_number else inner[name] * (grid[1] / grid[0]) ** way
+            )
+            if grid[0] <= moved <= grid[-1]:
+                yield {**inner, name: float(moved)}
+
+
+def _grids(effect: Effect, inside: Sequence[Parameter], scales: Mapping[str, float]) -> dict[str, Floats]:
     n = POINTS.get(len(inside), 2)
-    grids = [
-        _waves(effect, p, scales) if p.name == effect.wave_number else _grid(effect, p, scales, n)
+    return {
+        p.name: _waves(effect, p, scales) if p.name == effect.wave_number else _grid(effect, p, scales, n)
         for p in inside
-    ]
-    for values in itertools.product(*grids):
-        yield {**held, **dict(zip((p.name for p in inside), map(float, values), strict=True))}
+    }
 
 
 def _grid(effect: Effect, parameter: Parameter, scales: Mapping[str, float], n: int) -> Floats:

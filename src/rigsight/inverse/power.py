@@ -14,8 +14,8 @@ import numpy as np
 
 from rigsight.effects import Effect, Family, kind_of, placed_dimension
 from rigsight.inverse.effect_terms import EffectTerms
-from rigsight.inverse.proposal import Key, Selection
 from rigsight.inverse.propose import selection_of
+from rigsight.inverse.selection import Key, Selection
 from rigsight.units import characteristic_value
 
 NAMED_IN = 0.8

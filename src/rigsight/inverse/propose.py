@@ -1,8 +1,9 @@
 """The missing force first: which families of effects at which places explain what the equations leave along the measured motion.
 
 The equations of motion are a regression along the motion that the sensors show: their numbers and those of the effects are linear
-in it or tried on a grid, so its optimum is global and nothing is simulated. Families are taken one by one, the one first that
-removes most of the residual of stretches that it was not fitted to. It proposes; fits of the simulation decide.
+in it or tried on a grid that becomes finer where it counts, so its optimum is global and nothing is simulated. Families are taken
+one by one, the one first that removes most of the residual of stretches that it was not fitted to. It proposes; fits of the
+simulation decide.
 
 References
 ----------
@@ -31,12 +32,16 @@ from rigsight.inverse.equation_fit import (
     with_all_inputs,
 )
 from rigsight.inverse.missing_force import missing_forces, noise_of_rows
-from rigsight.inverse.proposal import Proposal, Selection
+from rigsight.inverse.proposal import Proposal
+from rigsight.inverse.selection import Selection
 from rigsight.inverse.smooth_signals import shifted
 from rigsight.inverse.tone_terms import of_tone
 from rigsight.simulate import compose
 
 Floats = NDArray[np.float64]
+
+_HALVINGS = 5
+"""Halvings of the grid's step: points of one parameter are then 3 % apart."""
 
 
 def propose(
@@ -96,6 +101,11 @@ def selection_of(
     if not terms:
         return None
     selection = Selection(fit, values, terms, noise)
+    for halvings in range(1, _HALVINGS + 1):
+        leading = selection.leading(fit.rig)
+        selection = selection.with_terms(
+            [near for term in leading for near in terms_of.beside(term, halvings)]
+        )
     left = selection.residuals(selection.selected(fit.rig))
     tones = [
         term
@@ -103,7 +113,7 @@ def selection_of(
         if e.pulsation is not None
         for term in of_tone(e, terms_of.fit, terms_of.values, left)
     ]
-    return Selection(fit, values, [*terms, *tones], noise) if tones else selection
+    return selection.with_terms(tones)
 
 
 def along_motion(campaign: Campaign, known: Mapping[str, float]) -> EffectTerms | None:

@@ -36,8 +36,12 @@ def of_sensor(
     values: Mapping[str, float],
     scales: Mapping[str, float],
     by_motion: Sequence[Floats],
+    points: Sequence[Mapping[str, float]] | None = None,
 ) -> Iterator[Term]:
-    """Yield what small changes of the reading, which undo a unit of each linear parameter, change in the equations."""
+    """Yield what small changes of the reading, which undo a unit of each linear parameter, change in the equations.
+
+    At points of the nonlinear parameters, or on their grid.
+    """
     name = fit.rig.acts_at(effect)
     if effect.measured is None or effect.states or any(name not in motion.record for motion in fit.motions):
         return
@@ -46,7 +50,7 @@ def of_sensor(
     linear = [p for p in fitted if not slopes[p].has(sp.Symbol(p.name, real=True))]
     if any(slopes[p].has(sp.Symbol(other.name, real=True)) for p in linear for other in linear):
         return
-    for inner in grid_of(effect, linear, scales):
+    for inner in grid_of(effect, linear, scales) if points is None else points:
         arguments = (canonical.reading, *(sp.Symbol(own, real=True) for own in inner))
         columns = []
         for motion, by in zip(fit.motions, by_motion, strict=True):

@@ -334,8 +334,8 @@ class SearchNumbers:
         0.5,
         "assumption",
         (
-            "Share of that from which on another family, or another form beside other causes, may be the cause: grids and "
-            "first-order terms understate some."
+            "Share of that from which on another family, or another form beside other causes, may be the cause: terms of first "
+            "order understate some."
         ),
     )
     noise_of_force: float = number(

@@ -144,6 +144,14 @@ def test_an_encoder_never_reads_backwards(base: Base, campaign: Campaign) -> Non
         spiked(base, spot, steep, campaign.records[0])
 
 
+def test_no_tone_is_faster_than_the_samples_show(base: Base, campaign: Campaign) -> None:
+    record = campaign.estimation[0]
+    spot, nyquist = _spot(base, "periodic_disturbance"), np.pi / record.dt
+    spiked(base, spot, {"T_p": 0.01, "w_p": 0.9 * nyquist}, record)
+    with pytest.raises(SimulationError, match="half the sampling frequency"):
+        spiked(base, spot, {"T_p": 0.01, "w_p": 1.1 * nyquist}, record)
+
+
 @pytest.mark.parametrize("kind", ADDED)
 def test_a_changed_record_is_one_of_the_rig_with_the_effect(
     campaign: Campaign, base: Base, kind: str

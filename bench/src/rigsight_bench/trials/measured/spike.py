@@ -106,6 +106,8 @@ def _changed(base: Base, spot: Spot, values: Mapping[str, float], record: Record
     motion = record_motion(base.rig, record, base.values)
     if motion is None:
         raise SimulationError(f"The sensors of the record '{record.name}' do not show the motion.")
+    if values.get(spot.effect.pulsation or "", 0.0) * record.dt > math.pi:
+        raise SimulationError(f"{spot.effect.name} would be above half the sampling frequency.")
     joint = joint_of(base.rig, spot.effect)
     force = effect_force(spot.effect, values, joint_motion(motion, joint, base.values))
     added = force if spot.way == "force_in_reading" else force * _per_force(base, spot, motion)
