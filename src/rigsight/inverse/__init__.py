@@ -22,6 +22,7 @@ from rigsight.inverse.power import named_sizes as named_sizes
 from rigsight.inverse.proposal import Proposal as Proposal
 from rigsight.inverse.proposal import ProposedCause as ProposedCause
 from rigsight.inverse.proposal import ProposedForm as ProposedForm
+from rigsight.inverse.proposal import ProposedStart as ProposedStart
 from rigsight.inverse.propose import along_motion as along_motion
 from rigsight.inverse.propose import numbers_along_motion as numbers_along_motion
 from rigsight.inverse.propose import propose as propose

@@ -21,6 +21,14 @@ class ProposedForm:
 
 
 @dataclass(frozen=True)
+class ProposedStart:
+    """Values at which an effect alone explains most of the missing force."""
+
+    own: Mapping[str, float]  # its parameters
+    numbers: Mapping[str, float]  # parameters of the equations beside it
+
+
+@dataclass(frozen=True)
 class ProposedCause:
     """A family at a place, in the form that explains most."""
 
@@ -70,8 +78,8 @@ class Proposal:
     # Parameters of the equations beside those taken, and beside any others.
     numbers: Mapping[str, float] = field(default_factory=dict)
     numbers_beside: NumbersBeside | None = field(default=None, repr=False, compare=False)
-    # Parameters of every effect alone, by its name, where it can have the sign that it needs.
-    starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    # Of every effect by its name, where it can have the sign that it needs.
+    starts: Mapping[str, ProposedStart] = field(default_factory=dict)
 
     @property
     def effects(self) -> tuple[Effect, ...]:

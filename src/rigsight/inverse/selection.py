@@ -19,7 +19,7 @@ from rigsight.effects import Effect, Family
 from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.numbers_beside import NumbersBeside
-from rigsight.inverse.proposal import Proposal, ProposedCause, ProposedForm
+from rigsight.inverse.proposal import Proposal, ProposedCause, ProposedForm, ProposedStart
 from rigsight.inverse.term import Term
 from rigsight.rigs import Rig
 
@@ -275,17 +275,22 @@ class Selection:
             name = self.terms[i].effect.name
             starts[name] = min(starts.get(name, (remainder, i)), (remainder, i))
         beside_any = self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()})
+
+        def numbers(columns: Sequence[int]) -> dict[str, float]:
+            return dict(zip(beside_any.names, map(float, beside_any.values(columns)), strict=True))
+
         return Proposal(
             taken,
             alone,
             judged,
             explained,
             self.by_chance,
-            numbers=dict(
-                zip(beside_any.names, map(float, beside_any.values(self.columns_of(selected))), strict=True)
-            ),
+            numbers=numbers(self.columns_of(selected)),
             numbers_beside=beside_any,
-            starts={name: self._values(i, []) for name, (_, i) in starts.items()},
+            starts={
+                name: ProposedStart(self._values(i, []), numbers(self.places[i]))
+                for name, (_, i) in starts.items()
+            },
         )
 
     def _intervals(self, terms: Sequence[int]) -> list[tuple[float, float]]:

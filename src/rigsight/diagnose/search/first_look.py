@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,10 +62,12 @@ def look_at(
     hold: frozenset[str] = frozenset(),
     substeps: Sequence[int] | None = None,
     are_enough: bool = False,
+    numbers: Mapping[str, float] = MappingProxyType({}),
 ) -> FirstLook:
     """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect.
 
-    `further` are more values of its own parameters; where they `are_enough`, its declared starts are left out.
+    `further` are more values of its own parameters, with `numbers` of the equations beside them; where they `are_enough`, its
+    declared starts are left out.
     """
     structure = context.simplest(effects, base.structure)
     known = context.constant_forces_beside(structure.effects)
@@ -74,7 +77,10 @@ def look_at(
     if context.given and context.leaves_numbers_open(base):
         from_given = replace(base, values={**base.values, **context.given})
         starts += start_values(context, structure, effects[-1], from_given, {})
-    own_starts = [{**starts[0], **with_own_values(structure, effects[-1], base, own)} for own in further]
+    beside = {name: value for name, value in numbers.items() if name in free}
+    own_starts = [
+        {**starts[0], **with_own_values(structure, effects[-1], base, own), **beside} for own in further
+    ]
     starts = own_starts if are_enough and own_starts else [*starts, *own_starts]
     starts = [{**start, **known} for start in starts]
     nearest = _looked(context, structure, free, starts, substeps)

@@ -28,6 +28,7 @@ from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.starts import restart_values
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, FitResult, off_bounds
+from rigsight.inverse import ProposedStart
 from rigsight.simulate import Structure
 
 _ROUGH_TOLERANCE = 1e-4
@@ -58,15 +59,15 @@ def fit_candidates(
     effects: Iterable[Effect],
     progress: Callable[[str], None] | None = None,
     known: Sequence[FittedModel] = (),
-    along_motion: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
+    along_motion: Mapping[str, ProposedStart] = MappingProxyType({}),
     is_shown: bool = False,
     reached: FittedModel | None = None,
 ) -> list[FittedModel]:
     """Return every effect alone, fitted and scored, with those that were before.
 
-    `along_motion` are values of the effects' own parameters that explain the missing force along the motion: one more start, or
-    the only one where the motion `is_shown`. `reached` is a model of several effects that leaves nothing: beside it one effect
-    alone only tells its share, so that rough fits are enough.
+    `along_motion` are values at which effects explain the missing force along the motion: one more start, or the only one where
+    the motion `is_shown`; then the equations start from their numbers there, too. `reached` is a model of several effects that
+    leaves nothing: beside it one effect alone only tells its share, so that rough fits are enough.
     """
     before = {model.effects[0].name: model.fit for model in known if np.isfinite(model.fit.cost)}
     looks = _looks(context, reidentified, context.offered(effects), along_motion, is_shown, before)
@@ -93,7 +94,7 @@ def _looks(
     context: FitContext,
     reidentified: FittedModel,
     effects: Sequence[Effect],
-    along_motion: Mapping[str, Mapping[str, float]],
+    along_motion: Mapping[str, ProposedStart],
     is_shown: bool,
     known: Mapping[str, FitResult],
 ) -> list[FirstLook]:
@@ -103,8 +104,13 @@ def _looks(
     waiting = list(effects)
 
     def one(parents: Mapping[str, FitResult], effect: Effect) -> FirstLook:
-        own = [along_motion[effect.name]] if effect.name in along_motion else []
-        return look_at(context, (effect,), reidentified.fit, parents, own, are_enough=is_shown)
+        start = along_motion.get(effect.name)
+        if start is None:
+            return look_at(context, (effect,), reidentified.fit, parents)
+        numbers = start.numbers if is_shown else {}
+        return look_at(
+            context, (effect,), reidentified.fit, parents, [start.own], are_enough=is_shown, numbers=numbers
+        )
 
     while waiting:
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]

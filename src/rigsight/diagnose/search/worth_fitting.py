@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.effects import Effect
-from rigsight.inverse import Proposal
+from rigsight.inverse import Proposal, ProposedStart
 from rigsight.rigs import Rig
 
 
@@ -20,8 +20,8 @@ class WorthFitting:
     # Whether the motion shows every force that matters: a family that it rules out is not the main cause.
     is_shown: bool = False
     explained: float = 0.0  # share of the missing force that one family explains, or all that were taken
-    # Own parameters of effects by their names, with which they explain most of the missing force along the motion.
-    starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    # Of effects by their names: where they explain most of the missing force along the motion.
+    starts: Mapping[str, ProposedStart] = field(default_factory=dict)
 
 
 def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]) -> WorthFitting:
