@@ -193,6 +193,15 @@ def test_in_a_motion_of_one_frequency_an_overtone_is_no_tone() -> None:
     assert "periodic_disturbance" not in proposed(own).judged
 
 
+def test_a_tone_that_a_controller_counters_is_a_tone() -> None:
+    """The input then has nothing but the tone, and the motion nothing of it."""
+    own = campaign(AXIS, AXIS_VALUES, [], (10.0, 20.0))
+    countered = [r.with_signals(u=r["u"] + 60.0 * np.sin(31.0 * T + i)) for i, r in enumerate(own.records)]
+    found = proposed(replace(own, records=tuple(countered)))
+    assert found.taken[0].effect.name == "periodic_disturbance"
+    assert found.taken[0].values["w_p"] == pytest.approx(31.0, rel=5e-3)
+
+
 @pytest.mark.parametrize("sharp", [None, 0.02])
 def test_a_family_is_proposed_in_its_plainest_form(sharp: float | None) -> None:
     """A sign that is rounded over a small speed is no other law of friction."""

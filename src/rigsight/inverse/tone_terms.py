@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from rigsight.effects import Effect
 from rigsight.frequency.persistent_line import line_power, persistent_line
 from rigsight.inverse.equation_fit import EquationFit, per_force
+from rigsight.inverse.joint_force import joint_motion
+from rigsight.inverse.measured_motion import RecordMotion
 from rigsight.inverse.term import Term
 from rigsight.rigs.rig import joint_of
 
@@ -20,7 +22,7 @@ _FINER = 8
 _MOST_PHASES = 12
 """Records up to which each has a tone of its own phase: of more, each is left out as a whole, and its phase is not known."""
 _OWN_LINE = 0.5
-"""Share of an input's power in one line from which the motion has one frequency (an assumption)."""
+"""Share of the power of an input and of the speed in one line from which the motion has one frequency (an assumption)."""
 _OVERTONES = (1, 2, 3, 4, 5)
 """Overtones of an input's line that laws of the motion make."""
 
@@ -29,27 +31,20 @@ def of_tone(
     effect: Effect, fit: EquationFit, values: Mapping[str, float], rows: Sequence[Floats]
 ) -> Iterator[Term]:
     """Yield a tone at the line that the residuals along all motions share; nothing where they share none."""
-    # Each record has a phase of its own. Where the motion has one frequency and this is an overtone, what follows from the motion
-    # and a tone are one.
+    # Each record has a phase of its own.
     motions, joint = fit.motions, joint_of(fit.rig, effect)
     pushes = [per_force(motion, joint, values) for motion in motions]
     row = int(np.argmax(sum(np.sum(push**2, axis=1) for push in pushes)))
     residuals = [own[row] for own in rows]
     steps = [motion.record.dt * motion.stride for motion in motions]
     line = persistent_line(residuals, steps)
-    inputs = [signal - np.mean(signal) for motion in motions for signal in motion.u[::3]]
     if line is None or len(motions) > _MOST_PHASES:
         return
     spacing = np.pi / max(r.size * dt for r, dt in zip(residuals, steps, strict=True))
     near = line + spacing * np.arange(-_FINER, _FINER + 1) / _FINER
     power = [sum(line_power(r, dt, w) for r, dt in zip(residuals, steps, strict=True)) for w in near]
     pulsation = float(near[int(np.argmax(power))])
-    of_inputs = zip(inputs, np.repeat([m.record.dt for m in motions], len(motions[0].u) // 3), strict=True)
-    if any(
-        line_power(signal, dt, pulsation / overtone) > _OWN_LINE * float(signal @ signal)
-        for signal, dt in of_inputs
-        for overtone in _OVERTONES
-    ):
+    if any(_is_of_motion(motion, joint_motion(motion, joint, values).v, pulsation) for motion in motions):
         return
     columns = []
     for i, (motion, push) in enumerate(zip(motions, pushes, strict=True)):
@@ -60,4 +55,20 @@ def of_tone(
     parts = 2 * len(motions)
     yield Term(
         effect, {effect.pulsation or "": pulsation}, (), (1.0,) * parts, tuple(columns), (False,) * parts
+    )
+
+
+def _is_of_motion(motion: RecordMotion, speed: Floats, pulsation: float) -> bool:
+    """Return whether a drive moves the joint at one frequency of which this is an overtone: its laws make tones.
+
+    A tone that a controller counters is in the input, one that nothing counters in the speed.
+    """
+
+    def has_line(signal: Floats, overtone: int) -> bool:
+        swing = signal - np.mean(signal)
+        return line_power(swing, motion.record.dt, pulsation / overtone) > _OWN_LINE * float(swing @ swing)
+
+    return any(
+        has_line(speed, overtone) and any(has_line(signal, overtone) for signal in motion.u[::3])
+        for overtone in _OVERTONES
     )
