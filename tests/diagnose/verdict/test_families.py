@@ -67,8 +67,13 @@ def test_a_law_that_is_no_exact_form_belongs_to_the_family_that_explains_the_gap
     # It leaves 0.16: the evidence of that beside the weight of any other cause.
     weight = 0.16**-FAMILIES.per_simulation
     assert found[0].probability == pytest.approx(
-        0.006 + 0.99 * weight / (weight + FAMILIES.other_causes), abs=0.01
+        0.006 + 0.99 * weight / ((1.0 + FAMILIES.failing) * weight + FAMILIES.other_causes), abs=0.01
     )
+
+
+def test_evidence_that_may_fail_makes_nothing_certain(families) -> None:
+    found, _ = families((("coulomb_friction",), 1e-3 * GAP, 0.0, 1.0), outside=1.0)
+    assert found[0].probability < 1.0 / (1.0 + FAMILIES.failing) < 0.98
 
 
 def test_a_rival_has_no_share_in_the_model_but_says_what_it_would_explain(families) -> None:

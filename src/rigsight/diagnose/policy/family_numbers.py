@@ -34,6 +34,13 @@ class FamilyNumbers:
         "nothing has the weight one.",
         set_by="the same trials",
     )
+    failing: float = number(
+        0.03,
+        "measured",
+        "Odds that the evidence itself fails, whatever it says: a fit ended elsewhere, or a form is unlike the true law at this "
+        "place. They limit every probability.",
+        set_by="experiments/missing_force: 99 known causes in measured records, the largest likelihood; 0.018 to 0.032 by seed",
+    )
     least_rank: float = number(
         0.1,
         "assumption",

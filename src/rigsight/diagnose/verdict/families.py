@@ -250,14 +250,14 @@ def _weighed(
         weights[key] = max(share, FAMILIES.least_rank) ** counts * math.exp(
             _evidence(simulated, 0.0, FAMILIES.per_simulation) + of_motion.get(key, 0.0)
         )
-    whole = math.fsum(weights.values()) + FAMILIES.other_causes
+    whole = (1.0 + FAMILIES.failing) * math.fsum(weights.values()) + FAMILIES.other_causes
     return {key: weight / whole for key, weight in weights.items()}
 
 
 def _second_cause(together: float, without: float) -> float:
     """Return how probable a family is as a further cause, from what a model explains with it and without it."""
     weight = math.exp(_evidence(together, without, FAMILIES.per_simulation))
-    return weight / (weight + FAMILIES.other_causes)
+    return weight / ((1.0 + FAMILIES.failing) * weight + FAMILIES.other_causes)
 
 
 def _evidence(explained: float, without: float, per_share: float) -> float:
