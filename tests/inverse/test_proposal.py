@@ -119,9 +119,20 @@ def test_what_lies_between_two_points_of_the_grid_is_found(
 ) -> None:
     hidden = effect_named(effect)
     found = proposed(campaign(AXIS, {**AXIS_VALUES, **values}, [hidden], (10.0, 20.0)))
-    assert found.alone[0].effect.name == effect
-    assert found.alone[0].share > 0.97
-    assert found.alone[0].values[number] == pytest.approx(values[number], rel=0.05)
+    cause = next(cause for cause in found.alone if cause.effect.name == effect)
+    # A loop with two numbers more imitates a short presliding spring: fits tell them apart.
+    assert cause.share > max(0.97, found.alone[0].share - 1e-3)
+    assert cause.values[number] == pytest.approx(values[number], rel=0.05)
+
+
+def test_a_loop_comes_with_the_share_of_the_stiffness_that_it_keeps() -> None:
+    """This scales its force, as a coefficient does: it is no parameter of the grid."""
+    hidden, values = effect_named("iwan_hysteresis"), {"a": 0.3, "x_s": 0.04, "q": -0.4}
+    found = proposed(campaign(AXIS, {**AXIS_VALUES, **values}, [hidden], (10.0, 20.0)))
+    assert found.alone[0].effect.name == "iwan_hysteresis"
+    start = found.starts["iwan_hysteresis"]
+    assert start.numbers["k"] == pytest.approx(AXIS_VALUES["k"], rel=0.06)
+    assert start.own == pytest.approx(values, rel=0.06)
 
 
 def test_a_selection_with_further_terms_is_that_of_all_terms() -> None:

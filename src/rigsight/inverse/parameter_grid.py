@@ -19,7 +19,7 @@ from rigsight.units import characteristic_value
 
 Floats = NDArray[np.float64]
 
-POINTS = {0: 1, 1: 6, 2: 4}
+POINTS = {0: 1, 1: 6, 2: 4, 3: 3}
 """Points of the grid of each nonlinear parameter, by their number; two points beyond."""
 _WAVES = 40
 """Points of the grid of a wave number: between two of them a wave loses its phase at the ends of the motion."""
@@ -32,7 +32,11 @@ def grid_of(
 ) -> Iterator[dict[str, float]]:
     """Yield the values of all parameters in which an effect is not linear, by their own names."""
     held = {p.name: p.held_at(usual(effect, p, scales)) for p in effect.parameters if not p.fitted}
-    grids = _grids(effect, [p for p in effect.parameters if p.fitted and p not in linear], scales)
+    if effect.post_yield_stiffness_ratio is not None:
+        # It scales the force of the loop: the coefficient of the column tells it, see `Selection`.
+        held[effect.post_yield_stiffness_ratio] = 0.0
+    inside = [p for p in effect.parameters if p.fitted and p not in linear and p.name not in held]
+    grids = _grids(effect, inside, scales)
     for values in itertools.product(*grids.values()):
         yield {**held, **dict(zip(grids, map(float, values), strict=True))}
 
@@ -41,34 +45,34 @@ def beside(
     effect: Effect, inner: Mapping[str, float], scales: Mapping[str, float], halvings: int
 ) -> Iterator[dict[str, float]]:
     """Yield the points on both sides of one along each parameter, at a step of the grid that was halved so often."""
-    grids = _grids(effect, [p for p in effect.parameters if p.fitted and p.name in inner], scales)
-    for name, grid in grids.items():
+    ratio = effect.post_yield_stiffness_ratio
+    inside = [p for p in effect.parameters if p.fitted and p.name in inner and p.name != ratio]
+    for parameter, (name, grid) in zip(inside, _grids(effect, inside, scales).items(), strict=True):
         if grid.size < 2:
             continue
         for way in (-(0.5**halvings), 0.5**halvings):
-            step = way * (grid[1] - grid[0])
-            moved = (
-                inner[name] + step if name == effect.wave_number else inner[name] * (grid[1] / grid[0]) ** way
-            )
+            step, factor = way * (grid[1] - grid[0]), (grid[1] / grid[0]) ** way
+            moved = inner[name] + step if _is_even(effect, parameter) else inner[name] * factor
             if grid[0] <= moved <= grid[-1]:
                 yield {**inner, name: float(moved)}
 
 
 def _grids(effect: Effect, inside: Sequence[Parameter], scales: Mapping[str, float]) -> dict[str, Floats]:
     n = POINTS.get(len(inside), 2)
-    return {
-        p.name: _waves(effect, p, scales) if p.name == effect.wave_number else _grid(effect, p, scales, n)
-        for p in inside
-    }
+    return {p.name: _grid(effect, p, scales, n) for p in inside}
+
+
+def _is_even(effect: Effect, parameter: Parameter) -> bool:
+    """Return whether the points of a parameter are evenly spaced: of a wave number, and of an exponent whose sign is open."""
+    return parameter.name == effect.wave_number or -MOST_SHARE <= parameter.search[0] < 0.0
 
 
 def _grid(effect: Effect, parameter: Parameter, scales: Mapping[str, float], n: int) -> Floats:
+    if _is_even(effect, parameter):
+        n = _WAVES if parameter.name == effect.wave_number else n
+        return usual(effect, parameter, scales) * np.linspace(*parameter.search, n)
     low, high = max(parameter.search[0], LEAST_SHARE), min(parameter.search[1], MOST_SHARE)
     return usual(effect, parameter, scales) * np.geomspace(low, 0.97 * high, n)
-
-
-def _waves(effect: Effect, parameter: Parameter, scales: Mapping[str, float]) -> Floats:
-    return usual(effect, parameter, scales) * np.linspace(*parameter.search, _WAVES)
 
 
 def usual(effect: Effect, parameter: Parameter, scales: Mapping[str, float]) -> float:

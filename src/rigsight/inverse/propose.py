@@ -35,6 +35,7 @@ from rigsight.inverse.missing_force import missing_forces, noise_of_rows
 from rigsight.inverse.proposal import Proposal
 from rigsight.inverse.selection import Selection
 from rigsight.inverse.smooth_signals import shifted
+from rigsight.inverse.term import Term
 from rigsight.inverse.tone_terms import of_tone
 from rigsight.simulate import compose
 
@@ -42,6 +43,8 @@ Floats = NDArray[np.float64]
 
 _HALVINGS = 5
 """Halvings of the grid's step: points of one parameter are then 3 % apart."""
+_ROUNDS = 10
+"""Rounds of this compass search: parameters that act together need some more moves than halvings."""
 
 
 def propose(
@@ -100,12 +103,7 @@ def selection_of(
     terms = [term for effect in effects for term in terms_of.of(effect)]
     if not terms:
         return None
-    selection = Selection(fit, values, terms, noise)
-    for halvings in range(1, _HALVINGS + 1):
-        leading = selection.leading(fit.rig)
-        selection = selection.with_terms(
-            [near for term in leading for near in terms_of.beside(term, halvings)]
-        )
+    selection = _with_finer_grid(Selection(fit, values, terms, noise), terms_of)
     left = selection.residuals(selection.selected(fit.rig))
     tones = [
         term
@@ -114,6 +112,23 @@ def selection_of(
         for term in of_tone(e, terms_of.fit, terms_of.values, left)
     ]
     return selection.with_terms(tones)
+
+
+def _with_finer_grid(selection: Selection, terms_of: EffectTerms) -> Selection:
+    """Return the selection with terms beside the leading ones; the step of one is halved when none beside it is better."""
+    halvings: dict[Term, int] = {}
+    for _ in range(_ROUNDS):
+        finer = []
+        for term in selection.leading(terms_of.fit.rig):
+            halvings[term] = halved = halvings.get(term, 0) + 1
+            if halved <= _HALVINGS:
+                near = list(terms_of.beside(term, halved))
+                halvings |= dict.fromkeys(near, halved - 1)
+                finer += near
+        if not finer:
+            break
+        selection = selection.with_terms(finer)
+    return selection
 
 
 def along_motion(campaign: Campaign, known: Mapping[str, float]) -> EffectTerms | None:

@@ -21,7 +21,8 @@ from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.numbers_beside import NumbersBeside
 from rigsight.inverse.proposal import Proposal, ProposedCause, ProposedForm, ProposedStart
 from rigsight.inverse.term import Term
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
+from rigsight.rigs.rig import joint_of
 
 Floats = NDArray[np.float64]
 Key = tuple[Family, str]
@@ -37,6 +38,8 @@ _SIGNIFICANCE = 0.01
 _DRAWS, _LIMITS = 100, (0.025, 0.975)
 """Resamplings of the stretches for the interval of a share, and its limits."""
 _SMOOTH = 1e-9
+_SHARES = (0.02, 0.98)
+"""Limits of the share of the stiffness that a loop keeps: at 1 it would vanish."""
 _NEAR = 0.5
 """Share of what the best effect alone removes from which on a finer grid may make another one the best (a convention)."""
 
@@ -335,12 +338,24 @@ class Selection:
     def _values(self, i: int, chosen: Sequence[int]) -> dict[str, float]:
         """Return the parameters of the effect of a term beside chosen columns."""
         term, columns = self.terms[i], [*self.own, *chosen, *self.places[i]]
-        numbers = self._solved(self.whole, columns)[-len(self.places[i]) :] / self.size[self.places[i]]
+        solved = self._solved(self.whole, columns) / self.size[columns]
+        numbers = solved[-len(self.places[i]) :]
         linear = {
             name: float(number) * unit
             for name, number, unit in zip(term.names, numbers, term.units, strict=False)
         }
+        ratio = term.effect.post_yield_stiffness_ratio
+        if ratio is not None:
+            linear[ratio] = self._soft_share(term.effect, float(numbers[0]), solved[: len(self.own)])
         return {**term.inner, **linear}
+
+    def _soft_share(self, effect: Effect, coefficient: float, change: Floats) -> float:
+        """Return the share of a joint's stiffness that its loop keeps, from the part that yields and a change of the numbers."""
+        stiffness, known = joint_of(self.fit.rig, effect).stiffness, self.fit.motions[0].record.constants
+        changed = {name: self.values[name] + own for name, own in zip(self.fit.free, change, strict=True)}
+        before, after = (evaluated(stiffness, {**self.values, **own, **known}) for own in ({}, changed))
+        least, most = _SHARES
+        return float(np.clip(1.0 - coefficient * before / after, least, most)) if after > 0.0 else least
 
 
 def _n_fitted(effect: Effect) -> int:
