@@ -135,6 +135,33 @@ def test_a_loop_comes_with_the_share_of_the_stiffness_that_it_keeps() -> None:
     assert start.own == pytest.approx(values, rel=0.06)
 
 
+@pytest.mark.parametrize(
+    ("effect", "values"), [("input_dead_zone", {"u_0": 7.0}), ("input_saturation", {"u_max": 9.0})]
+)
+def test_what_a_drive_loses_of_its_input_is_found_beside_a_loop(
+    effect: str, values: Mapping[str, float]
+) -> None:
+    loop = {"A": 1.0, "a": 0.4, "beta": 30.0, "gamma": 5.0, "n": 1.3}
+    effects = [effect_named(effect), effect_named("bouc_wen_hysteresis")]
+    found = proposed(campaign(AXIS, {**AXIS_VALUES, **loop, **values}, effects, (10.0, 20.0)))
+    assert (found.taken[0].effect.name, found.taken[0].family) == (effect, "drive_limit")
+    assert found.taken[0].values == pytest.approx(values, rel=0.1)
+    assert {"memory", "dry_friction"} & {cause.family for cause in found.taken}
+
+
+@pytest.mark.parametrize("part", [0.5, 0.999])
+def test_a_loss_that_scales_all_forces_explains_nothing(part: float) -> None:
+    own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [effect_named("coulomb_friction")], (10.0, 20.0))
+    terms_of = along_motion(own, {**own.constants, **own.given})
+    assert terms_of is not None
+    fit, values = terms_of.fit, terms_of.values
+    columns = tuple(motion.thinned(part * motion.forces(values)[1])[None] for motion in fit.motions)
+    loss = Term(effect_named("input_saturation"), {}, (), (), columns, (False,), is_given=True)
+    selection = Selection(fit, values, [loss])
+    regression = selection.regression
+    assert regression.remainder(selection.places[0]) == pytest.approx(regression.remainder([]), rel=1e-5)
+
+
 def test_a_selection_with_further_terms_is_that_of_all_terms() -> None:
     own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [effect_named("coulomb_friction")], (10.0, 20.0))
     terms_of = along_motion(own, {**own.constants, **own.given})
@@ -143,9 +170,9 @@ def test_a_selection_with_further_terms_is_that_of_all_terms() -> None:
     whole = Selection(terms_of.fit, terms_of.values, [*few, *more])
     grown = Selection(terms_of.fit, terms_of.values, few).with_terms(more)
     assert grown.places == whole.places
-    assert np.allclose(grown.matrix, whole.matrix, rtol=1e-12)
-    assert np.allclose(grown.products, whole.products, rtol=1e-9)
-    assert np.allclose(grown.whole, whole.whole, rtol=1e-9)
+    assert np.allclose(grown.regression.matrix, whole.regression.matrix, rtol=1e-12)
+    assert np.allclose(grown.regression.products, whole.regression.products, rtol=1e-9)
+    assert np.allclose(grown.regression.whole, whole.regression.whole, rtol=1e-9)
 
 
 def test_friction_beside_a_constant_force_does_not_drive_both_ways() -> None:

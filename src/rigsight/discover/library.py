@@ -181,7 +181,7 @@ def term_signals(
 ) -> Iterator[TermSignals]:
     """Yield an effect along measured motions, for each point of the grid of its nonlinear parameters."""
     fitted = [p for p in effect.parameters if p.fitted]
-    linear = [p for p in fitted if effect.torque is not None and _is_linear(effect, p)]
+    linear = effect.linear_parameters
     inside = [p for p in fitted if p not in linear]
     names = tuple(p.name for p in linear)
     held = {
@@ -193,10 +193,6 @@ def term_signals(
         inner = {**held, **dict(zip((p.name for p in inside), values, strict=True))}
         parts = tuple(tuple(_signals(effect, linear, inner, motion)) for motion in motions)
         yield TermSignals(effect, inner, names, parts)
-
-
-def _is_linear(effect: Effect, parameter: Parameter) -> bool:
-    return not _slope(effect, parameter).has(sp.Symbol(parameter.name, real=True))
 
 
 def _grid(parameter: Parameter, scales: Mapping[str, float]) -> list[float]:

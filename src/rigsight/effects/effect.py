@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 
 import sympy as sp
 
@@ -279,6 +280,19 @@ class Effect:
         """True for a force whose mean depends on the direction: no record distinguishes this mean from a constant force."""
         lopsided = self.torque is not None and self.signature.even_harmonics
         return lopsided and not (self.reads(symbols.x) or self.reads(symbols.position))
+
+    @cached_property
+    def linear_parameters(self) -> tuple[Parameter, ...]:
+        """Fitted parameters in which its torque is linear; those of its states are none."""
+        if self.torque is None:
+            return ()
+        symbols_of = {p: sp.Symbol(p.name, real=True) for p in self.parameters if p.fitted}
+        in_states = set().union(*(state.rate.free_symbols for state in self.states))
+        return tuple(
+            parameter
+            for parameter, symbol in symbols_of.items()
+            if symbol not in in_states and not symbols.derivative(self.torque, symbol).has(symbol)
+        )
 
     @property
     def reads_inertia(self) -> bool:

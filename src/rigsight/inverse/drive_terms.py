@@ -1,12 +1,12 @@
 """Effects of a drive along measured motions.
 
-They are functions of the force that the motion requires, not of the logged input: a clip of the logged input would explain that
-input.
+Where a controller makes the motion, errors of laws are in the input: what the drive adds to it is a function of the force that
+the motion requires. Where nothing reacts to the motion, what the drive loses is a function of the logged input.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 import sympy as sp
@@ -17,7 +17,7 @@ from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.inverse.equation_fit import EquationFit
 from rigsight.inverse.measured_motion import RecordMotion, along_change
-from rigsight.inverse.parameter_grid import usual
+from rigsight.inverse.parameter_grid import grid_of, usual
 from rigsight.inverse.term import Term, compiled
 from rigsight.rigs import Drive, evaluated
 
@@ -37,7 +37,7 @@ def late_drive(
     return np.asarray(along * more)
 
 
-def of_drive(
+def of_required(
     effect: Effect, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]
 ) -> Iterator[Term]:
     """Yield what the input must give beyond what reaches the motion, a function of what the motion requires.
@@ -45,19 +45,69 @@ def of_drive(
     To first order in small parameters. With large ones nearly all of the required force is lost, and this force holds the
     residual that it would explain.
     """
+    if not all(p.null == 0.0 for p in effect.parameters):
+        return
+    found = _driving(effect, fit, values)
+    if found is None:
+        return
+    drive, _, _ = found
+    small = {p.name: _SMALL_PART * usual(effect, p, scales) for p in effect.parameters}
+    columns = [
+        motion.thinned(lost(drive, effect, small, fit, motion, values))[None] for motion in fit.motions
+    ]
+    if not all(np.all(np.isfinite(column)) for column in columns):
+        return
+    if len(small) == 1:
+        yield Term(effect, {}, tuple(small), tuple(small.values()), tuple(columns), (True,))
+    else:
+        yield Term(effect, small, (), (), tuple(columns), (True,))
+
+
+def of_given(
+    effect: Effect,
+    fit: EquationFit,
+    values: Mapping[str, float],
+    scales: Mapping[str, float],
+    points: Sequence[Mapping[str, float]] | None,
+) -> Iterator[Term]:
+    """Yield the force that a drive loses of its input, at points of its parameters or on their grid.
+
+    It is given, not fitted: a limit that loses nearly all of the input would else explain all that is left of it.
+    """
+    found = _driving(effect, fit, values)
+    if found is None:
+        return
+    drive, per_input, reaching = found
+    for own in grid_of(effect, [], scales) if points is None else points:
+        columns = []
+        for motion, gain in zip(fit.motions, per_input, strict=True):
+            equations, p = motion.equations, motion.equations.parameters(values, motion.record)
+            along = equations.slopes_along(motion.z, motion.u, p)[drive.name]
+            force = equations.at_places(motion.z, motion.u, p)[f"force@{drive.name}"]
+            lost_force = force - gain * reaching(force / gain, *own.values())
+            columns.append(motion.thinned(along * lost_force)[None])
+        if all(np.all(np.isfinite(column)) for column in columns) and any(map(np.any, columns)):
+            yield Term(effect, own, (), (), tuple(columns), (False,), is_given=True)
+
+
+def _driving(
+    effect: Effect, fit: EquationFit, values: Mapping[str, float]
+) -> tuple[Drive, list[float], Callable[..., Floats]] | None:
+    """Return the drive of an effect, its force per input in each record, and what the effect lets through of an input."""
     drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
     per_input = [_force_per_input(drive, {**values, **motion.record.constants}) for motion in fit.motions]
+    reaching = _reaching(effect)
+    if reaching is None or not fit.motions[0].equations.n_coordinates or not all(per_input):
+        return None
+    return drive, per_input, reaching
+
+
+def _reaching(effect: Effect) -> Callable[..., Floats] | None:
+    """Return what a drive effect lets through as a function of its input and its parameters; None for one that reads more."""
     own = [sp.Symbol(p.name, real=True) for p in effect.parameters]
-    is_function = effect.drive is not None and effect.drive.free_symbols <= {canonical.u, *own}
-    vanishes = all(p.null == 0.0 for p in effect.parameters)
-    if not (is_function and vanishes and fit.motions[0].equations.n_coordinates and all(per_input)):
-        return
-    inner = {p.name: _SMALL_PART * usual(effect, p, scales) for p in effect.parameters}
-    columns = [
-        motion.thinned(lost(drive, effect, inner, fit, motion, values))[None] for motion in fit.motions
-    ]
-    if all(np.all(np.isfinite(column)) for column in columns):
-        yield Term(effect, inner, (), (), tuple(columns), (True,))
+    if effect.drive is None or not effect.drive.free_symbols <= {canonical.u, *own}:
+        return None
+    return compiled(effect.drive, (canonical.u, *own))
 
 
 def lost(
@@ -69,10 +119,9 @@ def lost(
     values: Mapping[str, float],
 ) -> Floats:
     """Return the force that a drive effect takes from what the motion requires, shape (n_equations, n_samples)."""
-    assert effect.drive is not None
-    gain = _force_per_input(drive, {**values, **motion.record.constants})
+    gain, reaching = _force_per_input(drive, {**values, **motion.record.constants}), _reaching(effect)
+    assert reaching is not None
     along, force = _required(drive, fit, motion, values)
-    reaching = compiled(effect.drive, (canonical.u, *(sp.Symbol(name, real=True) for name in own)))
     return np.asarray(along * (force - gain * reaching(force / gain, *own.values())))
 
 

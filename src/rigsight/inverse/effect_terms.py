@@ -19,13 +19,12 @@ from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
-from rigsight.inverse.drive_terms import late_drive, lost, of_drive
+from rigsight.inverse.drive_terms import late_drive, lost, of_given, of_required
 from rigsight.inverse.equation_fit import EquationFit, generalized
 from rigsight.inverse.joint_force import JointMotion, joint_motion
 from rigsight.inverse.parameter_grid import LEAST_SHARE, POINTS, beside, grid_of, usual
 from rigsight.inverse.sensor_terms import influence, late_reading, of_sensor
 from rigsight.inverse.term import Term, compiled
-from rigsight.parameters import Parameter
 from rigsight.rigs import evaluated
 from rigsight.rigs.rig import joint_of
 
@@ -73,14 +72,14 @@ class EffectTerms:
             return
         if is_late(effect):
             yield from self._of_late(effect, self._lengths(effect))
-        elif effect.place is Place.ACTUATOR:
-            yield from of_drive(effect, self.fit, self.values, self.scales)
         else:
             yield from self._at(effect, None)
 
     def beside(self, term: Term, halvings: int) -> Iterator[Term]:
         """Yield the effect of a term on both sides of its nonlinear parameters, at a step of the grid halved so often."""
         if not is_late(term.effect):
+            if term.effect.place is Place.ACTUATOR and not term.is_given:
+                return
             yield from self._at(term.effect, list(beside(term.effect, term.inner, self.scales, halvings)))
             return
         (length,), lengths = term.units, self._lengths(term.effect)
@@ -89,9 +88,13 @@ class EffectTerms:
         yield from self._of_late(term.effect, [own for own in near if abs(own) <= lengths[-1]])
 
     def _at(self, effect: Effect, points: Sequence[Mapping[str, float]] | None) -> Iterator[Term]:
-        """Yield an effect of a sensor or a joint at points of its nonlinear parameters, or on their grid."""
+        """Yield an effect of a sensor, a drive or a joint at points of its nonlinear parameters, or on their grid."""
         if effect.place is Place.SENSOR:
             yield from of_sensor(effect, self.fit, self.values, self.scales, self._by_motion, points)
+        elif effect.place is Place.ACTUATOR:
+            if points is None:
+                yield from of_required(effect, self.fit, self.values, self.scales)
+            yield from of_given(effect, self.fit, self.values, self.scales, points)
         elif is_joint_force(effect) and not _is_resonance(effect):
             moved = self._motion_of(effect)
             yield from _of_joint(effect, self.fit, self.values, self.scales, moved, points)
@@ -198,7 +201,7 @@ def _of_joint(
     springs = effect.spring is not None or effect.deflection is not None
     if springs and not evaluated(joint.stiffness, {**values, **fit.motions[0].record.constants}) > 0.0:
         return
-    linear = [p for p in effect.parameters if p.fitted and _is_linear(effect, p)]
+    linear = effect.linear_parameters
     units = [usual(effect, p, scales) for p in linear]
     if effect.holds_constant_force and linear and all(p.lower >= 0.0 for p in linear):
         one_sided = (False,) * len(linear)
@@ -218,14 +221,6 @@ def _of_joint(
             return
         if all(np.all(np.isfinite(column)) for column in columns):
             yield Term(effect, inner, tuple(p.name for p in linear), tuple(units), columns, one_sided)
-
-
-def _is_linear(effect: Effect, parameter: Parameter) -> bool:
-    if effect.torque is None:
-        return False
-    symbol = sp.Symbol(parameter.name, real=True)
-    in_states = any(state.rate.has(symbol) for state in effect.states)
-    return not in_states and not derivative(effect.torque, symbol).has(symbol)
 
 
 def is_late(effect: Effect) -> bool:

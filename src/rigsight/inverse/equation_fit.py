@@ -67,8 +67,15 @@ def identifiable(
     values: Mapping[str, float],
     held: Collection[str],
 ) -> tuple[str, ...]:
-    """Return the parameters that the equations determine along the motions, beside those that are held."""
+    """Return the parameters that the equations determine along the motions, beside those that are held.
+
+    Those of modelled effects are linear ones, as all parameters that a regression determines.
+    """
+    structure = compose(rig, modelled)
     free = [p.name for p in rig.parameters if p.name not in held and matters(motions, values, p.name)]
+    free += [
+        structure.parameter_name(effect, p.name) for effect in modelled for p in effect.linear_parameters
+    ]
     # A constant force and the rest of a spring do the same: the rest stays where it is known.
     of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
     ordered = sorted(free, key=lambda name: name in of_rest)
@@ -225,13 +232,16 @@ class EquationFit:
     def slopes(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
         """Return the derivatives of `residual` by the free numbers along one motion, shape (n_free, n_equations, n_samples)."""
         of_rig = [name for name in self.free if name in motion.equations.structure.names]
-        found = list(motion.slopes(values, of_rig)) if of_rig else []
+        found = dict(zip(of_rig, motion.slopes(values, of_rig) if of_rig else [], strict=True))
         for effect in self.modelled:
-            for p in effect.parameters:
-                if self.structure.parameter_name(effect, p.name) in self.free:
-                    # Dry friction, which is linear in its number.
-                    found.append(self._along(motion, effect, {p.name: 1.0}, values))
-        return np.array(found) if found else np.zeros((0, *motion.residual(values).shape))
+            without = {**self._own(effect, values), **{p.name: 0.0 for p in effect.linear_parameters}}
+            for p in effect.linear_parameters:
+                name = self.structure.parameter_name(effect, p.name)
+                if name in self.free:
+                    found[name] = self._along(motion, effect, {**without, p.name: 1.0}, values)
+        if not found:
+            return np.zeros((0, *motion.residual(values).shape))
+        return np.array([found[name] for name in self.free])
 
     def _own(self, effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
         return {p.name: values[self.structure.parameter_name(effect, p.name)] for p in effect.parameters}

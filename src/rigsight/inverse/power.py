@@ -15,6 +15,7 @@ import numpy as np
 from rigsight.effects import Effect, Family, kind_of, placed_dimension
 from rigsight.inverse.effect_terms import EffectTerms
 from rigsight.inverse.propose import selection_of
+from rigsight.inverse.regression import STRETCHES
 from rigsight.inverse.selection import Key, Selection
 from rigsight.units import characteristic_value
 
@@ -69,8 +70,13 @@ def named_sizes(
     selection = selection_of(terms_of, effects)
     if selection is None:
         return [_none(terms_of, effect, _NOT_ASKED) for effect in effects]
-    # A tone is sought where the residual has a line: one that is hidden elsewhere would not be asked for.
-    judged = {term.effect.name for term in selection.terms if term.effect.pulsation is None}
+    # A tone is sought where the residual has a line: one that is hidden elsewhere would not be asked for. The input that a motion
+    # would need beyond a limit of a drive was never logged.
+    judged = {
+        term.effect.name
+        for term in selection.terms
+        if term.effect.pulsation is None and not (term.is_given and term.inner)
+    }
     known = selection.selected(rig)
     found = []
     for effect in effects:
@@ -85,8 +91,8 @@ def named_sizes(
 
 
 _NOT_ASKED = (
-    "Not judged along the motion: only fits of the simulation find resonances, tones, limits of drives, "
-    "and errors of sensors of which there are more than the motion needs."
+    "Not judged along the motion: only fits of the simulation find resonances, tones, and errors of sensors of which there are "
+    "more than the motion needs; what a drive would need beyond a limit was never logged."
 )
 
 
@@ -110,11 +116,12 @@ def _smallest(
         if rows is None:
             yield from (False,) * (1 + _RESAMPLINGS)
             return
-        added = selection.with_added(rows)
-        yield added.names(rig, key, known)
+        added = selection.regression.with_added(rows)
+        yield selection.with_regression(added).names(rig, key, known)
         rng = np.random.default_rng(seed)
         for _ in range(_RESAMPLINGS):
-            yield added.resampled(rng).names(rig, key, known)
+            counts = rng.multinomial(STRETCHES, np.full(STRETCHES, 1.0 / STRETCHES))
+            yield selection.with_regression(added.resampled(counts)).names(rig, key, known)
 
     as_they_are = [next(named(float(size))) for size in _SIZES]
     first = next((i for i in range(_SIZES.size) if all(as_they_are[i : i + 2])), None)

@@ -104,7 +104,7 @@ def selection_of(
     if not terms:
         return None
     selection = _with_finer_grid(Selection(fit, values, terms, noise), terms_of)
-    left = selection.residuals(selection.selected(fit.rig))
+    left = selection.regression.residuals(selection.columns_of(selection.selected(fit.rig)))
     tones = [
         term
         for e in effects

@@ -20,6 +20,7 @@ from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.numbers_beside import NumbersBeside
 from rigsight.inverse.proposal import Proposal, ProposedCause, ProposedForm, ProposedStart
+from rigsight.inverse.regression import SMOOTH, STRETCHES, Regression
 from rigsight.inverse.term import Term
 from rigsight.rigs import Rig, evaluated
 from rigsight.rigs.rig import joint_of
@@ -28,8 +29,6 @@ Floats = NDArray[np.float64]
 Key = tuple[Family, str]
 """A family and the place at which it acts."""
 
-_STRETCHES = 10
-"""Number of parts of the records of which each is left out once."""
 _MOST_CAUSES = 5
 """Families that are taken at most; a robot has three to five causes at once."""
 _WORTH = 0.03
@@ -37,7 +36,6 @@ _WORTH = 0.03
 _SIGNIFICANCE = 0.01
 _DRAWS, _LIMITS = 100, (0.025, 0.975)
 """Resamplings of the stretches for the interval of a share, and its limits."""
-_SMOOTH = 1e-9
 _SHARES = (0.02, 0.98)
 """Limits of the share of the stiffness that a loop keeps: at 1 it would vanish."""
 _NEAR = 0.5
@@ -45,7 +43,7 @@ _NEAR = 0.5
 
 
 class Selection:
-    """Greedy selection of families by the residual of held-out stretches, on sums of products."""
+    """Greedy selection of families by the residual of held-out stretches."""
 
     def __init__(
         self,
@@ -54,73 +52,45 @@ class Selection:
         terms: Sequence[Term],
         noise: Floats | None = None,
     ) -> None:
-        self.fit, self.values, self.terms = fit, values, terms
-        rows, slopes, stretch = [], [], []
-        self.shapes: list[tuple[int, int]] = []
-        self.weights: list[Floats] = []
-        unit = fit.tolerance(values, noise)[:, None]
-        # Together all rows have RMS one, for the ridge of the regression.
-        self.unit = unit = unit * np.sqrt(np.mean((fit.rms(values)[:, None] / unit) ** 2))
-        per_record = max(1, round(2 * _STRETCHES / len(fit.motions)))
-        for i, motion in enumerate(fit.motions):
-            weight = motion.row_weights[:, :: motion.stride] / unit
-            own = motion.thinned(fit.residual(motion, values))
-            rows.append(np.ravel(own * weight))
-            slopes.append(_as_columns(motion.thinned(fit.slopes(motion, values)) * weight))
-            self.weights.append(weight)
-            n_equations, n = own.shape
-            self.shapes.append((n_equations, n))
-            stretch.append(np.tile(i * per_record + (np.arange(n) * per_record) // n, n_equations))
-        target = -np.concatenate(rows)
-        self.n_rows, self.groups = target.size, np.concatenate(stretch) % _STRETCHES
-        own, columns = np.concatenate(slopes), self._columns(terms)
-        self.own, self.places = list(range(own.shape[1])), _places(own.shape[1], terms)
-        matrix = np.column_stack([own, columns, target])
-        self.size = _sizes(matrix)
-        self.size[-1] = 1.0
-        self.matrix = matrix / self.size
-        self.products = np.array([part.T @ part for part in map(self._stretch, range(_STRETCHES))])
-        self.whole = np.sum(self.products, axis=0)
+        self.fit, self.values, self.terms = fit, values, list[Term]()
+        self.places: list[list[int]] = []
+        self.regression = Regression(fit, values, noise)
         # Limit of the largest share of the squares that one of so many columns explains (Bonferroni): the share that a column
         # explains by chance has a beta distribution. What laws leave moves with the motion: in its band lie fewer rows than in
-        # that of the forces.
-        independent = max(target.size / WIDER, 2.0)
+        # that of the forces. The numbers of the equations have taken their part of them.
+        independent = max(self.regression.n_rows / WIDER - len(fit.free), 2.0)
         self.by_chance = 1.0 - (_SIGNIFICANCE / len(terms)) ** (2.0 / (independent - 1.0))
+        if not self.regression.predicts_accelerations:
+            # Nothing tells a given force from masses that shrink.
+            terms = [term for term in terms if not term.is_given]
+        self._add(terms)
 
-    def _columns(self, terms: Sequence[Term]) -> Floats:
-        """Return the columns of terms, shape (n_rows, n_parts), weighted as all rows are."""
-        weighted = [
-            np.column_stack([_as_columns(term.columns[i] * weight) for term in terms])
-            for i, weight in enumerate(self.weights)
-        ]
-        return np.concatenate(weighted)
-
-    def _stretch(self, group: int) -> Floats:
-        return np.asarray(self.matrix[self.groups == group])
+    def _add(self, terms: Sequence[Term]) -> None:
+        ends = np.cumsum([self.regression.n_columns, *(len(term.columns[0]) for term in terms)])
+        self.terms, self.places = (
+            [*self.terms, *terms],
+            [*self.places, *(list(range(a, b)) for a, b in pairwise(ends))],
+        )
+        self.regression = self.regression.with_columns(
+            [term.columns for term in terms], [term.is_given for term in terms]
+        )
 
     def with_terms(self, terms: Sequence[Term]) -> Selection:
         """Return the selection among further terms, too. Near ones of the grid add nothing to what chance explains."""
-        if not terms:
-            return self
-        wider, new = copy(self), self._columns(terms)
-        n = self.matrix.shape[1] - 1
-        wider.terms, wider.places = [*self.terms, *terms], [*self.places, *_places(n, terms)]
-        sizes = _sizes(new)
-        wider.size = np.concatenate([self.size[:n], sizes, self.size[n:]])
-        wider.matrix = np.column_stack([self.matrix[:, :n], new / sizes, self.matrix[:, n:]])
-        at = np.r_[np.arange(n), wider.matrix.shape[1] - 1]
-        wider.products = np.empty((_STRETCHES, wider.size.size, wider.size.size))
-        for group in range(_STRETCHES):
-            part = wider._stretch(group)
-            wider.products[group][np.ix_(at, at)] = self.products[group]
-            wider.products[group][:, n:-1] = part.T @ part[:, n:-1]
-            wider.products[group][n:-1, :] = wider.products[group][:, n:-1].T
-        wider.whole = np.sum(wider.products, axis=0)
+        wider = copy(self)
+        if terms:
+            wider._add(terms)
         return wider
+
+    def with_regression(self, regression: Regression) -> Selection:
+        """Return the selection of the same terms by a regression on changed records."""
+        changed = copy(self)
+        changed.regression = regression
+        return changed
 
     def leading(self, rig: Rig) -> list[Term]:
         """Return the terms that a finer grid may lift: the best of every effect alone, and those selected."""
-        begun = self.remainder([])
+        begun = self.regression.remainder([])
         alone: dict[str, tuple[float, int]] = {}
         for i, remainder in self._remainders([]):
             name = self.terms[i].effect.name
@@ -129,39 +99,6 @@ class Selection:
         near = [i for remainder, i in alone.values() if begun - remainder >= _NEAR * (begun - least) > 0.0]
         return [self.terms[i] for i in dict.fromkeys([*near, *(i for _, i, _ in self.selected(rig))])]
 
-    def _solved(self, products: Floats, columns: Sequence[int]) -> Floats:
-        """Return the numbers of columns, shape (.., n_columns), from sums of products, shape (.., n, n)."""
-        at = np.asarray(columns, dtype=np.int64)
-        normal = products[..., at[:, None], at]
-        ridge = _SMOOTH * self.n_rows * np.eye(at.size)
-        return np.asarray(np.linalg.solve(normal + ridge, products[..., at, -1:])[..., 0])
-
-    def remainder(self, chosen: Sequence[int]) -> float:
-        """Return the sum of squares of held-out stretches with further columns beside those of the equations."""
-        return float(self._drawn(np.ones((1, _STRETCHES), dtype=np.int64), chosen)[0])
-
-    def with_added(self, rows: Sequence[Floats]) -> Selection:
-        """Return the selection for records in which a further force acts: what `EffectTerms.acting` gives."""
-        own = np.concatenate([np.ravel(w * part) for w, part in zip(self.weights, rows, strict=True)])
-        added = copy(self)
-        added.products = self.products.copy()
-        for g in range(_STRETCHES):
-            here = self.groups == g
-            change = self.matrix[here].T @ own[here]
-            added.products[g, :, -1] += change
-            added.products[g, -1, :] += change
-            added.products[g, -1, -1] += own[here] @ own[here]
-        added.whole = np.sum(added.products, axis=0)
-        return added
-
-    def resampled(self, rng: np.random.Generator) -> Selection:
-        """Return the selection for stretches that are drawn with replacement."""
-        drawn = copy(self)
-        counts = rng.multinomial(_STRETCHES, np.full(_STRETCHES, 1.0 / _STRETCHES))
-        drawn.products = counts[:, None, None] * self.products
-        drawn.whole = np.sum(drawn.products, axis=0)
-        return drawn
-
     def _forms(self, rig: Rig, key: Key, taken: int, chosen: Sequence[int]) -> tuple[ProposedForm, ...]:
         """Return the other forms of a selected family, beside the columns of the other families."""
         own = [i for i, term in enumerate(self.terms) if (term.effect.family, rig.where(term.effect)) == key]
@@ -169,7 +106,7 @@ class Selection:
         for i, remainder in self._remainders(chosen, own):
             name = self.terms[i].effect.name
             best[name] = min(best.get(name, (remainder, i)), (remainder, i))
-        whole = self.remainder([*chosen, *self.places[taken]])
+        whole = self.regression.remainder([*chosen, *self.places[taken]])
         return tuple(
             ProposedForm(self.terms[i].effect, self._values(i, chosen), remainder / whole)
             for name, (remainder, i) in best.items()
@@ -192,13 +129,12 @@ class Selection:
         for i in range(len(self.terms)) if asked is None else asked:
             term = self.terms[i]
             columns = [*chosen, *self.places[i]]
-            own = self._solved(self.whole, [*self.own, *columns])[-len(self.places[i]) :]
-            if term.allows(own / self.size[self.places[i]]):
-                yield i, self.remainder(columns)
+            if term.allows(self.regression.solved(columns)[-len(self.places[i]) :]):
+                yield i, self.regression.remainder(columns)
 
     def selected(self, rig: Rig) -> list[tuple[Key, int, float]]:
         """Take families until none removes enough: each with its term and what it leaves beside those before it."""
-        remainder, found = self.remainder([]), list[tuple[Key, int, float]]()
+        remainder, found = self.regression.remainder([]), list[tuple[Key, int, float]]()
         for _ in range(_MOST_CAUSES):
             chosen = self.columns_of(found)
             best = self.best(rig, chosen, [key for key, _, _ in found])
@@ -214,7 +150,10 @@ class Selection:
         terms = [i for _, i, _ in found]
         for n, (key, i, _) in enumerate(found):
             chosen = [column for other in (*terms[:n], *terms[n + 1 :]) for column in self.places[other]]
-            whole, without = self.remainder([*chosen, *self.places[i]]), self.remainder(chosen)
+            whole, without = (
+                self.regression.remainder([*chosen, *self.places[i]]),
+                self.regression.remainder(chosen),
+            )
             enough = whole + LAW_ERROR**2 * (without - whole)
             own = [
                 t for t, term in enumerate(self.terms) if (term.effect.family, rig.where(term.effect)) == key
@@ -225,15 +164,9 @@ class Selection:
             )[1]
         columns = [[c for t in terms[: n + 1] for c in self.places[t]] for n in range(len(terms))]
         return [
-            (key, t, self.remainder(own)) for (key, _, _), t, own in zip(found, terms, columns, strict=True)
+            (key, t, self.regression.remainder(own))
+            for (key, _, _), t, own in zip(found, terms, columns, strict=True)
         ]
-
-    def residuals(self, found: Sequence[tuple[Key, int, float]]) -> list[Floats]:
-        """Return what selected terms leave along each motion, shape (n_equations, n_rows) each; zero where nothing moves."""
-        columns = [*self.own, *self.columns_of(found)]
-        left = self.matrix[:, -1] - self.matrix[:, columns] @ self._solved(self.whole, columns)
-        parts = np.split(left, np.cumsum([np.prod(shape) for shape in self.shapes])[:-1])
-        return [part.reshape(shape) * self.unit for part, shape in zip(parts, self.shapes, strict=True)]
 
     def columns_of(self, found: Sequence[tuple[Key, int, float]]) -> list[int]:
         """Return the columns of selected terms."""
@@ -241,7 +174,7 @@ class Selection:
 
     def is_worth(self, after: float, before: float) -> bool:
         """Return whether a further family removes enough: of what was left before, and beside what the laws taken before err."""
-        of_laws = LAW_ERROR**2 * max(self.remainder([]) - before, 0.0)
+        of_laws = LAW_ERROR**2 * max(self.regression.remainder([]) - before, 0.0)
         return bool(before - after > max(max(_WORTH, self.by_chance) * before, of_laws))
 
     def names(self, rig: Rig, key: Key, known: Sequence[tuple[Key, int, float]]) -> bool:
@@ -249,11 +182,11 @@ class Selection:
         chosen = self.columns_of(known)
         best = self.best(rig, chosen, [own for own, _, _ in known])
         first = min(best, key=lambda own: best[own][0], default=None)
-        return first == key and self.is_worth(best[key][0], self.remainder(chosen))
+        return first == key and self.is_worth(best[key][0], self.regression.remainder(chosen))
 
     def proposal(self, rig: Rig) -> Proposal:
         """Return what every family explains alone, and those that are taken."""
-        begun = self.remainder([])
+        begun = self.regression.remainder([])
         best = self.best(rig, [], [])
         ordered = sorted(best.items(), key=lambda found: found[1][0])
         intervals = self._intervals([i for _, (_, i) in ordered])
@@ -277,21 +210,16 @@ class Selection:
         for i, remainder in self._remainders([]):
             name = self.terms[i].effect.name
             starts[name] = min(starts.get(name, (remainder, i)), (remainder, i))
-        beside_any = self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()})
-
-        def numbers(columns: Sequence[int]) -> dict[str, float]:
-            return dict(zip(beside_any.names, map(float, beside_any.values(columns)), strict=True))
-
         return Proposal(
             taken,
             alone,
             judged,
             explained,
             self.by_chance,
-            numbers=numbers(self.columns_of(selected)),
-            numbers_beside=beside_any,
+            numbers=self._numbers(self.columns_of(selected)),
+            numbers_beside=self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()}),
             starts={
-                name: ProposedStart(self._values(i, []), numbers(self.places[i]))
+                name: ProposedStart(self._values(i, []), self._numbers(self.places[i]))
                 for name, (_, i) in starts.items()
             },
         )
@@ -299,23 +227,18 @@ class Selection:
     def _intervals(self, terms: Sequence[int]) -> list[tuple[float, float]]:
         """Return the limits of the share that each term removes alone, over stretches drawn with replacement."""
         rng = np.random.default_rng(0)
-        counts = rng.multinomial(_STRETCHES, np.full(_STRETCHES, 1.0 / _STRETCHES), size=_DRAWS)
-        begun = self._drawn(counts, [])
-        shares = [1.0 - self._drawn(counts, self.places[i]) / begun for i in terms]
+        counts = rng.multinomial(STRETCHES, np.full(STRETCHES, 1.0 / STRETCHES), size=_DRAWS)
+        begun = self.regression.remainders(counts, [])
+        shares = [1.0 - self.regression.remainders(counts, self.places[i]) / begun for i in terms]
         return [(float(np.quantile(own, _LIMITS[0])), float(np.quantile(own, _LIMITS[1]))) for own in shares]
 
-    def _drawn(self, counts: NDArray[np.int64], chosen: Sequence[int]) -> Floats:
-        """Return what `remainder` is for stretches drawn so often, shape (n_draws, n_stretches) -> (n_draws,)."""
-        at = np.asarray([*self.own, *chosen, self.matrix.shape[1] - 1], dtype=np.int64)
-        parts = counts[:, :, None, None] * self.products[:, at[:, None], at]
-        whole = np.sum(parts, axis=1, keepdims=True)
-        rest = whole - parts
-        ridge = _SMOOTH * self.n_rows * np.eye(at.size - 1)
-        x = np.linalg.solve(rest[..., :-1, :-1] + ridge, rest[..., :-1, -1:])[..., 0]
-        along = np.einsum("dgi,dgi->d", x, parts[..., :-1, -1])
-        squares = np.einsum("dgi,dgij,dgj->d", x, parts[..., :-1, :-1], x)
-        least = np.finfo(np.float64).tiny
-        return np.asarray(np.maximum(whole[:, 0, -1, -1] - 2.0 * along + squares, least))
+    def _numbers(self, chosen: Sequence[int]) -> dict[str, float]:
+        """Return the numbers of the equations beside chosen columns, within their bounds."""
+        found = {}
+        changes = self.regression.solved(chosen)[: len(self.fit.free)]
+        for name, change, (low, high) in zip(self.fit.free, changes, self.fit.bounds, strict=True):
+            found[name] = float(np.clip(self.values[name] + change, low, high))
+        return found
 
     def _numbers_beside(self, missing: float, terms: Mapping[str, int]) -> NumbersBeside:
         """Return the numbers of the equations beside effects, of which each has a term."""
@@ -325,11 +248,11 @@ class Selection:
             tuple(name in of_rig for name in self.fit.free),
             np.array([self.values[name] for name in self.fit.free]),
             self.fit.bounds,
-            self.size[self.own],
-            self.whole / self.n_rows,
-            missing / self.n_rows,
+            self.regression.size[self.regression.own],
+            self.regression.whole / self.regression.n_rows,
+            missing / self.regression.n_rows,
             {name: self.places[i] for name, i in terms.items()},
-            _SMOOTH,
+            SMOOTH,
         )
 
     def _cause(self, key: Key, i: int, share: float, chosen: Sequence[int]) -> ProposedCause:
@@ -337,8 +260,7 @@ class Selection:
 
     def _values(self, i: int, chosen: Sequence[int]) -> dict[str, float]:
         """Return the parameters of the effect of a term beside chosen columns."""
-        term, columns = self.terms[i], [*self.own, *chosen, *self.places[i]]
-        solved = self._solved(self.whole, columns) / self.size[columns]
+        term, solved = self.terms[i], self.regression.solved([*chosen, *self.places[i]])
         numbers = solved[-len(self.places[i]) :]
         linear = {
             name: float(number) * unit
@@ -346,7 +268,9 @@ class Selection:
         }
         ratio = term.effect.post_yield_stiffness_ratio
         if ratio is not None:
-            linear[ratio] = self._soft_share(term.effect, float(numbers[0]), solved[: len(self.own)])
+            linear[ratio] = self._soft_share(
+                term.effect, float(numbers[0]), solved[: len(self.regression.own)]
+            )
         return {**term.inner, **linear}
 
     def _soft_share(self, effect: Effect, coefficient: float, change: Floats) -> float:
@@ -360,20 +284,3 @@ class Selection:
 
 def _n_fitted(effect: Effect) -> int:
     return sum(parameter.fitted for parameter in effect.parameters)
-
-
-def _places(first: int, terms: Sequence[Term]) -> list[list[int]]:
-    """Return the columns of each term, from the first one on."""
-    ends = np.cumsum([first, *(len(term.one_sided) for term in terms)])
-    return [list(range(a, b)) for a, b in pairwise(ends)]
-
-
-def _sizes(columns: Floats) -> Floats:
-    """Return the RMS of each column, 1 for an empty one."""
-    found = np.sqrt(np.mean(columns**2, axis=0))
-    return np.where(found == 0.0, 1.0, found)
-
-
-def _as_columns(rows: Floats) -> Floats:
-    """Return rows (n_columns, n_equations, n_rows) as columns with all equations one after the other."""
-    return np.reshape(rows, (rows.shape[0], rows.shape[1] * rows.shape[2])).T

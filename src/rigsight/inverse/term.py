@@ -27,6 +27,7 @@ class Term:
     # Of each record, filtered and thinned, shape (n_parts, n_equations, n_rows) each.
     columns: tuple[Floats, ...]
     one_sided: tuple[bool, ...]  # whether a coefficient cannot be negative
+    is_given: bool = False  # whether the column is a force, not that of a unit of a number
 
     def allows(self, coefficients: Floats) -> bool:
         """Return whether coefficients, shape (n_parts,), have the sign and order that the effect needs."""

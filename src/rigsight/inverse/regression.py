@@ -1,0 +1,238 @@
+"""The equations along all motions as one linear regression, judged on stretches of the records left out.
+
+The rows are those of the motions, weighted by what laws and noise leave. Everything follows from their sums of products over each
+stretch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.inverse.equation_fit import EquationFit
+from rigsight.inverse.mass_determinant import MassDeterminant
+
+Floats = NDArray[np.float64]
+
+STRETCHES = 10
+"""Number of parts of the records of which each is left out once."""
+SMOOTH = 1e-9
+"""Added to the mean square of each column, which is one: what nothing determines stays."""
+_ROUNDS = 3
+"""Steps to the likeliest numbers; for one mass the first one is exact."""
+_WORTHLESS = 1e9
+"""Factor of what is left beside a force with which no mass is positive."""
+
+
+class Regression:
+    """Columns of the numbers of the equations first, then those of effects, then the missing force."""
+
+    def __init__(self, fit: EquationFit, values: Mapping[str, float], noise: Floats | None = None) -> None:
+        rows, slopes, stretch = [], [], []
+        self.shapes: list[tuple[int, int]] = []
+        self.weights: list[Floats] = []
+        unit = fit.tolerance(values, noise)[:, None]
+        # Together all rows have RMS one, for the ridge of the regression.
+        self.unit = unit = unit * np.sqrt(np.mean((fit.rms(values)[:, None] / unit) ** 2))
+        per_record = max(1, round(2 * STRETCHES / len(fit.motions)))
+        for i, motion in enumerate(fit.motions):
+            weight = motion.row_weights[:, :: motion.stride] / unit
+            own = motion.thinned(fit.residual(motion, values))
+            rows.append(np.ravel(own * weight))
+            slopes.append(_as_columns(motion.thinned(fit.slopes(motion, values)) * weight))
+            self.weights.append(weight)
+            n_equations, n = own.shape
+            self.shapes.append((n_equations, n))
+            stretch.append(np.tile(i * per_record + (np.arange(n) * per_record) // n, n_equations))
+        target = -np.concatenate(rows)
+        self.n_rows, self.groups = target.size, np.concatenate(stretch) % STRETCHES
+        own = np.concatenate(slopes)
+        self.own = list(range(own.shape[1]))
+        self.mass = MassDeterminant(fit, values)
+        self.size = np.r_[_sizes(own), 1.0]
+        self.matrix = np.column_stack([own / self.size[:-1], target])
+        self.products = np.array([part.T @ part for part in map(self._stretch, range(STRETCHES))])
+        self.whole = np.sum(self.products, axis=0)
+        self.given = frozenset[int]()
+        self._given_alone: dict[tuple[int, ...], Floats] = {}
+
+    @property
+    def n_columns(self) -> int:
+        """Number of the columns before the missing force."""
+        return int(self.size.size) - 1
+
+    def _stretch(self, group: int) -> Floats:
+        return np.asarray(self.matrix[self.groups == group])
+
+    def with_columns(self, columns: Sequence[Sequence[Floats]], given: Sequence[bool]) -> Regression:
+        """Return the regression with further columns.
+
+        Parameters
+        ----------
+        columns
+            Of each effect along each motion, shape (n_parts, n_equations, n_rows) each.
+        given
+            Whether the columns of each effect are a force, not that of a unit of a number.
+        """
+        new = np.concatenate(
+            [
+                np.column_stack([_as_columns(own[i] * weight) for own in columns])
+                for i, weight in enumerate(self.weights)
+            ]
+        )
+        wider, n = copy(self), self.matrix.shape[1] - 1
+        sizes = _sizes(new)
+        wider.size = np.concatenate([self.size[:n], sizes, self.size[n:]])
+        wider.matrix = np.column_stack([self.matrix[:, :n], new / sizes, self.matrix[:, n:]])
+        at = np.r_[np.arange(n), wider.matrix.shape[1] - 1]
+        wider.products = np.empty((STRETCHES, wider.size.size, wider.size.size))
+        for group in range(STRETCHES):
+            part = wider._stretch(group)
+            wider.products[group][np.ix_(at, at)] = self.products[group]
+            wider.products[group][:, n:-1] = part.T @ part[:, n:-1]
+            wider.products[group][n:-1, :] = wider.products[group][:, n:-1].T
+        wider.whole = np.sum(wider.products, axis=0)
+        of_each = [len(own[0]) for own in columns]
+        wider.given = self.given | set((n + np.flatnonzero(np.repeat(given, of_each))).tolist())
+        return wider
+
+    def with_added(self, rows: Sequence[Floats]) -> Regression:
+        """Return the regression for records in which a further force acts: what `EffectTerms.acting` gives."""
+        own = np.concatenate([np.ravel(w * part) for w, part in zip(self.weights, rows, strict=True)])
+        added = copy(self)
+        added.products = self.products.copy()
+        for g in range(STRETCHES):
+            here = self.groups == g
+            change = self.matrix[here].T @ own[here]
+            added.products[g, :, -1] += change
+            added.products[g, -1, :] += change
+            added.products[g, -1, -1] += own[here] @ own[here]
+        added.whole = np.sum(added.products, axis=0)
+        added._given_alone = {}
+        return added
+
+    def resampled(self, counts: NDArray[np.int64]) -> Regression:
+        """Return the regression for records in which each stretch occurs so often."""
+        drawn = copy(self)
+        drawn.products = counts[:, None, None] * self.products
+        drawn.whole = np.sum(drawn.products, axis=0)
+        drawn._given_alone = {}
+        return drawn
+
+    def solved(self, chosen: Sequence[int]) -> Floats:
+        """Return the numbers of the equations and of chosen columns, those that are given with their force as it is."""
+        found = np.ones(len(self.own) + len(chosen))
+        free = [column not in self.given for column in (*self.own, *chosen)]
+        found[free] = (
+            _numbers(self._system(self.whole, chosen), self.n_rows) / self.size[[*self.own, *chosen]][free]
+        )
+        return found
+
+    def residuals(self, chosen: Sequence[int]) -> list[Floats]:
+        """Return what chosen columns leave along each motion, shape (n_equations, n_rows) each; zero where nothing moves."""
+        columns = [*self.own, *chosen]
+        left = self.matrix[:, -1] - self.matrix[:, columns] @ (self.solved(chosen) * self.size[columns])
+        parts = np.split(left, np.cumsum([np.prod(shape) for shape in self.shapes])[:-1])
+        return [part.reshape(shape) * self.unit for part, shape in zip(parts, self.shapes, strict=True)]
+
+    @property
+    def predicts_accelerations(self) -> bool:
+        """Whether the likeliest numbers of the equations alone have positive masses on all stretches."""
+        return bool(
+            np.all(np.isfinite(self._left(np.ones((1, STRETCHES), dtype=np.int64), (), likeliest=True)))
+        )
+
+    def remainder(self, chosen: Sequence[int]) -> float:
+        """Return the sum of squares of held-out stretches with further columns beside those of the equations."""
+        return float(self.remainders(np.ones((1, STRETCHES), dtype=np.int64), chosen)[0])
+
+    def remainders(self, counts: NDArray[np.int64], chosen: Sequence[int]) -> Floats:
+        """Return what `remainder` is for stretches drawn so often, shape (n_draws, n_stretches) -> (n_draws,)."""
+        given = tuple(column for column in chosen if column in self.given)
+        found = self._left(counts, chosen)
+        if not given:
+            return found
+        found = found / self._left(counts, given) * self._beside_given(counts, given)
+        return np.asarray(np.maximum(found, np.finfo(np.float64).tiny))
+
+    def _beside_given(self, counts: NDArray[np.int64], given: tuple[int, ...]) -> Floats:
+        """Return what is left beside given forces alone, comparable with what is left beside other effects.
+
+        Smaller masses alone leave less force. So the factor counts by which the likeliest numbers predict the accelerations
+        better: no scale of forces changes it.
+        """
+        if given in self._given_alone and len(counts) == 1:
+            return self._given_alone[given]
+        before, beside = (self._left(counts, own, likeliest=True) for own in ((), given))
+        with np.errstate(all="ignore"):
+            better = np.minimum(np.nan_to_num(beside / before, nan=_WORTHLESS), _WORTHLESS)
+        found = np.asarray(better * self._left(counts, ()))
+        if len(counts) == 1:
+            self._given_alone[given] = found
+        return found
+
+    def _left(self, counts: NDArray[np.int64], chosen: Sequence[int], *, likeliest: bool = False) -> Floats:
+        parts = counts[:, :, None, None] * self._system(self.products, chosen)
+        rest = np.sum(parts, axis=1, keepdims=True) - parts
+        x = self._likeliest(rest) if likeliest else _numbers(rest, self.n_rows)
+        squares = _squares(parts, x)
+        if likeliest:
+            log_ratio = self.mass.log_ratio(x[..., : len(self.own)] / self.size[self.own])
+            scale = np.exp(-2.0 * np.where(np.isfinite(log_ratio), log_ratio, 0.0) / max(self.mass.order, 1))
+            squares = np.where(np.isfinite(log_ratio), squares * scale, np.inf)
+        return np.asarray(np.maximum(np.sum(squares, axis=1), np.finfo(np.float64).tiny))
+
+    def _likeliest(self, products: Floats) -> Floats:
+        """Return numbers at which ``log(squares) - 2 log(det M) / n`` is stationary, of n equations with masses M."""
+        x = _numbers(products, self.n_rows)
+        if not self.mass.is_open:
+            return x
+        n_own, size = len(self.own), self.size[self.own]
+        for _ in range(_ROUNDS):
+            pulled = products.copy()
+            slope = self.mass.slope(x[..., :n_own] / size) / size
+            pulled[..., :n_own, -1] += _squares(products, x)[..., None] * slope / self.mass.order
+            x = _numbers(pulled, self.n_rows)
+        return x
+
+    def _system(self, products: Floats, chosen: Sequence[int]) -> Floats:
+        """Return the sums of products of the columns whose numbers are free, and of the force missing beside those given."""
+        free = [column for column in chosen if column not in self.given]
+        given = np.array([column for column in chosen if column in self.given], dtype=np.int64)
+        at = np.array([*self.own, *free, self.matrix.shape[1] - 1], dtype=np.int64)
+        found = np.asarray(products[..., at[:, None], at])
+        if given.size:
+            force = self.size[given]
+            along = products[..., at[:, None], given] @ force
+            found = found.copy()
+            found[..., -1, :] -= along
+            found[..., :, -1] -= along
+            found[..., -1, -1] += products[..., given[:, None], given] @ force @ force
+        return found
+
+
+def _numbers(products: Floats, n_rows: int) -> Floats:
+    """Return the numbers of columns, shape (.., n), from sums of products, shape (.., n + 1, n + 1)."""
+    normal = products[..., :-1, :-1] + SMOOTH * n_rows * np.eye(products.shape[-1] - 1)
+    return np.asarray(np.linalg.solve(normal, products[..., :-1, -1:])[..., 0])
+
+
+def _squares(products: Floats, x: Floats) -> Floats:
+    """Return the sum of squares that numbers leave, shape (..,)."""
+    along = np.einsum("...i,...i->...", x, products[..., :-1, -1])
+    own = np.einsum("...i,...ij,...j->...", x, products[..., :-1, :-1], x)
+    return np.asarray(products[..., -1, -1] - 2.0 * along + own)
+
+
+def _sizes(columns: Floats) -> Floats:
+    """Return the RMS of each column, 1 for an empty one."""
+    found = np.sqrt(np.mean(columns**2, axis=0))
+    return np.where(found == 0.0, 1.0, found)
+
+
+def _as_columns(rows: Floats) -> Floats:
+    """Return rows (n_columns, n_equations, n_rows) as columns with all equations one after the other."""
+    return np.reshape(rows, (rows.shape[0], rows.shape[1] * rows.shape[2])).T
