@@ -5,7 +5,7 @@ which all masses and forces shrink leave less force and predict no acceleration 
 
 References
 ----------
-J. Nocedal and S. J. Wright, *Numerical Optimization* (Springer 2006), for fixed-point and Newton iterations.
+A. Papoulis, *Probability, Random Variables, and Stochastic Processes* (McGraw-Hill 1991), for transformed densities.
 """
 
 from __future__ import annotations
