@@ -60,7 +60,7 @@ class MassDeterminant:
 
     def slope(self, change: Floats) -> Floats:
         """Return the derivatives of `log_ratio` by the numbers, of the same shape as their change."""
-        inverse = np.linalg.inv(self._changed(change))
+        inverse = np.linalg.pinv(self._changed(change))
         return np.asarray(np.einsum("...kij,fkji->...f", inverse, self._slopes) / len(self._start))
 
     def _changed(self, change: Floats) -> Floats:

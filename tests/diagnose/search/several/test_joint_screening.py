@@ -91,3 +91,14 @@ def test_without_responses_there_are_no_sets() -> None:
     assert best_sets([], COLUMNS[0], 2) == []
     assert best_sets([response("coulomb_friction", 0.1, COLUMNS[0])], COLUMNS[1], 2) == []
     assert best_sets([response("coulomb_friction", 0.1, COLUMNS[0])], np.zeros(500), 2) == []
+
+
+def test_a_response_that_runs_away_is_in_no_set() -> None:
+    friction, damping, spring = COLUMNS[:3]
+    responses = [
+        response("coulomb_friction", 0.1, friction),
+        response("quadratic_damping", 0.1, damping),
+        response("cubic_stiffness", 0.1, 1e200 * spring),
+    ]
+    found = best_sets(responses, friction + damping, 2)
+    assert [one.names for one in found] == [{"coulomb_friction", "quadratic_damping"}]

@@ -48,6 +48,9 @@ class EffectSet:
 def best_sets(responses: Sequence[Response], residual: Floats, size: int) -> list[EffectSet]:
     """Return the sets of effects that explain most of a residual together, best first."""
     total = float(residual @ residual)
+    # A response that runs away in the simulation has no direction.
+    with np.errstate(over="ignore"):
+        responses = [r for r in responses if 0.0 < np.linalg.norm(r.column) < np.inf]
     if not responses or not total > 0.0:
         return []
     columns = _Columns.of(responses, residual)
