@@ -23,6 +23,8 @@ SMOOTH = 1e-9
 """Added to the mean square of each column, which is one: what nothing determines stays."""
 _ROUNDS = 3
 """Steps to the likeliest numbers; for one mass the first one is exact."""
+_ROUNDING = 1e-12
+"""Error of sums of squares by rounding, relative to those of the missing force."""
 _WORTHLESS = 1e9
 """Factor of what is left beside a force with which no mass is positive."""
 
@@ -178,7 +180,8 @@ class Regression:
         parts = counts[:, :, None, None] * self._system(self.products, chosen)
         rest = np.sum(parts, axis=1, keepdims=True) - parts
         x = self._likeliest(rest) if likeliest else _numbers(rest, self.n_rows)
-        squares = _squares(parts, x)
+        # Where a given force takes all of the input, the numbers vanish and rounding is left.
+        squares = np.maximum(_squares(parts, x), _ROUNDING * parts[..., -1, -1])
         if likeliest:
             log_ratio = self.mass.log_ratio(x[..., : len(self.own)] / self.size[self.own])
             scale = np.exp(-2.0 * np.where(np.isfinite(log_ratio), log_ratio, 0.0) / max(self.mass.order, 1))
