@@ -56,3 +56,15 @@ def test_a_rough_fit_does_not_serve_for_one_that_is_finished() -> None:
     for finish, recalled in ((False, 0), (True, 0), (False, 1), (True, 2)):
         fit.fit({**values, "m": 2.2}, ["m"], finish=finish)
         assert memory.recalled == recalled
+
+
+def test_the_rounding_of_an_initial_state_makes_no_other_problem() -> None:
+    values = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+    push = Record("push", 0.01, {"u": np.sin(np.linspace(0.0, 60.0, 300) ** 1.3)}, {})
+    record = simulate(compose(AXIS), values, push)
+    memory = Kept()
+    scales = characteristic_scales(AXIS, [record], values)
+    fit = GreyBoxFit(compose(AXIS), [record], scales, {"x": 1e-5}, memory=memory)
+    for speed, recalled in ((0.0, 0), (1e-19, 1), (1e-3, 1)):
+        fit.fit({**values, "m": 2.2}, ["m"], initial_states=[np.array([0.0, speed])])
+        assert memory.recalled == recalled

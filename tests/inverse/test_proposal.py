@@ -13,6 +13,7 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose import candidates_on
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.symbols import v
+from rigsight.identify import FitResult
 from rigsight.inverse import Proposal, along_motion, propose
 from rigsight.inverse.selection import Selection
 from rigsight.inverse.term import Term
@@ -291,6 +292,30 @@ def test_beside_a_force_at_a_joint_or_a_delay_the_motion_is_asked(
         own, {**own.constants, **own.given, **value}, candidates_on(AXIS, CATALOGUE, own.modelled)
     )
     assert (found is not None) is is_asked
+
+
+def test_a_modelled_friction_has_its_number_along_the_motion() -> None:
+    friction = effect_named("coulomb_friction")
+    own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [friction], (10.0, 20.0))
+    own = replace(own, modelled=(friction,))
+    found = propose(
+        own, {**own.constants, **own.given, "T_c": 0.5}, candidates_on(AXIS, CATALOGUE, own.modelled)
+    )
+    assert found is not None
+    assert found.taken == ()
+    assert found.numbers["T_c"] == pytest.approx(3.0, rel=0.02)
+
+
+def test_the_motion_is_asked_beside_a_loop_whose_exponent_is_written_into_its_equations() -> None:
+    loop, values = effect_named("bouc_wen_hysteresis"), {"A": 1.0, "a": 0.4, "beta": 30.0, "gamma": 5.0}
+    own = campaign(AXIS, {**AXIS_VALUES, **values, "n": 1.0}, [loop], (10.0, 20.0))
+    structure = compose(AXIS, [loop], {"n": 1.0})
+    fit = FitResult(structure, True, "", values, {}, (), 1.0, 1, 1, (), np.zeros((0, 0)), ())
+    own = replace(own, modelled=(loop,))
+    candidates = candidates_on(AXIS, CATALOGUE, own.modelled)
+    found = propose(own, {**own.constants, **own.given, **fit.all_values}, candidates)
+    assert found is not None
+    assert found.taken == ()
 
 
 def test_effects_of_somebody_else_are_judged_like_those_of_the_catalogue() -> None:

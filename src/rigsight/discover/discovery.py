@@ -142,7 +142,7 @@ def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], Non
         Attempt(
             chosen.support,
             release=frozenset(special - chosen.fit.structure.special_cases),
-            start={**dict(chosen.fit.structure.fixed), **chosen.fit.values, damping: 0.0},
+            start={**chosen.fit.all_values, damping: 0.0},
             left_out=frozenset({damping}),
         )
     )
@@ -176,7 +176,7 @@ def _polished(data: RegressionData, bench: Bench, chosen: Trial) -> tuple[FitRes
         )
 
     special = special_values(rig, chosen.fit.structure.effects)
-    start = {**special, **dict(chosen.fit.structure.fixed), **chosen.fit.values}
+    start = {**special, **chosen.fit.all_values}
     effects = chosen.fit.structure.effects
     fit = fitted(compose(rig, effects), start, free | set(special))
     if not math.isfinite(fit.cost):

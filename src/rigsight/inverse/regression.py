@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +20,55 @@ Floats = NDArray[np.float64]
 
 STRETCHES = 10
 """Number of parts of the records of which each is left out once."""
-SMOOTH = 1e-9
+_SMOOTH = 1e-9
 """Added to the mean square of each column, which is one: what nothing determines stays."""
 _ROUNDS = 3
 """Steps to the likeliest numbers; for one mass the first one is exact."""
 _ROUNDING = 1e-12
 """Error of sums of squares by rounding, relative to those of the missing force."""
+_LEAST = float(np.finfo(np.float64).tiny)
 _WORTHLESS = 1e9
 """Factor of what is left beside a force with which no mass is positive."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums of products of all columns, from which the numbers of the equations beside any columns follow."""
+
+    products: (
+        Floats  # of the scaled columns, the missing force last, shape (.., n_columns + 1, n_columns + 1)
+    )
+    size: Floats  # of each column before it was scaled to a mean square of one, shape (n_columns + 1,)
+    own: Sequence[int]  # columns of the numbers of the equations
+    given: frozenset[int]  # columns that are a force as it is, not that of a unit of a number
+    n_rows: int
+
+    def solved(self, chosen: Sequence[int]) -> Floats:
+        """Return the numbers of the equations and of chosen columns, shape (n,); 1 for a given force."""
+        columns = [*self.own, *chosen]
+        found = np.ones(len(columns))
+        free = np.array([column not in self.given for column in columns])
+        found[free] = _numbers(self.system(chosen), self.n_rows) / self.size[columns][free]
+        return found
+
+    def normal(self, chosen: Sequence[int]) -> Floats:
+        """Return the sums of products of the columns that are free, shape (.., n_free, n_free), with the ridge."""
+        return _with_ridge(self.system(chosen), self.n_rows)
+
+    def system(self, chosen: Sequence[int]) -> Floats:
+        """Return the sums of products of the columns that are free, and of the force missing beside those given."""
+        free = [column for column in chosen if column not in self.given]
+        given = np.array([column for column in chosen if column in self.given], dtype=np.int64)
+        at = np.array([*self.own, *free, self.size.size - 1], dtype=np.int64)
+        found = np.asarray(self.products[..., at[:, None], at])
+        if given.size:
+            force = self.size[given]
+            along = self.products[..., at[:, None], given] @ force
+            found = found.copy()
+            found[..., -1, :] -= along
+            found[..., :, -1] -= along
+            found[..., -1, -1] += self.products[..., given[:, None], given] @ force @ force
+        return found
 
 
 class Regression:
@@ -59,7 +101,7 @@ class Regression:
         self.products = np.array([part.T @ part for part in map(self._stretch, range(STRETCHES))])
         self.whole = np.sum(self.products, axis=0)
         self.given = frozenset[int]()
-        self._given_alone: dict[tuple[int, ...], Floats] = {}
+        self._factors: dict[tuple[int, ...], Floats] = {}
 
     @property
     def n_columns(self) -> int:
@@ -113,7 +155,7 @@ class Regression:
             added.products[g, -1, :] += change
             added.products[g, -1, -1] += own[here] @ own[here]
         added.whole = np.sum(added.products, axis=0)
-        added._given_alone = {}
+        added._factors = {}
         return added
 
     def resampled(self, counts: NDArray[np.int64]) -> Regression:
@@ -121,17 +163,16 @@ class Regression:
         drawn = copy(self)
         drawn.products = counts[:, None, None] * self.products
         drawn.whole = np.sum(drawn.products, axis=0)
-        drawn._given_alone = {}
+        drawn._factors = {}
         return drawn
 
+    def sums(self, products: Floats) -> Sums:
+        """Return sums of products, such as `whole`, as a system of equations."""
+        return Sums(products, self.size, self.own, self.given, self.n_rows)
+
     def solved(self, chosen: Sequence[int]) -> Floats:
-        """Return the numbers of the equations and of chosen columns, those that are given with their force as it is."""
-        found = np.ones(len(self.own) + len(chosen))
-        free = [column not in self.given for column in (*self.own, *chosen)]
-        found[free] = (
-            _numbers(self._system(self.whole, chosen), self.n_rows) / self.size[[*self.own, *chosen]][free]
-        )
-        return found
+        """Return the numbers of the equations and of chosen columns, shape (n,); 1 for a given force."""
+        return self.sums(self.whole).solved(chosen)
 
     def residuals(self, chosen: Sequence[int]) -> list[Floats]:
         """Return what chosen columns leave along each motion, shape (n_equations, n_rows) each; zero where nothing moves."""
@@ -155,29 +196,26 @@ class Regression:
         """Return what `remainder` is for stretches drawn so often, shape (n_draws, n_stretches) -> (n_draws,)."""
         given = tuple(column for column in chosen if column in self.given)
         found = self._left(counts, chosen)
-        if not given:
-            return found
-        found = found / self._left(counts, given) * self._beside_given(counts, given)
-        return np.asarray(np.maximum(found, np.finfo(np.float64).tiny))
+        return found if not given else np.maximum(found * self._comparable(counts, given), _LEAST)
 
-    def _beside_given(self, counts: NDArray[np.int64], given: tuple[int, ...]) -> Floats:
-        """Return what is left beside given forces alone, comparable with what is left beside other effects.
+    def _comparable(self, counts: NDArray[np.int64], given: tuple[int, ...]) -> Floats:
+        """Return the factor that makes what is left beside given forces comparable with what is left beside other effects.
 
-        Smaller masses alone leave less force. So the factor counts by which the likeliest numbers predict the accelerations
-        better: no scale of forces changes it.
+        Smaller masses alone leave less force. So it counts how much better the likeliest numbers predict the accelerations: no
+        scale of forces changes this.
         """
-        if given in self._given_alone and len(counts) == 1:
-            return self._given_alone[given]
+        if given in self._factors and len(counts) == 1:
+            return self._factors[given]
         before, beside = (self._left(counts, own, likeliest=True) for own in ((), given))
         with np.errstate(all="ignore"):
             better = np.minimum(np.nan_to_num(beside / before, nan=_WORTHLESS), _WORTHLESS)
-        found = np.asarray(better * self._left(counts, ()))
+        factor = better * self._left(counts, ()) / self._left(counts, given)
         if len(counts) == 1:
-            self._given_alone[given] = found
-        return found
+            self._factors[given] = factor
+        return np.asarray(factor)
 
     def _left(self, counts: NDArray[np.int64], chosen: Sequence[int], *, likeliest: bool = False) -> Floats:
-        parts = counts[:, :, None, None] * self._system(self.products, chosen)
+        parts = counts[:, :, None, None] * self.sums(self.products).system(chosen)
         rest = np.sum(parts, axis=1, keepdims=True) - parts
         x = self._likeliest(rest) if likeliest else _numbers(rest, self.n_rows)
         # Where a given force takes all of the input, the numbers vanish and rounding is left.
@@ -186,7 +224,7 @@ class Regression:
             log_ratio = self.mass.log_ratio(x[..., : len(self.own)] / self.size[self.own])
             scale = np.exp(-2.0 * np.where(np.isfinite(log_ratio), log_ratio, 0.0) / max(self.mass.order, 1))
             squares = np.where(np.isfinite(log_ratio), squares * scale, np.inf)
-        return np.asarray(np.maximum(np.sum(squares, axis=1), np.finfo(np.float64).tiny))
+        return np.asarray(np.maximum(np.sum(squares, axis=1), _LEAST))
 
     def _likeliest(self, products: Floats) -> Floats:
         """Return numbers at which ``log(squares) - 2 log(det M) / n`` is stationary, of n equations with masses M."""
@@ -201,26 +239,14 @@ class Regression:
             x = _numbers(pulled, self.n_rows)
         return x
 
-    def _system(self, products: Floats, chosen: Sequence[int]) -> Floats:
-        """Return the sums of products of the columns whose numbers are free, and of the force missing beside those given."""
-        free = [column for column in chosen if column not in self.given]
-        given = np.array([column for column in chosen if column in self.given], dtype=np.int64)
-        at = np.array([*self.own, *free, self.matrix.shape[1] - 1], dtype=np.int64)
-        found = np.asarray(products[..., at[:, None], at])
-        if given.size:
-            force = self.size[given]
-            along = products[..., at[:, None], given] @ force
-            found = found.copy()
-            found[..., -1, :] -= along
-            found[..., :, -1] -= along
-            found[..., -1, -1] += products[..., given[:, None], given] @ force @ force
-        return found
-
 
 def _numbers(products: Floats, n_rows: int) -> Floats:
     """Return the numbers of columns, shape (.., n), from sums of products, shape (.., n + 1, n + 1)."""
-    normal = products[..., :-1, :-1] + SMOOTH * n_rows * np.eye(products.shape[-1] - 1)
-    return np.asarray(np.linalg.solve(normal, products[..., :-1, -1:])[..., 0])
+    return np.asarray(np.linalg.solve(_with_ridge(products, n_rows), products[..., :-1, -1:])[..., 0])
+
+
+def _with_ridge(products: Floats, n_rows: int) -> Floats:
+    return np.asarray(products[..., :-1, :-1] + _SMOOTH * n_rows * np.eye(products.shape[-1] - 1))
 
 
 def _squares(products: Floats, x: Floats) -> Floats:

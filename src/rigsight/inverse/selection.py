@@ -20,7 +20,7 @@ from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.numbers_beside import NumbersBeside
 from rigsight.inverse.proposal import Proposal, ProposedCause, ProposedForm, ProposedStart
-from rigsight.inverse.regression import SMOOTH, STRETCHES, Regression
+from rigsight.inverse.regression import STRETCHES, Regression
 from rigsight.inverse.term import Term
 from rigsight.rigs import Rig, evaluated
 from rigsight.rigs.rig import joint_of
@@ -38,6 +38,8 @@ _DRAWS, _LIMITS = 100, (0.025, 0.975)
 """Resamplings of the stretches for the interval of a share, and its limits."""
 _SHARES = (0.02, 0.98)
 """Limits of the share of the stiffness that a loop keeps: at 1 it would vanish."""
+_DIGITS = 9
+"""Digits of values from which fits start: further ones are rounding, on which fits of sticking joints would depend."""
 _NEAR = 0.5
 """Share of what the best effect alone removes from which on a finer grid may make another one the best (a convention)."""
 
@@ -210,16 +212,17 @@ class Selection:
         for i, remainder in self._remainders([]):
             name = self.terms[i].effect.name
             starts[name] = min(starts.get(name, (remainder, i)), (remainder, i))
+        numbers = self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()})
         return Proposal(
             taken,
             alone,
             judged,
             explained,
             self.by_chance,
-            numbers=self._numbers(self.columns_of(selected)),
-            numbers_beside=self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()}),
+            numbers=numbers.values(self.columns_of(selected)),
+            numbers_beside=numbers,
             starts={
-                name: ProposedStart(self._values(i, []), self._numbers(self.places[i]))
+                name: ProposedStart(_rounded(self._values(i, [])), _rounded(numbers.values(self.places[i])))
                 for name, (_, i) in starts.items()
             },
         )
@@ -232,14 +235,6 @@ class Selection:
         shares = [1.0 - self.regression.remainders(counts, self.places[i]) / begun for i in terms]
         return [(float(np.quantile(own, _LIMITS[0])), float(np.quantile(own, _LIMITS[1]))) for own in shares]
 
-    def _numbers(self, chosen: Sequence[int]) -> dict[str, float]:
-        """Return the numbers of the equations beside chosen columns, within their bounds."""
-        found = {}
-        changes = self.regression.solved(chosen)[: len(self.fit.free)]
-        for name, change, (low, high) in zip(self.fit.free, changes, self.fit.bounds, strict=True):
-            found[name] = float(np.clip(self.values[name] + change, low, high))
-        return found
-
     def _numbers_beside(self, missing: float, terms: Mapping[str, int]) -> NumbersBeside:
         """Return the numbers of the equations beside effects, of which each has a term."""
         of_rig = {p.name for p in self.fit.rig.parameters}
@@ -248,11 +243,9 @@ class Selection:
             tuple(name in of_rig for name in self.fit.free),
             np.array([self.values[name] for name in self.fit.free]),
             self.fit.bounds,
-            self.regression.size[self.regression.own],
-            self.regression.whole / self.regression.n_rows,
-            missing / self.regression.n_rows,
+            self.regression.sums(self.regression.whole),
+            missing,
             {name: self.places[i] for name, i in terms.items()},
-            SMOOTH,
         )
 
     def _cause(self, key: Key, i: int, share: float, chosen: Sequence[int]) -> ProposedCause:
@@ -280,6 +273,10 @@ class Selection:
         before, after = (evaluated(stiffness, {**self.values, **own, **known}) for own in ({}, changed))
         least, most = _SHARES
         return float(np.clip(1.0 - coefficient * before / after, least, most)) if after > 0.0 else least
+
+
+def _rounded(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: float(f"{value:.{_DIGITS}g}") for name, value in values.items()}
 
 
 def _n_fitted(effect: Effect) -> int:

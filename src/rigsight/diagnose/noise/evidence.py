@@ -136,7 +136,7 @@ class Evidence:
     def _of_forces(self, reidentified: FittedModel) -> Linearization | None:
         """Return the responses of the sensors to forces at the joints; None where the equations cannot be linearized."""
         structure = compose(with_probes(self._context.rig), self._context.modelled)
-        values = {**reidentified.fit.values, **dict(reidentified.fit.structure.fixed), PUSH_SIZE: 1.0}
+        values = {**reidentified.fit.all_values, PUSH_SIZE: 1.0}
         try:
             return linearize(structure, values)
         except SimulationError:

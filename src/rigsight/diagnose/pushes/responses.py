@@ -105,7 +105,7 @@ class Responses:
         self.structure = compose(
             with_probes(rig), (*context.modelled, *effects), observed=observed_sensors(records)
         )
-        self.values = {**fit.values, **dict(fit.structure.fixed), PUSH_SIZE: 1.0}
+        self.values = {**fit.all_values, PUSH_SIZE: 1.0}
         self._p = parameter_vector(self.structure, self.values)
         own = fit.structure.states
         order = [own.index(state) for state in self.structure.states]

@@ -196,7 +196,7 @@ def with_several_effects(
 
     def ask(model: FittedModel) -> Proposal | None:
         beside = replace(campaign, modelled=(*campaign.modelled, *model.effects))
-        return propose(beside, {**campaign.constants, **model.fit.values}, models.effects, noise)
+        return propose(beside, {**campaign.constants, **model.fit.all_values}, models.effects, noise)
 
     found = several_effects(models, ask, forms, checks, lower_bound, prepare)
     for model in found[:1]:

@@ -230,8 +230,8 @@ def _released(
     if not released or not np.isfinite(settled.error_over_noise) or settled.error_over_noise <= VERDICT.exact:
         return settled
     free = [name for name in structure.names if name in (*settled.fit.free, *released)]
-    start = {**settled.fit.values, **dict(settled.fit.structure.fixed)}
-    freer = _fitted(context, settled.effects, structure, free, (replace(settled.fit, values=start),), True)
+    begin = replace(settled.fit, values=settled.fit.all_values)
+    freer = _fitted(context, settled.effects, structure, free, (begin,), True)
     return freer if freer.error_over_noise < settled.error_over_noise / VERDICT.release_gain else settled
 
 

@@ -40,6 +40,11 @@ class FitResult:
     offset_names: tuple[str, ...] = ()  # sensors whose offsets were free in each record, in that order
 
     @property
+    def all_values(self) -> dict[str, float]:
+        """Values of all parameters by name, with those that are written into the equations of the structure."""
+        return {**self.values, **dict(self.structure.fixed)}
+
+    @property
     def rig_states(self) -> tuple[Floats, ...]:
         """Initial states of the structure per record, shape (n_states,), without offsets of sensors."""
         count = len(self.offset_names)

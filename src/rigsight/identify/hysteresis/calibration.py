@@ -151,7 +151,7 @@ def calibrate_to_records(
     rough.sort(key=lambda fit: fit.cost)
     fit = _refined(structure, chosen, simple, records, scales, noise, rough[0], rng, threads)
     tell("refined the best")
-    minima = tuple(Minimum(f.values | dict(f.structure.fixed), f.cost / f.n_samples) for f in rough)
+    minima = tuple(Minimum(f.all_values, f.cost / f.n_samples) for f in rough)
     amplitudes = record_amplitudes(structure, records, fit.values)
     derived = derived_quantities(fit, amplitudes, scales, rng)
     return Calibration(fit, derived, minima)
