@@ -21,8 +21,8 @@ from rigsight.simulate import has_dry_friction, parameter_vector, simulate_sets
 
 _STATE_RANGE = 20.0
 """Largest distance of an initial state from its first estimate, in units of its size."""
-_DECIMALS = 12
-"""Decimals of initial states in units of their sizes: further ones are rounding."""
+_ROUNDING = 1e-12
+"""Initial states below this, in units of their sizes, are zero: rounding leaves them."""
 _HIDDEN_RANGE = 3.0
 """The same for a state of an effect, which no sensor shows and whose estimate is its equilibrium. Further off, its own motion
 would explain what its equation does not: a resonance that begins at twenty times the motion of the mass on which it hangs."""
@@ -249,9 +249,9 @@ class SearchStart:
         of_effects = tuple(f"{effect.name}." for effect in data.structure.effects)
         hidden = [name.startswith(of_effects) for name in data.structure.state_names]
         reach = np.where(hidden, _HIDDEN_RANGE, _STATE_RANGE)
-        # A speed of 1e-19 that only rounding leaves would decide whether a joint sticks.
-        places = [np.round(s / sizes, _DECIMALS) for s in states]
-        places = [np.where(limited, np.clip(place, -1.0, 1.0), place) for place in places]
+        places = [np.where(limited, np.clip(s / sizes, -1.0, 1.0), s / sizes) for s in states]
+        # The sign of a speed of 1e-19 would decide whether a joint sticks.
+        places = [np.where(np.abs(place) < _ROUNDING, 0.0, place) for place in places]
         return cls(
             coordinates=coordinates,
             theta=np.concatenate([own, *places]),
