@@ -78,8 +78,6 @@ class EffectTerms:
     def beside(self, term: Term, halvings: int) -> Iterator[Term]:
         """Yield the effect of a term on both sides of its nonlinear parameters, at a step of the grid halved so often."""
         if not is_late(term.effect):
-            if term.effect.place is Place.ACTUATOR and not term.is_given:
-                return
             yield from self._at(term.effect, list(beside(term.effect, term.inner, self.scales, halvings)))
             return
         (length,), lengths = term.units, self._lengths(term.effect)

@@ -20,7 +20,7 @@ from rigsight.inverse.equation_fit import EquationFit
 Floats = NDArray[np.float64]
 
 _SAMPLES = 8
-"""Samples of each motion at which the mass matrix counts; it changes slowly."""
+"""Samples of each motion over which the mass matrix is averaged (a convention)."""
 _SMALL = 1e-4
 """Relative change of a number from which the change of the mass matrix is taken."""
 
