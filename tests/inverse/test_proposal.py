@@ -306,6 +306,19 @@ def test_a_modelled_friction_has_its_number_along_the_motion() -> None:
     assert found.numbers["T_c"] == pytest.approx(3.0, rel=0.02)
 
 
+def test_a_modelled_spring_law_does_not_take_the_stiffness_of_a_missing_loop() -> None:
+    spring, loop = effect_named("cubic_stiffness"), effect_named("iwan_hysteresis")
+    values = {**AXIS_VALUES, "k_3": 2e4, "a": 0.1, "x_s": 0.02, "q": -0.4}
+    own = campaign(AXIS, values, [spring, loop], (10.0, 20.0, 40.0))
+    own = replace(own, modelled=(spring,))
+    found = propose(
+        own, {**own.constants, **own.given, "k_3": 2e4}, candidates_on(AXIS, CATALOGUE, own.modelled)
+    )
+    assert found is not None
+    assert [taken.family for taken in found.taken][:1] == ["memory"]
+    assert "k_3" not in found.numbers
+
+
 def test_the_motion_is_asked_beside_a_loop_whose_exponent_is_written_into_its_equations() -> None:
     loop, values = effect_named("bouc_wen_hysteresis"), {"A": 1.0, "a": 0.4, "beta": 30.0, "gamma": 5.0}
     own = campaign(AXIS, {**AXIS_VALUES, **values, "n": 1.0}, [loop], (10.0, 20.0))

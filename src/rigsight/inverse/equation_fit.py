@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from rigsight.effects import Effect
+from rigsight.effects import Effect, symbols
 from rigsight.errors import SimulationError
 from rigsight.inverse.joint_force import JointMotion, effect_force, joint_motion
 from rigsight.inverse.measured_motion import RecordMotion, record_motion
@@ -69,12 +69,16 @@ def identifiable(
 ) -> tuple[str, ...]:
     """Return the parameters that the equations determine along the motions, beside those that are held.
 
-    Those of modelled effects are linear ones, as all parameters that a regression determines.
+    Those of modelled effects are the linear ones of effects that do not read the displacement.
     """
     structure = compose(rig, modelled)
     free = [p.name for p in rig.parameters if p.name not in held and matters(motions, values, p.name)]
+    # A modelled spring law would take the stiffness of a missing loop.
+    without_springs = [effect for effect in modelled if not effect.reads(symbols.x)]
     free += [
-        structure.parameter_name(effect, p.name) for effect in modelled for p in effect.linear_parameters
+        structure.parameter_name(effect, p.name)
+        for effect in without_springs
+        for p in effect.linear_parameters
     ]
     # A constant force and the rest of a spring do the same: the rest stays where it is known.
     of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
