@@ -175,7 +175,8 @@ class VerdictNumbers:
         "assumption",
         (
             "Share of the gap, and of the error between models with equally many parameters, by which models may differ and "
-            "still count as indistinguishable: no model is exact, and disturbances change the result."
+            "still count as indistinguishable: no model is exact, and disturbances change the result. A single effect that "
+            "leaves no more asks for no second one."
         ),
         set_by="in a gap of 48 floors, play with a disturbance left 4 % more than an end stop with a weak parallel spring",
     )

@@ -254,9 +254,16 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
     monkeypatch.setattr(Stepwise, "found", found)
     alone = scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))
     checks = SimpleNamespace(is_adequate=lambda _: adequate)
-    models = single_models(scored((), error_over_noise=40.0), alone, WorthFitting())
+    models = single_models(scored((), error_over_noise=15.0), alone, WorthFitting())
     several_effects(models, lambda _: None, None, checks, lower_bound, None)
     assert asked == [nothing_remains]
+
+
+def test_a_remainder_too_small_to_part_a_pair_from_a_single_effect_asks_for_none(scored) -> None:
+    single = scored(("iwan_hysteresis",), error_over_noise=1.08, residuals=np.ones(8))
+    checks = SimpleNamespace(is_adequate=lambda _: False)
+    models = single_models(scored((), error_over_noise=130.0), single, WorthFitting())
+    assert several_effects(models, lambda _: None, None, checks, False, None) == []
 
 
 def test_a_residual_of_the_size_of_a_law_error_asks_for_no_second_effect(scored) -> None:

@@ -230,6 +230,8 @@ def several_effects(
             enough,
         ).found()
         return larger_first(without_repeated_equations(context, each_once(named)), usable)
+    if best.error_over_noise <= tied_at_the_floor(reidentified):
+        return []
     is_excused = lower_bound and best.error_over_noise <= VERDICT.at_lower_bound
     if is_excused and checks.is_adequate(best):
         return []
@@ -245,6 +247,14 @@ def several_effects(
 def settled(reidentified: FittedModel) -> float:
     """Return the error at which nothing remains to explain, or no more than a law errs, in units of the noise floor."""
     return max(VERDICT.at_floor, SEARCH.law_error * reidentified.error_over_noise)
+
+
+def tied_at_the_floor(reidentified: FittedModel) -> float:
+    """Return the error of a single effect that ties in the ranking with any pair, in units of the noise floor.
+
+    What remains is too small a part of the gap to tell a second cause from a disturbance, and the single effect is plainer.
+    """
+    return 1.0 + VERDICT.inexact * reidentified.error_over_noise
 
 
 def larger_part_closed(reidentified: FittedModel) -> float:
