@@ -45,7 +45,7 @@ def train() -> Rig:
 
 def test_numbers_are_found_from_others(train: Rig) -> None:
     own = campaign(train, TRAIN, [], (0.8, 1.5))
-    fit = EquationFit(train, record_motions(train, own.records, TRAIN), (), ("J_m", "J_l", "k_s"))
+    fit = EquationFit(train, record_motions(train, own.records, TRAIN), (), ("J_m", "J_l", "k_s"), TRAIN)
     found, _ = fit.settled({**TRAIN, "J_m": 2e-4, "J_l": 4e-4, "k_s": 1.0})
     assert found["J_l"] == pytest.approx(TRAIN["J_l"], rel=0.02)
     assert found["k_s"] == pytest.approx(TRAIN["k_s"], rel=0.02)
@@ -54,7 +54,7 @@ def test_numbers_are_found_from_others(train: Rig) -> None:
 def test_where_nothing_is_free_the_numbers_stay(train: Rig) -> None:
     own = campaign(train, TRAIN, [], (0.8,))
     motions = record_motions(train, own.records, TRAIN)
-    fit = EquationFit(train, motions, (), ())
+    fit = EquationFit(train, motions, (), (), TRAIN)
     assert fit.independent(TRAIN) == ()
     assert fit.settled(TRAIN)[0] == TRAIN
     assert fit.slopes(motions[0], TRAIN).shape == (0, 2, own.records[0].n_samples)
@@ -63,7 +63,8 @@ def test_where_nothing_is_free_the_numbers_stay(train: Rig) -> None:
 def test_of_two_numbers_that_do_the_same_the_first_is_free() -> None:
     rig = RIGS["axis"]
     own = campaign(rig, AXIS_VALUES, [], (10.0,))
-    fit = EquationFit(rig, record_motions(rig, own.records, AXIS_VALUES), (), ("force_off", "k", "x_off"))
+    motions = record_motions(rig, own.records, AXIS_VALUES)
+    fit = EquationFit(rig, motions, (), ("force_off", "k", "x_off"), AXIS_VALUES)
     assert fit.independent(AXIS_VALUES) == ("force_off", "k")
 
 
@@ -82,7 +83,7 @@ def test_a_change_that_widens_the_band_is_compared_in_the_band_of_the_measured_m
     x = record["x"]
     beat = 0.02 * np.std(x) * np.sin(0.5 * np.pi * np.arange(len(x)))
     motions = [record_motions(rig, [own], AXIS_VALUES) for own in (record, record.with_signals(x=x + beat))]
-    before, after = (EquationFit(rig, own, (), ("k", "d")) for own in motions)
+    before, after = (EquationFit(rig, own, (), ("k", "d"), AXIS_VALUES) for own in motions)
     assert motions[1][0].band != motions[0][0].band
     wide = float(np.sqrt(np.mean((after.rows(AXIS_VALUES)[0] - np.mean(after.rows(AXIS_VALUES)[0])) ** 2)))
     assert before.unexplained(after, AXIS_VALUES, np.ones(1))[0] < 0.1 * wide

@@ -10,6 +10,7 @@ from scipy.optimize import lsq_linear
 
 from rigsight.effects import Effect, symbols
 from rigsight.errors import SimulationError
+from rigsight.inverse.drive_gain import changed, gains_of_known_scale
 from rigsight.inverse.joint_force import JointMotion, effect_force, joint_motion
 from rigsight.inverse.measured_motion import RecordMotion, record_motion
 from rigsight.records import Record
@@ -26,6 +27,7 @@ _DEPENDENT = 1e-6
 LAW_ERROR = 0.05
 """Error of laws relative to the force in an equation (an assumption). It weighs the joints of a rig against each other: one whose
 equation holds would else count as much as one whose friction is missing."""
+_UNBOUNDED = 1e18
 _APART = 1e-12
 """Least distance of two bounds, relative to them, that the solver accepts."""
 
@@ -83,7 +85,7 @@ def identifiable(
     # A constant force and the rest of a spring do the same: the rest stays where it is known.
     of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
     ordered = sorted(free, key=lambda name: name in of_rest)
-    return EquationFit(rig, motions, modelled, ordered).independent(values)
+    return EquationFit(rig, motions, modelled, ordered, values).independent(values)
 
 
 def undriven_inertias(motions: Sequence[RecordMotion], values: Mapping[str, float]) -> set[str]:
@@ -102,12 +104,25 @@ def undriven_inertias(motions: Sequence[RecordMotion], values: Mapping[str, floa
 
 
 class EquationFit:
-    """The error of equations along motions as a function of their numbers."""
+    """The error of equations along motions as a function of their numbers.
+
+    Where the gain of a drive is free, residuals are in units of its input, times the gain at `values`.
+    """
 
     def __init__(
-        self, rig: Rig, motions: Sequence[RecordMotion], modelled: Sequence[Effect], free: Sequence[str]
+        self,
+        rig: Rig,
+        motions: Sequence[RecordMotion],
+        modelled: Sequence[Effect],
+        free: Sequence[str],
+        values: Mapping[str, float],
     ) -> None:
         self.rig, self.motions, self.modelled, self.free = rig, motions, modelled, list(free)
+        self.gains = {
+            name: (values[name], np.array(rows)[:, None])
+            for name, rows in gains_of_known_scale(rig).items()
+            if name in self.free
+        }
         self.structure = compose(rig, modelled)
         parameters = {p.name: p for p in self.structure.parameters}
         self.bounds = [(parameters[name].lower, parameters[name].upper) for name in free]
@@ -118,10 +133,20 @@ class EquationFit:
 
     def residual(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
         """Return the residual of each equation along one motion in its whole band, shape (n_equations, n_samples)."""
+        return self._force(motion, values) * self.per_input(values)
+
+    def _force(self, motion: RecordMotion, values: Mapping[str, float]) -> Floats:
         own = motion.residual(values)
         for effect in self.modelled:
             own = own + self._along(motion, effect, self._own(effect, values), values)
         return own
+
+    def per_input(self, values: Mapping[str, float]) -> Floats:
+        """Return the factors that bring the forces in each equation to units of the input, shape (n_equations or 1, 1)."""
+        factor = np.ones((1, 1))
+        for name, (gain, rows) in self.gains.items():
+            factor = factor * np.where(rows, gain / values[name], 1.0)
+        return factor
 
     def rms(self, values: Mapping[str, float]) -> Floats:
         """Return the RMS of each equation."""
@@ -179,13 +204,17 @@ class EquationFit:
         q, r = np.linalg.qr(matrix)
         # Directions that nothing determines stay where they are.
         held = _RANK * float(np.max(np.abs(r), initial=0.0)) * np.eye(r.shape[1])
+        # The regression is linear in the reciprocal of a gain.
+        is_gain = np.array([name in self.gains for name in self.free])
+        ends[is_gain] = -_UNBOUNDED, _UNBOUNDED
         low, high = (ends[:, 0] - now) * size, (ends[:, 1] - now) * size
         narrow = high <= low
         high = np.where(narrow, low + _APART * np.maximum(1.0, np.abs(low)), high)
         change = lsq_linear(
             np.concatenate([r, held]), -np.r_[q.T @ target, np.zeros(len(held))], (low, high)
         ).x
-        return {**values, **dict(zip(self.free, map(float, now + change / size), strict=True))}
+        moved = np.clip(changed(now, change / size, is_gain), *np.array(self.bounds).T)
+        return {**values, **dict(zip(self.free, map(float, moved), strict=True))}
 
     def independent(self, values: Mapping[str, float]) -> tuple[str, ...]:
         """Return the free numbers whose influence is not a sum of the influences of those before them."""
@@ -245,7 +274,9 @@ class EquationFit:
                     found[name] = self._along(motion, effect, {**without, p.name: 1.0}, values)
         if not found:
             return np.zeros((0, *motion.residual(values).shape))
-        return np.array([found[name] for name in self.free])
+        for name, (_, rows) in self.gains.items():
+            found[name] = found[name] - np.where(rows, self._force(motion, values) / values[name], 0.0)
+        return np.array([found[name] for name in self.free]) * self.per_input(values)
 
     def _own(self, effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
         return {p.name: values[self.structure.parameter_name(effect, p.name)] for p in effect.parameters}

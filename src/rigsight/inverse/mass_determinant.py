@@ -73,5 +73,5 @@ def _masses(fit: EquationFit, values: Mapping[str, float]) -> Floats:
     for motion in fit.motions:
         at = np.linspace(0, motion.record.n_samples - 1, _SAMPLES).astype(np.int64)
         p = motion.equations.parameters(values, motion.record)
-        found.append(motion.equations.mass(motion.z[:, at], motion.u[:, at], p))
+        found.append(motion.equations.mass(motion.z[:, at], motion.u[:, at], p) * fit.per_input(values))
     return np.concatenate(found)

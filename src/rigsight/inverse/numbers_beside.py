@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.effects import Effect
+from rigsight.inverse.drive_gain import changed
 from rigsight.inverse.regression import Sums
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,7 @@ class NumbersBeside:
 
     names: tuple[str, ...]  # numbers of the equations, in the order of their columns
     of_rig: tuple[bool, ...]  # whether each is a parameter of the rig, not of an effect that is modelled
+    is_gain: tuple[bool, ...]  # whether each is the gain of a drive
     start: Floats  # values at which the columns were taken, shape (n,)
     bounds: Sequence[tuple[float, float]]  # of each number
     sums: Sums
@@ -53,5 +55,6 @@ class NumbersBeside:
     def values(self, chosen: Sequence[int]) -> dict[str, float]:
         """Return all numbers of the equations beside chosen columns, within their bounds."""
         n = len(self.names)
-        found = np.clip(self.start + self.sums.solved(chosen)[:n], *np.reshape(self.bounds, (n, 2)).T)
+        moved = changed(self.start, self.sums.solved(chosen)[:n], self.is_gain)
+        found = np.clip(moved, *np.reshape(self.bounds, (n, 2)).T)
         return dict(zip(self.names, map(float, found), strict=True))

@@ -22,6 +22,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import Effect, Place
 from rigsight.errors import SimulationError
 from rigsight.identify import characteristic_scales
+from rigsight.inverse.drive_gain import gains_of_known_scale
 from rigsight.inverse.effect_terms import EffectTerms, is_joint_force, is_late, lateness
 from rigsight.inverse.equation_fit import (
     EquationFit,
@@ -191,11 +192,12 @@ def _in_time(campaign: Campaign, known: Mapping[str, float]) -> Campaign:
 
 def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit, dict[str, float]]:
     rig = campaign.rig
-    held = held_numbers(rig) | ({campaign.absent_spring} if campaign.absent_spring else set())
     start = {p.name: p.default if p.default is not None else 1.0 for p in rig.parameters}
     start |= {**campaign.constants, **known}
+    held = held_numbers(rig) - {name for name in gains_of_known_scale(rig) if start[name] != 0.0}
+    held |= {campaign.absent_spring} if campaign.absent_spring else set()
     motions = record_motions(rig, campaign.estimation, start)
     held |= undriven_inertias(motions, start)
     free = identifiable(rig, motions, campaign.modelled, start, held)
-    fit = EquationFit(rig, motions, campaign.modelled, free)
-    return fit, fit.settled(start)[0]
+    values, _ = EquationFit(rig, motions, campaign.modelled, free, start).settled(start)
+    return EquationFit(rig, motions, campaign.modelled, free, values), values

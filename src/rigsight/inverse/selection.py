@@ -62,8 +62,8 @@ class Selection:
         # that of the forces. The numbers of the equations have taken their part of them.
         independent = max(self.regression.n_rows / WIDER - len(fit.free), 2.0)
         self.by_chance = 1.0 - (_SIGNIFICANCE / len(terms)) ** (2.0 / (independent - 1.0))
-        if not self.regression.predicts_accelerations:
-            # Nothing tells a given force from masses that shrink.
+        if fit.gains or not self.regression.predicts_accelerations:
+            # Nothing tells a given force from masses that shrink, or from a gain that grows.
             terms = [term for term in terms if not term.is_given]
         self._add(terms)
 
@@ -241,6 +241,7 @@ class Selection:
         return NumbersBeside(
             tuple(self.fit.free),
             tuple(name in of_rig for name in self.fit.free),
+            tuple(name in self.fit.gains for name in self.fit.free),
             np.array([self.values[name] for name in self.fit.free]),
             self.fit.bounds,
             self.regression.sums(self.regression.whole),

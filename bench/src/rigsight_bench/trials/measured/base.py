@@ -90,7 +90,13 @@ class Base:
             The same stretches without it.
         """
         before, after = (
-            EquationFit(self.rig, record_motions(self.rig, records, self.values), self.modelled, self.free)
+            EquationFit(
+                self.rig,
+                record_motions(self.rig, records, self.values),
+                self.modelled,
+                self.free,
+                self.values,
+            )
             for records in (reference, changed)
         )
         return float(np.max(before.unexplained(after, self.values, self.remainder) / self.remainder))
@@ -164,5 +170,5 @@ def _fitted(
         (effect,) = modelled
         name = structure.parameter_name(effect, "T_c")
         values[name], free = 0.0, (*free, name)
-    values, remainder = EquationFit(rig, motions, modelled, free).settled(values)
+    values, remainder = EquationFit(rig, motions, modelled, free, values).settled(values)
     return Base(campaign, modelled, is_chosen, values, free, remainder)

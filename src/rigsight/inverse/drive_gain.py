@@ -1,0 +1,61 @@
+"""Gains of drives that move a known mass or work against a known weight: the scale of their forces follows from it.
+
+Residuals of equations count in units of the input there: of the force, a smaller gain alone would leave less.
+
+References
+----------
+M. Gautier and S. Briot, IEEE Trans. Robot. 30 (2014) 1220, for gains of drives from a known payload.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.effects.symbols import derivative
+from rigsight.rigs import Rig
+
+Floats = NDArray[np.float64]
+
+
+def gains_of_known_scale(rig: Rig) -> dict[str, list[bool]]:
+    """Return for each parameter that is the gain of one drive against a known mass or weight the equations that it enters."""
+    mechanism = rig.mechanism
+    symbols = {p.name: sp.Symbol(p.name, real=True) for p in rig.parameters}
+    known = (mechanism.kinetic + mechanism.potential).xreplace(dict.fromkeys(symbols.values(), sp.Integer(0)))
+    scaled = set() if known.has(sp.zoo, sp.nan) else known.free_symbols
+    moved = {c.symbol for c in mechanism.free if {c.symbol, c.rate} & scaled}
+    found = {}
+    for name, gain in symbols.items():
+        drives = [d for d in mechanism.drives if gain in d.force.free_symbols | d.signal.free_symbols]
+        if len(drives) != 1 or not drives[0].along.free_symbols & moved:
+            continue
+        if sp.expand(drives[0].force - gain * derivative(drives[0].force, gain)) == 0:
+            found[name] = [c.symbol in drives[0].along.free_symbols for c in mechanism.free]
+    return found
+
+
+def changed(start: Floats, change: Floats, is_gain: Sequence[bool] | NDArray[np.bool_]) -> Floats:
+    """Return numbers after a change by a regression of residuals in units of the input; a gain of no sign stays.
+
+    Parameters
+    ----------
+    start
+        Numbers at which the slopes were taken, shape (n,).
+    change
+        Of the numbers, by the regression, shape (n,).
+    is_gain
+        Which of them are gains: residuals are linear in their reciprocals, and scale all forces.
+    """
+    own = np.asarray(is_gain, dtype=np.bool_)
+    if not np.any(own):
+        return start + change
+    scale = 1.0 - change[own] / start[own]
+    if np.any(scale <= 0.0):
+        return start + np.where(own, 0.0, change)
+    found = start + change / float(np.mean(scale))
+    found[own] = start[own] / scale
+    return found
