@@ -19,6 +19,7 @@ from rigsight.inverse.selection import Selection
 from rigsight.inverse.term import Term
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
 DT = 2e-3
@@ -26,6 +27,32 @@ T = DT * np.arange(4000)
 AXIS_VALUES = {"gain": 1.0, "m": 1.0, "d": 4.0, "k": 400.0, "x_off": 0.0, "force_off": 0.0}
 TRAIN = {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
 NOISE = 1e-3
+WHEEL = """
+name = "wheel"
+summary = "A motor turns a wheel."
+[inputs.u]
+unit = "N m"
+[parameters.J]
+unit = "kg m^2"
+lower = 1e-9
+[parameters.b]
+unit = "N m s/rad"
+lower = 0.0
+[coordinates.q]
+unit = "rad"
+[energy]
+kinetic = "J*d(q)^2/2"
+[joints.bearing]
+motion = "q"
+damping = "b"
+[drives.motor]
+signal = "u"
+force = "motor"
+along = "q"
+[sensors.angle]
+reads = "q"
+unit = "rad"
+"""
 
 
 def campaign(
@@ -174,6 +201,17 @@ def test_a_selection_with_further_terms_is_that_of_all_terms() -> None:
     assert np.allclose(grown.regression.matrix, whole.regression.matrix, rtol=1e-12)
     assert np.allclose(grown.regression.products, whole.regression.products, rtol=1e-9)
     assert np.allclose(grown.regression.whole, whole.regression.whole, rtol=1e-9)
+
+
+def test_friction_of_a_wheel_that_turns_one_way_does_not_take_the_drive_for_its_load() -> None:
+    rig, effect = rig_of_text(WHEEL, "wheel.toml"), effect_named("asymmetric_stiffness")
+    values, rng = {"J": 5e-3, "b": 0.04, "k_2": 1.5e-5}, np.random.default_rng(0)
+    drive = 0.6 + 0.15 * np.sin(2.0 * np.pi * (0.1 * T + 0.2 * T**2)) + 0.1 * np.sin(2.0 * np.pi * 0.37 * T)
+    run = simulate(compose(rig, [effect]), values, Record("run", DT, {"u": drive}, {}, hold="foh"))
+    record = run.with_signals(angle=run["angle"] + 1e-3 * rng.standard_normal(T.size))
+    found = proposed(Campaign("test", rig, {}, {"J": values["J"], "b": values["b"]}, (record,)))
+    assert found.taken[0].family == "spring_law"
+    assert found.numbers["J"] == pytest.approx(values["J"], rel=0.05)
 
 
 def test_friction_beside_a_constant_force_does_not_drive_both_ways() -> None:

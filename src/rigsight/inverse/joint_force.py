@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 _ROUNDS = 60
 """Rounds in which friction and the load that it depends on settle; each shortens the difference by the friction coefficient."""
 _ACCURACY = 1e-5
+_TINY = float(np.finfo(np.float64).tiny)
 _ELEMENT: dict[str, Any] = {
     "name": "measured_joint",
     "summary": "A joint moves as it was measured.",
@@ -103,6 +104,7 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
     places = equations.at_places(motion.z, motion.u, p)
     x, v = places[f"motion@{joint.name}"], places[f"rate@{joint.name}"]
     along = equations.slopes_along(motion.z, motion.u, p)[joint.name] if equations.n_coordinates else None
+    load = _load(motion, joint, numbers)
     if along is None:
         # Of a joint along the prescribed coordinates themselves.
         acceleration = np.gradient(v, record.dt)
@@ -111,6 +113,11 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
                 acceleration = motion.u[3 * i + 2]
     else:
         acceleration = np.einsum("ik,ik->k", along, motion.a)
+        # The drives as the motion requires them: of those recorded, what they carry would explain them by themselves.
+        missing = np.sum(along * motion.residual(values), axis=0) / np.maximum(
+            np.sum(along**2, axis=0), _TINY
+        )
+        load = motion.filtered(load + missing)
     return JointMotion(
         record,
         x,
@@ -118,12 +125,12 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
         acceleration,
         evaluated(joint.rest, numbers),
         evaluated(joint.stiffness, numbers),
-        _load(motion, joint, numbers),
+        load,
     )
 
 
 def _load(motion: RecordMotion, joint: Joint, numbers: Mapping[str, float]) -> Floats:
-    """Return what the joint carries with the drives as they are recorded."""
+    """Return what the joint carries with the drives as they are recorded, shape (n_samples,)."""
     rig, equations = motion.equations.rig, motion.equations
     signals: dict[str, Any] = dict(numbers)
     for i, c in enumerate(rig.mechanism.free):
