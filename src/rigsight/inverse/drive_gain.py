@@ -16,7 +16,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.effects.symbols import derivative
-from rigsight.rigs import Rig
+from rigsight.rigs import Drive, Rig
 
 Floats = NDArray[np.float64]
 
@@ -24,17 +24,26 @@ Floats = NDArray[np.float64]
 def gains_of_known_scale(rig: Rig) -> dict[str, list[bool]]:
     """Return for each parameter that is the gain of one drive against a known mass or weight the equations that it enters."""
     mechanism = rig.mechanism
-    symbols = {p.name: sp.Symbol(p.name, real=True) for p in rig.parameters}
-    known = (mechanism.kinetic + mechanism.potential).xreplace(dict.fromkeys(symbols.values(), sp.Integer(0)))
+    along = {name: drive.along.free_symbols for name, drive in _gains(rig).items()}
+    if not along:
+        return {}
+    numbers = {sp.Symbol(p.name, real=True): sp.Integer(0) for p in rig.parameters}
+    known = (mechanism.kinetic + mechanism.potential).xreplace(numbers)
     scaled = set() if known.has(sp.zoo, sp.nan) else known.free_symbols
     moved = {c.symbol for c in mechanism.free if {c.symbol, c.rate} & scaled}
+    return {name: [c.symbol in own for c in mechanism.free] for name, own in along.items() if own & moved}
+
+
+def _gains(rig: Rig) -> dict[str, Drive]:
+    """Return the parameters to which the force of just one drive is proportional, with this drive."""
     found = {}
-    for name, gain in symbols.items():
-        drives = [d for d in mechanism.drives if gain in d.force.free_symbols | d.signal.free_symbols]
-        if len(drives) != 1 or not drives[0].along.free_symbols & moved:
+    for parameter in rig.parameters:
+        gain = sp.Symbol(parameter.name, real=True)
+        drives = [d for d in rig.mechanism.drives if gain in d.force.free_symbols | d.signal.free_symbols]
+        if len(drives) != 1 or gain in drives[0].signal.free_symbols:
             continue
         if sp.expand(drives[0].force - gain * derivative(drives[0].force, gain)) == 0:
-            found[name] = [c.symbol in drives[0].along.free_symbols for c in mechanism.free]
+            found[parameter.name] = drives[0]
     return found
 
 
