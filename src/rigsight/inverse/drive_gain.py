@@ -1,6 +1,6 @@
 """Gains of drives that move a known mass or work against a known weight: the scale of their forces follows from it.
 
-Residuals of equations count in units of the input there: of the force, a smaller gain alone would leave less.
+Residuals of equations count in units of the input there. Measured as a force, they would fall with the gain alone.
 
 References
 ----------
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 def gains_of_known_scale(rig: Rig) -> dict[str, list[bool]]:
-    """Return for each parameter that is the gain of one drive against a known mass or weight the equations that it enters."""
+    """Return the parameters that are the gain of a drive against a known mass or weight, with whether it enters each equation."""
     mechanism = rig.mechanism
     along = {name: drive.along.free_symbols for name, drive in _gains(rig).items()}
     if not along:

@@ -16,7 +16,7 @@ from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.inverse.equation_fit import EquationFit
-from rigsight.inverse.measured_motion import RecordMotion, along_change
+from rigsight.inverse.measured_motion import RecordMotion, along_change, nearest_force
 from rigsight.inverse.parameter_grid import grid_of, usual
 from rigsight.inverse.term import Term, compiled
 from rigsight.rigs import Drive, evaluated
@@ -148,5 +148,4 @@ def _through_drive(
     """Return how a drive enters the equations, shape (n_equations, n_samples), and the force of the drive nearest to rows."""
     p = motion.equations.parameters(values, motion.record)
     along = motion.equations.slopes_along(motion.z, motion.u, p)[name]
-    size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
-    return along, np.sum(along * rows, axis=0) / size
+    return along, nearest_force(along, rows)

@@ -82,9 +82,10 @@ def identifiable(
         for effect in without_springs
         for p in effect.linear_parameters
     ]
-    # A constant force and the rest of a spring do the same: the rest stays where it is known.
+    # Of numbers that do the same the last one stays as it is known: the rest of a spring beside a constant force, or a gain.
     of_rest = {symbol.name for joint in rig.mechanism.joints for symbol in joint.rest.free_symbols}
-    ordered = sorted(free, key=lambda name: name in of_rest)
+    of_drives = held_numbers(rig)
+    ordered = sorted(free, key=lambda name: (name in of_drives, name in of_rest))
     return EquationFit(rig, motions, modelled, ordered, values).independent(values)
 
 

@@ -16,7 +16,7 @@ from rigsight.effects import Effect, Place, kind_of
 from rigsight.effects import symbols as canonical
 from rigsight.effects.placed import ByIdentity
 from rigsight.identify.rig_equations import FUNCTIONS
-from rigsight.inverse.measured_motion import RecordMotion, speed_at_rest
+from rigsight.inverse.measured_motion import RecordMotion, nearest_force, speed_at_rest
 from rigsight.records import Record
 from rigsight.rigs import Joint, Rig, evaluated, rig_of_tables
 from rigsight.simulate import Structure, compose, simulate
@@ -26,7 +26,6 @@ Floats = NDArray[np.float64]
 _ROUNDS = 60
 """Rounds in which friction and the load that it depends on settle; each shortens the difference by the friction coefficient."""
 _ACCURACY = 1e-5
-_TINY = float(np.finfo(np.float64).tiny)
 _ELEMENT: dict[str, Any] = {
     "name": "measured_joint",
     "summary": "A joint moves as it was measured.",
@@ -113,11 +112,8 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
                 acceleration = motion.u[3 * i + 2]
     else:
         acceleration = np.einsum("ik,ik->k", along, motion.a)
-        # The drives as the motion requires them: of those recorded, what they carry would explain them by themselves.
-        missing = np.sum(along * motion.residual(values), axis=0) / np.maximum(
-            np.sum(along**2, axis=0), _TINY
-        )
-        load = motion.filtered(load + missing)
+        # With the drives as the motion requires them: the load of the recorded ones explains these by itself.
+        load = motion.filtered(load + nearest_force(along, motion.residual(values)))
     return JointMotion(
         record,
         x,

@@ -229,6 +229,20 @@ class RecordMotion:
         return max(1, int(1.0 / (_ABOVE * self.band)))
 
 
+def nearest_force(along: Floats, rows: Floats) -> Floats:
+    """Return the force that explains most of rows of equations, shape (n_samples,).
+
+    Parameters
+    ----------
+    along
+        What a unit of the force adds to each equation, shape (n_equations, n_samples).
+    rows
+        Of the equations, of the same shape.
+    """
+    size = np.maximum(np.sum(along**2, axis=0), np.finfo(np.float64).tiny)
+    return np.asarray(np.sum(along * rows, axis=0) / size)
+
+
 def speed_at_rest(speed: Floats) -> float:
     """Return the size up to which a speed along a record is noise and has no direction."""
     return _AT_REST * float(np.percentile(np.abs(speed), _LARGE))

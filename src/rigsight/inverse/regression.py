@@ -35,9 +35,8 @@ _WORTHLESS = 1e9
 class Sums:
     """Sums of products of all columns, from which the numbers of the equations beside any columns follow."""
 
-    products: (
-        Floats  # of the scaled columns, the missing force last, shape (.., n_columns + 1, n_columns + 1)
-    )
+    # Of the scaled columns, the missing force last, shape (.., n_columns + 1, n_columns + 1).
+    products: Floats
     size: Floats  # of each column before it was scaled to a mean square of one, shape (n_columns + 1,)
     own: Sequence[int]  # columns of the numbers of the equations
     given: frozenset[int]  # columns that are a force as it is, not that of a unit of a number
