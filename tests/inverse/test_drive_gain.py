@@ -10,7 +10,7 @@ import pytest
 from rigsight.diagnose import candidates_on
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.inverse import propose
-from rigsight.inverse.drive_gain import changed, gains_of_known_scale
+from rigsight.inverse.drive_gain import changed, gains_of_known_scale, slopes_of_changes
 from rigsight.rigs import RIGS
 from rigsight.rigs.reading.rig_file import rig_of_text
 
@@ -87,3 +87,11 @@ def test_numbers_follow_from_residuals_in_units_of_the_input() -> None:
     assert changed(start, np.array([-0.5, 0.0]), is_gain) == pytest.approx([0.25, 2.0])
     assert changed(start, np.array([-0.5, 2.0]), is_gain) == pytest.approx([0.25, 3.0])
     assert changed(start, np.array([0.6, 0.1]), is_gain) == pytest.approx([0.5, 2.1]), "no sign"
+
+
+def test_the_slopes_of_changes_are_those_of_the_numbers_backwards() -> None:
+    start, change, is_gain = np.array([0.5, 2.0, 3.0]), np.array([0.2, 0.4, -0.3]), [True, False, False]
+    found = changed(start, change, is_gain)
+    steps = 1e-6 * np.eye(3)
+    forward = np.array([(changed(start, change + step, is_gain) - found) / 1e-6 for step in steps]).T
+    assert slopes_of_changes(start, found, is_gain) @ forward == pytest.approx(np.eye(3), abs=1e-4)

@@ -68,3 +68,24 @@ def changed(start: Floats, change: Floats, is_gain: Sequence[bool] | NDArray[np.
     found = start + change / float(np.mean(scale))
     found[own] = start[own] / scale
     return found
+
+
+def slopes_of_changes(start: Floats, found: Floats, is_gain: Sequence[bool] | NDArray[np.bool_]) -> Floats:
+    """Return the derivatives of the change of each number by the numbers that follow from it, shape (n, n).
+
+    Parameters
+    ----------
+    start, is_gain
+        As for `changed`.
+    found
+        What it returned, shape (n,).
+    """
+    own = np.asarray(is_gain, dtype=np.bool_)
+    slopes = np.eye(start.size)
+    if np.any(own):
+        scale = start[own] / found[own]
+        slopes *= float(np.mean(scale))
+        by_gain = -scale / found[own]
+        slopes[:, own] = np.outer(found - start, by_gain / by_gain.size)
+        slopes[np.ix_(own, own)] = np.diag(scale**2)
+    return slopes

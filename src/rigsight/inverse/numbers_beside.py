@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.effects import Effect
-from rigsight.inverse.drive_gain import changed
+from rigsight.inverse.drive_gain import changed, slopes_of_changes
 from rigsight.inverse.regression import Sums
 
 Floats = NDArray[np.float64]
@@ -44,13 +44,13 @@ class NumbersBeside:
         kept, size = np.flatnonzero(self.of_rig), self.sums.size
         # What the numbers of effects can take over costs nothing.
         shared = np.linalg.inv(self.sums.normal(chosen))[kept[:, None], kept]
-        curvature = np.linalg.inv(shared) * np.outer(size[kept], size[kept])
+        of_changes = np.linalg.inv(shared) * np.outer(size[kept], size[kept])
         values = self.values(chosen)
-        return NumbersAlongMotion(
-            tuple(self.names[i] for i in kept),
-            np.array([values[self.names[i]] for i in kept]),
-            (curvature + curvature.T) / (2.0 * self.missing),
-        )
+        names = tuple(self.names[i] for i in kept)
+        found = np.array([values[name] for name in names])
+        slopes = slopes_of_changes(self.start[kept], found, np.array(self.is_gain)[kept])
+        curvature = slopes.T @ of_changes @ slopes
+        return NumbersAlongMotion(names, found, (curvature + curvature.T) / (2.0 * self.missing))
 
     def values(self, chosen: Sequence[int]) -> dict[str, float]:
         """Return all numbers of the equations beside chosen columns, within their bounds."""
