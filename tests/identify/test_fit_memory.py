@@ -9,9 +9,11 @@ import numpy as np
 
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
-from rigsight.rigs import AXIS, rig_file_text
+from rigsight.rigs import AXIS, Rig, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
+
+VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
 
 
 class Kept:
@@ -27,44 +29,37 @@ class Kept:
         self.known[key] = outcome
 
 
+def fit_of(rig: Rig, memory: Kept) -> GreyBoxFit:
+    push = Record("push", 0.01, {"u": np.sin(np.linspace(0.0, 60.0, 300) ** 1.3)}, {})
+    record = simulate(compose(rig), VALUES, push)
+    scales = characteristic_scales(rig, [record], VALUES)
+    return GreyBoxFit(compose(rig), [record], scales, {"x": 1e-5}, memory=memory)
+
+
 def test_a_rig_file_with_other_bounds_is_another_problem() -> None:
     text = rig_file_text("axis").replace('name = "axis"', 'name = "stage"')
     other = text.replace(
         '[parameters.m]\nunit = "kg"\nlower = 1e-15', '[parameters.m]\nunit = "kg"\nlower = 1e-3'
     )
     assert other != text
-    values = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
-    push = Record("push", 0.01, {"u": np.sin(np.linspace(0.0, 60.0, 300) ** 1.3)}, {})
     memory = Kept()
     for rig, recalled in ((rig_of_text(text), 0), (rig_of_text(text), 1), (rig_of_text(other), 1)):
-        structure = compose(rig)
-        record = simulate(structure, values, push)
-        fit = GreyBoxFit(
-            structure, [record], characteristic_scales(rig, [record], values), {"x": 1e-5}, memory=memory
-        )
-        fit.fit({**values, "m": 2.2}, ["m"])
+        fit = fit_of(rig, memory)
+        fit.fit({**VALUES, "m": 2.2}, ["m"])
         assert memory.recalled == recalled
 
 
 def test_a_rough_fit_does_not_serve_for_one_that_is_finished() -> None:
-    values = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
-    push = Record("push", 0.01, {"u": np.sin(np.linspace(0.0, 60.0, 300) ** 1.3)}, {})
-    record = simulate(compose(AXIS), values, push)
     memory = Kept()
-    scales = characteristic_scales(AXIS, [record], values)
-    fit = GreyBoxFit(compose(AXIS), [record], scales, {"x": 1e-5}, memory=memory)
+    fit = fit_of(AXIS, memory)
     for finish, recalled in ((False, 0), (True, 0), (False, 1), (True, 2)):
-        fit.fit({**values, "m": 2.2}, ["m"], finish=finish)
+        fit.fit({**VALUES, "m": 2.2}, ["m"], finish=finish)
         assert memory.recalled == recalled
 
 
 def test_the_rounding_of_an_initial_state_makes_no_other_problem() -> None:
-    values = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
-    push = Record("push", 0.01, {"u": np.sin(np.linspace(0.0, 60.0, 300) ** 1.3)}, {})
-    record = simulate(compose(AXIS), values, push)
     memory = Kept()
-    scales = characteristic_scales(AXIS, [record], values)
-    fit = GreyBoxFit(compose(AXIS), [record], scales, {"x": 1e-5}, memory=memory)
+    fit = fit_of(AXIS, memory)
     for speed, recalled in ((0.0, 0), (1e-19, 1), (1e-3, 1)):
-        fit.fit({**values, "m": 2.2}, ["m"], initial_states=[np.array([0.0, speed])])
+        fit.fit({**VALUES, "m": 2.2}, ["m"], initial_states=[np.array([0.0, speed])])
         assert memory.recalled == recalled

@@ -12,45 +12,17 @@ from rigsight.effects import CATALOGUE, effect_named
 from rigsight.inverse import propose
 from rigsight.inverse.drive_gain import changed, gains_of_known_scale, slopes_of_changes
 from rigsight.rigs import RIGS
-from rigsight.rigs.reading.rig_file import rig_of_text
 
+from .motor_rig import motor_rig
 from .test_proposal import campaign
 
-SERVO = """
-name = "servo"
-summary = "A motor turns a payload that was weighed."
-[inputs.u]
-unit = "1"
+WEIGHED = """
 [constants.m]
 unit = "kg"
 [constants.l]
 unit = "m"
-[parameters.J]
-unit = "kg m^2"
-lower = 1e-7
-log = true
-[parameters.k_v]
-unit = "N m"
-lower = 0.0
-[parameters.d]
-unit = "N m s/rad"
-lower = 0.0
-[coordinates.q]
-unit = "rad"
-[energy]
-kinetic = "(J + m*l^2)*d(q)^2/2"
-potential = "-m*9.81*l*cos(q)"
-[joints.gearbox]
-motion = "q"
-damping = "d"
-[drives.motor]
-signal = "u"
-force = "k_v*motor"
-along = "q"
-[sensors.angle]
-reads = "q"
-unit = "rad"
 """
+SERVO = motor_rig("(J + m*l^2)*d(q)^2/2", "-m*9.81*l*cos(q)", WEIGHED)
 PAYLOAD = {"m": 0.5, "l": 0.1}
 VALUES = {**PAYLOAD, "J": 2e-3, "k_v": 0.6, "d": 0.02}
 
@@ -66,10 +38,9 @@ VALUES = {**PAYLOAD, "J": 2e-3, "k_v": 0.6, "d": 0.02}
 def test_what_is_missing_and_the_gain_are_found_from_any_given_gain(
     missing: str, values: Mapping[str, float], given: float
 ) -> None:
-    rig = rig_of_text(SERVO, "servo.toml")
-    own = campaign(rig, {**VALUES, **values}, [effect_named(missing)], (0.3, 0.5))
+    own = campaign(SERVO, {**VALUES, **values}, [effect_named(missing)], (0.3, 0.5))
     known = {**PAYLOAD, "J": 1e-3, "k_v": given, "d": 0.05}
-    found = propose(own, known, candidates_on(rig, CATALOGUE))
+    found = propose(own, known, candidates_on(SERVO, CATALOGUE))
     assert found is not None
     assert found.taken[0].family == effect_named(missing).family
     assert found.numbers["k_v"] == pytest.approx(VALUES["k_v"], rel=0.02)

@@ -13,46 +13,20 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose import candidates_on
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.symbols import v
-from rigsight.identify import FitResult
 from rigsight.inverse import Proposal, along_motion, propose
 from rigsight.inverse.selection import Selection
 from rigsight.inverse.term import Term
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
-from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
+
+from .motor_rig import motor_rig
 
 DT = 2e-3
 T = DT * np.arange(4000)
 AXIS_VALUES = {"gain": 1.0, "m": 1.0, "d": 4.0, "k": 400.0, "x_off": 0.0, "force_off": 0.0}
 TRAIN = {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
 NOISE = 1e-3
-WHEEL = """
-name = "wheel"
-summary = "A motor turns a wheel."
-[inputs.u]
-unit = "N m"
-[parameters.J]
-unit = "kg m^2"
-lower = 1e-9
-[parameters.b]
-unit = "N m s/rad"
-lower = 0.0
-[coordinates.q]
-unit = "rad"
-[energy]
-kinetic = "J*d(q)^2/2"
-[joints.bearing]
-motion = "q"
-damping = "b"
-[drives.motor]
-signal = "u"
-force = "motor"
-along = "q"
-[sensors.angle]
-reads = "q"
-unit = "rad"
-"""
 
 
 def campaign(
@@ -204,12 +178,12 @@ def test_a_selection_with_further_terms_is_that_of_all_terms() -> None:
 
 
 def test_friction_of_a_wheel_that_turns_one_way_does_not_take_the_drive_for_its_load() -> None:
-    rig, effect = rig_of_text(WHEEL, "wheel.toml"), effect_named("asymmetric_stiffness")
-    values, rng = {"J": 5e-3, "b": 0.04, "k_2": 1.5e-5}, np.random.default_rng(0)
+    rig, effect = motor_rig("J*d(q)^2/2"), effect_named("asymmetric_stiffness")
+    values, rng = {"J": 5e-3, "d": 0.04, "k_v": 1.0, "k_2": 1.5e-5}, np.random.default_rng(0)
     drive = 0.6 + 0.15 * np.sin(2.0 * np.pi * (0.1 * T + 0.2 * T**2)) + 0.1 * np.sin(2.0 * np.pi * 0.37 * T)
     run = simulate(compose(rig, [effect]), values, Record("run", DT, {"u": drive}, {}, hold="foh"))
     record = run.with_signals(angle=run["angle"] + 1e-3 * rng.standard_normal(T.size))
-    found = proposed(Campaign("test", rig, {}, {"J": values["J"], "b": values["b"]}, (record,)))
+    found = proposed(Campaign("test", rig, {}, {n: values[n] for n in ("J", "d", "k_v")}, (record,)))
     assert found.taken[0].family == "spring_law"
     assert found.numbers["J"] == pytest.approx(values["J"], rel=0.05)
 
@@ -231,18 +205,6 @@ def test_a_delay_comes_with_its_length(effect: str, number: str, length: float) 
     (cause,) = proposed(own, [hidden]).taken
     assert cause.share > 0.8
     assert cause.values[number] == pytest.approx(length, rel=0.15)
-
-
-def test_beside_a_known_delay_friction_is_named() -> None:
-    delay, friction = effect_named("input_delay"), effect_named("coulomb_friction")
-    values = {**AXIS_VALUES, "T_d": 0.02, "T_c": 1.0}
-    own = replace(campaign(AXIS, values, [delay, friction], (10.0, 20.0)), modelled=(delay,))
-    found = propose(
-        own, {**own.constants, **own.given, "T_d": 0.02}, candidates_on(AXIS, CATALOGUE, (delay,))
-    )
-    assert found is not None
-    assert found.alone[0].family == "dry_friction"
-    assert found.alone[0].share > 0.8
 
 
 def test_a_tone_and_a_spring_law_are_named_together() -> None:
@@ -311,62 +273,6 @@ def test_a_few_samples_name_nothing(n: int) -> None:
         candidates_on(AXIS, CATALOGUE),
     )
     assert found is None or found.taken == ()
-
-
-@pytest.mark.parametrize(
-    ("modelled", "value", "is_asked"),
-    [
-        ("coulomb_friction", {"T_c": 3.0}, True),
-        ("input_delay", {"T_d": 0.01}, True),
-        ("input_dead_zone", {"u_0": 0.1}, False),
-    ],
-)
-def test_beside_a_force_at_a_joint_or_a_delay_the_motion_is_asked(
-    modelled: str, value: Mapping[str, float], is_asked: bool
-) -> None:
-    own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [effect_named("coulomb_friction")], (10.0, 20.0))
-    own = replace(own, modelled=(effect_named(modelled),))
-    found = propose(
-        own, {**own.constants, **own.given, **value}, candidates_on(AXIS, CATALOGUE, own.modelled)
-    )
-    assert (found is not None) is is_asked
-
-
-def test_a_modelled_friction_has_its_number_along_the_motion() -> None:
-    friction = effect_named("coulomb_friction")
-    own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [friction], (10.0, 20.0))
-    own = replace(own, modelled=(friction,))
-    found = propose(
-        own, {**own.constants, **own.given, "T_c": 0.5}, candidates_on(AXIS, CATALOGUE, own.modelled)
-    )
-    assert found is not None
-    assert found.taken == ()
-    assert found.numbers["T_c"] == pytest.approx(3.0, rel=0.02)
-
-
-def test_a_modelled_spring_law_does_not_take_the_stiffness_of_a_missing_loop() -> None:
-    spring, loop = effect_named("cubic_stiffness"), effect_named("iwan_hysteresis")
-    values = {**AXIS_VALUES, "k_3": 2e4, "a": 0.1, "x_s": 0.02, "q": -0.4}
-    own = campaign(AXIS, values, [spring, loop], (10.0, 20.0, 40.0))
-    own = replace(own, modelled=(spring,))
-    found = propose(
-        own, {**own.constants, **own.given, "k_3": 2e4}, candidates_on(AXIS, CATALOGUE, own.modelled)
-    )
-    assert found is not None
-    assert [taken.family for taken in found.taken][:1] == ["memory"]
-    assert "k_3" not in found.numbers
-
-
-def test_the_motion_is_asked_beside_a_loop_whose_exponent_is_written_into_its_equations() -> None:
-    loop, values = effect_named("bouc_wen_hysteresis"), {"A": 1.0, "a": 0.4, "beta": 30.0, "gamma": 5.0}
-    own = campaign(AXIS, {**AXIS_VALUES, **values, "n": 1.0}, [loop], (10.0, 20.0))
-    structure = compose(AXIS, [loop], {"n": 1.0})
-    fit = FitResult(structure, True, "", values, {}, (), 1.0, 1, 1, (), np.zeros((0, 0)), ())
-    own = replace(own, modelled=(loop,))
-    candidates = candidates_on(AXIS, CATALOGUE, own.modelled)
-    found = propose(own, {**own.constants, **own.given, **fit.all_values}, candidates)
-    assert found is not None
-    assert found.taken == ()
 
 
 def test_effects_of_somebody_else_are_judged_like_those_of_the_catalogue() -> None:
