@@ -305,6 +305,14 @@ def test_a_motion_that_no_sensor_shows_gives_no_proposal() -> None:
     assert propose(hidden, {**own.constants, **own.given}, candidates_on(rig, CATALOGUE)) is None
 
 
+def test_a_sensor_that_loses_the_sign_of_its_reading_is_not_asked() -> None:
+    # Small changes of a reading that shows the motion: one without its sign does not show it.
+    own = campaign(AXIS, {**AXIS_VALUES, "T_c": 3.0}, [effect_named("coulomb_friction")], (10.0, 20.0))
+    judged = proposed(own).judged
+    assert "rectified_sensor" not in judged
+    assert "encoder_eccentricity" in judged
+
+
 def test_a_held_input_is_no_delay() -> None:
     structure = compose(AXIS)
     drive = 10.0 * np.sin(2.0 * np.pi * (0.3 * T + 0.4 * T**2))

@@ -47,6 +47,9 @@ def of_sensor(
         return
     fitted = [p for p in effect.parameters if p.fitted]
     slopes = {p: derivative(effect.measured, sp.Symbol(p.name, real=True)) for p in fitted}
+    # A reading without its sign is no small change: it does not show the motion.
+    if any(slope.has(sp.Abs) for slope in slopes.values()):
+        return
     linear = [p for p in fitted if not slopes[p].has(sp.Symbol(p.name, real=True))]
     if any(slopes[p].has(sp.Symbol(other.name, real=True)) for p in linear for other in linear):
         return
