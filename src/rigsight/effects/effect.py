@@ -295,6 +295,11 @@ class Effect:
         )
 
     @property
+    def loses_sign(self) -> bool:
+        """True if a sensor with it shows magnitudes: its reading is not the motion, however small the effect is."""
+        return self.measured is not None and bool(self.measured.has(sp.Abs))
+
+    @property
     def reads_inertia(self) -> bool:
         """True if its equations hold the inertia that moves with its joint; that of a large arm is a long expression."""
         return self.reads(symbols.m)

@@ -43,13 +43,15 @@ def of_sensor(
     At points of the nonlinear parameters, or on their grid.
     """
     name = fit.rig.acts_at(effect)
-    if effect.measured is None or effect.states or any(name not in motion.record for motion in fit.motions):
+    if (
+        effect.measured is None
+        or effect.states
+        or effect.loses_sign
+        or any(name not in motion.record for motion in fit.motions)
+    ):
         return
     fitted = [p for p in effect.parameters if p.fitted]
     slopes = {p: derivative(effect.measured, sp.Symbol(p.name, real=True)) for p in fitted}
-    # A reading without its sign is no small change: it does not show the motion.
-    if any(slope.has(sp.Abs) for slope in slopes.values()):
-        return
     linear = [p for p in fitted if not slopes[p].has(sp.Symbol(p.name, real=True))]
     if any(slopes[p].has(sp.Symbol(other.name, real=True)) for p in linear for other in linear):
         return

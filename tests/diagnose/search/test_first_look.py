@@ -52,3 +52,20 @@ def test_a_lag_too_short_for_the_steps_of_another_model_takes_its_own() -> None:
     assert not np.isfinite(context.problem(structure, (record,)).fit(start.values, [], substeps=[1]).cost)
     (wide,) = widened(context, [look], substeps=[1])
     assert mean_square(wide.fits[0]) < 1.0
+
+
+def test_where_a_sensor_loses_the_sign_the_given_simulation_is_a_start() -> None:
+    rectified = effect_named("rectified_sensor")
+    t = DT * np.arange(2000)
+    run = Record("sweep", DT, {"u": linear_sweep(t, 2.0, 1.0, 40.0)}, {}, role="estimation", hold="zoh")
+    own = {name: value for name, value in GIVEN.items() if name != "k_3"}
+    record = simulate(compose(AXIS, [rectified]), {**own, "r": 1.0}, run)
+    scales = characteristic_scales(AXIS, [record], own)
+    refit = GreyBoxFit(compose(AXIS), [record], scales, {"x": NOISE}).fit(own, [])
+    bent = replace(refit, values={**refit.values, "m": 600.0, "d": 0.1})
+    context = FitContext(
+        AXIS, (record,), (record,), (record,), scales, {"x": NOISE}, frozenset(), given={**own, "m": 1.1}
+    )
+    look = look_at(context, (rectified,), bent, {})
+    assert mean_square(look.fits[0]) < 1.0
+    assert look.fits[0].values["r"] > 0.99

@@ -74,7 +74,8 @@ def look_at(
     moved = {*context.free_parameters(structure), *base.free} - {*hold, *known}
     free = tuple(name for name in structure.names if name in moved)
     starts = list(start_values(context, structure, effects[-1], base, parents))
-    if context.given and context.leaves_numbers_open(base):
+    # Readings without their sign lead a fit of the equations alone to the numbers of another motion.
+    if context.given and (context.leaves_numbers_open(base) or effects[-1].loses_sign):
         from_given = replace(base, values={**base.values, **context.given})
         starts += start_values(context, structure, effects[-1], from_given, {})
     beside = {name: value for name, value in numbers.items() if name in free}
