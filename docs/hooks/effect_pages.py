@@ -12,10 +12,11 @@ from rigsight.parameters import Parameter
 from rigsight.report.render import equations_of
 from rigsight.report.wording import effect_label, listed, sentence_case
 from rigsight.rigs import RIGS
-from rigsight.workflow.own.effect_checks import ELEMENT_BENCH, bench_of
+from rigsight.workflow.own.effect_benches import ELEMENT_BENCH, bench_of
 
 _PLACES = {
     Place.ACTUATOR: "actuator",
+    Place.CONTROLLER: "controller",
     Place.DYNAMICS: "dynamics",
     Place.DISTURBANCE: "disturbance",
     Place.LATERAL_DYNAMICS: "lateral dynamics",
@@ -176,6 +177,8 @@ def _caption(effect: Effect) -> str:
         how = "Running gear with the numbers of the thesis: lateral displacement over motor current."
     elif bench_of(effect) is ELEMENT_BENCH:
         how = "Element with d = 2 N s/m, k = 100 N/m: force over the frequency of the prescribed motion."
+    elif effect.place is Place.CONTROLLER:
+        how = "Position drive with m = 1 kg, d = 1 N s/m, k_p = 100 N/m and k_v = 3 N s/m: displacement over goal."
     else:
         how = "Axis with m = 1 kg, d = 2 N s/m, k = 100 N/m: it resonates at 10 rad/s."
     return (

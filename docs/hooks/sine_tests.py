@@ -17,7 +17,8 @@ from rigsight.errors import SimulationError
 from rigsight.records import Record
 from rigsight.rigs import ELEMENT, RUNNING_GEAR
 from rigsight.simulate import Structure, compose, simulate
-from rigsight.workflow.own.effect_checks import FULL, GEAR_BENCH, Bench, bench_of, start_values
+from rigsight.workflow.own.effect_benches import GEAR_BENCH, Bench, bench_of
+from rigsight.workflow.own.effect_checks import FULL, start_values
 
 LEVELS = (0.3, 1.0, 3.0)
 """Amplitudes of the drive, in units of the one for which an effect's start values are scaled."""
@@ -68,7 +69,9 @@ def panels(effect: Effect) -> tuple[Panel, Panel]:
     gain = _gain(effect, bench, values, levels[1:2] if steady else levels)
     if effect.place is Place.DISTURBANCE:
         return gain, _over_time(effect, bench, values, HARDLY_DRIVEN)
-    if effect.lateral is not None or (effect.drive is not None and not steady):
+    if effect.lateral is not None or (
+        (effect.drive is not None or effect.control is not None) and not steady
+    ):
         return gain, _over_time(effect, bench, values, levels[1])
     if ELEMENT.offers(effect):
         return gain, _loop(effect, values, levels)
@@ -131,7 +134,8 @@ def _first_harmonic(
 
 
 def _gain(effect: Effect, bench: Bench, values: Values, levels: tuple[float, ...]) -> Panel:
-    unit = {"x": "m/N", "y": "m/A", "force": "N/m"}[bench.output]
+    across = {"u": "N", "goal": "m"}.get(bench.rig.inputs[0].name, "")
+    unit = {"x": f"m/{across}", "y": "m/A", "force": "N/m"}[bench.output]
     linear = np.abs(_response(compose(bench.rig), bench, values, FULL))
     structure = compose(bench.rig, [effect])
     lines = [Line(FREQUENCIES, linear, "linear rig", None)]

@@ -40,6 +40,7 @@ RIG_VALUES: Mapping[str, Mapping[str, float]] = {
         "k_t": 0.05, "J_m": 1e-3, "J_l": 3e-3, "k_s": 2.0, "d_s": 2e-3, "d_m": 4e-3, "d_l": 4e-3, "k_l": 1.0,
     },
     "servo": {"m": 1.0, "l": 0.15, "k_p": 2.0, "J": 0.02, "k_v": 3.0, "d": 0.2, "angle_off": 0.05},
+    "position_drive": {"m": 1.0, "d": 0.5, "k_p": 100.0, "k_v": 3.0},
     "two_link_arm": {
         "l_1": 0.3, "g": 9.81, "I_1": 0.05, "I_2": 0.02, "m_2": 0.6, "s_1": 0.12, "s_2": 0.08, "d_1": 0.05, "d_2": 0.02,
     },
@@ -140,11 +141,20 @@ class _Plan:
     amplitude: float = 1.0
 
 
+@cache
+def rig_named(name: str) -> Rig:
+    """A rig that is built in, or from a file."""
+    return RIGS[name] if name in RIGS else read_rig_file(FROM_FILES / f"{name}.toml")
+
+
 def _alone(effect: Effect) -> _Plan:
     """An effect on the first rig that offers it."""
-    if RIGS["running_gear"].offers(effect):
-        return _Plan("running_gear", (effect.name,))
-    return _Plan("element", (effect.name,), amplitude=0.01)
+    name = next(
+        name
+        for name in ("running_gear", "element", "servo", "position_drive")
+        if rig_named(name).offers(effect)
+    )
+    return _Plan(name, (effect.name,), amplitude=0.01 if name == "element" else 1.0)
 
 
 PLANS: dict[str, _Plan] = {effect.name: _alone(effect) for effect in CATALOGUE} | {
@@ -210,12 +220,6 @@ def fed(structure: Structure, record: Record) -> tuple[NDArray[np.float64], ...]
         value, rate = at_samples[3 * i : 3 * i + 2]
         columns += [value, rate]
     return tuple(columns)
-
-
-@cache
-def rig_named(name: str) -> Rig:
-    """A rig that is built in, or from a file."""
-    return RIGS[name] if name in RIGS else read_rig_file(FROM_FILES / f"{name}.toml")
 
 
 def sweep(rig: Rig, plan: _Plan) -> Record:

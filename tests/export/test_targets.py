@@ -45,7 +45,7 @@ def needed(model: Model) -> set[str]:
     feeling = any(e.reads(symbols.acceleration) or e.shifts_the_record for e in effects)
     found = {
         STICKING: bool(freeze(structure).frictions),
-        DELAY: any(e.delay is not None for e in effects),
+        DELAY: any(e.delay is not None or e.command_delay is not None for e in effects),
         SENSOR_DELAY: any(e.reading_delay is not None for e in effects),
         FELT_ACCELERATION: feeling and bool(structure.rig.mechanism.prescribed),
     }

@@ -16,6 +16,7 @@ class Place(StrEnum):
     """Where in the signal path an effect acts."""
 
     ACTUATOR = "actuator"
+    CONTROLLER = "controller"
     DYNAMICS = "dynamics"
     DISTURBANCE = "disturbance"
     LATERAL_DYNAMICS = "lateral_dynamics"
@@ -37,6 +38,7 @@ _MOTION = ("x", "v", "t", "k", "m", "position", "acceleration")
 _LOADED = (*_MOTION, "load")
 _SPRING = (*_MOTION, "spring_torque", "deflection", "deflection_rate")
 _DRIVE = ("u", "v", "t")
+_CONTROL = ("output", "error", "command", "t")
 _CONTACT = ("creepage", "creep_gain", "lateral_displacement", "lateral_feedback")
 _READING = ("reading", "t")
 
@@ -46,6 +48,8 @@ PARTS = {
     "deflection": Part((Place.DYNAMICS,), "deflection of the spring = {}", ("x",), ("x", "v")),
     "drive": Part((Place.ACTUATOR,), "drive = {}", _DRIVE, _DRIVE),
     "delay": Part((Place.ACTUATOR,), "drive = u(t - {})"),
+    "control": Part((Place.CONTROLLER,), "controller output = {}", _CONTROL, _CONTROL),
+    "command_delay": Part((Place.CONTROLLER,), "command = command(t - {})"),
     "lateral": Part((Place.LATERAL_DYNAMICS,), "lateral rate = {}", _CONTACT),
     "measured": Part((Place.SENSOR,), "measured = {}", _READING, _READING),
     "reading_delay": Part((Place.SENSOR,), "measured = reading(t - {})"),
@@ -201,6 +205,10 @@ class Effect:
         Output of the actuator in terms of ``u`` and states.
     delay
         Time by which the input arrives late [s].
+    control
+        Output of a controller in terms of ``output``, ``error``, ``command`` and states.
+    command_delay
+        Time by which the command reaches the controller late [s].
     lateral
         Rate of the lateral displacement, of ``creepage``, ``creep_gain``, ``lateral_displacement`` and ``lateral_feedback``.
     measured
@@ -244,6 +252,8 @@ class Effect:
     deflection: sp.Expr | None = None
     drive: sp.Expr | None = None
     delay: sp.Expr | None = None
+    control: sp.Expr | None = None
+    command_delay: sp.Expr | None = None
     lateral: sp.Expr | None = None
     measured: sp.Expr | None = None
     reading_delay: sp.Expr | None = None

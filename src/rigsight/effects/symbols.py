@@ -22,6 +22,12 @@ load = sp.Symbol("load", real=True)
 """What a joint carries: the force of the drives along it less what its spring, weight and neighbors push along it."""
 u = sp.Symbol("u", real=True)
 """Input as it arrives at the effect (after the actuator effects in front of it)."""
+output = sp.Symbol("output", real=True)
+"""Output of a controller before the effect, in units of the signal of its drive; limits of this signal come later."""
+error = sp.Symbol("error", real=True)
+"""Output of a controller at standstill: proportional to goal less reading."""
+command = sp.Symbol("command", real=True)
+"""Part of the output of a controller that follows from the recorded input."""
 t = sp.Symbol("t", real=True)
 """Time since the start of the record [s]."""
 m = sp.Symbol("m", positive=True)

@@ -202,7 +202,7 @@ def unsaid(content: Exported) -> dict[str, str]:
         feeling = [e.name for e in structure.effects if e.reads(symbols.acceleration) or e.shifts_the_record]
         found[FELT_ACCELERATION] = (feeling or [structure.rig.name])[0]
     for effect in structure.effects:
-        if effect.delay is not None:
+        if effect.delay is not None or effect.command_delay is not None:
             found[DELAY] = effect.name
         if effect.reading_delay is not None:
             found[SENSOR_DELAY] = effect.name

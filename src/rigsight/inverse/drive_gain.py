@@ -40,9 +40,10 @@ def _gains(rig: Rig) -> dict[str, Drive]:
     for parameter in rig.parameters:
         gain = sp.Symbol(parameter.name, real=True)
         drives = [d for d in rig.mechanism.drives if gain in d.force.free_symbols | d.signal.free_symbols]
-        if len(drives) != 1 or gain in drives[0].signal.free_symbols:
+        if len(drives) != 1:
             continue
-        if sp.expand(drives[0].force - gain * derivative(drives[0].force, gain)) == 0:
+        force = drives[0].force.xreplace({sp.Symbol(drives[0].name, real=True): drives[0].signal})
+        if sp.expand(force - gain * derivative(force, gain)) == 0:
             found[parameter.name] = drives[0]
     return found
 

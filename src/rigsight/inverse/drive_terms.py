@@ -95,7 +95,7 @@ def _driving(
 ) -> tuple[Drive, list[float], Callable[..., Floats]] | None:
     """Return the drive of an effect, its force per input in each record, and what the effect lets through of an input."""
     drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
-    per_input = [_force_per_input(drive, {**values, **motion.record.constants}) for motion in fit.motions]
+    per_input = [force_per_input(drive, {**values, **motion.record.constants}) for motion in fit.motions]
     reaching = _reaching(effect)
     if reaching is None or not fit.motions[0].equations.n_coordinates or not all(per_input):
         return None
@@ -119,13 +119,14 @@ def lost(
     values: Mapping[str, float],
 ) -> Floats:
     """Return the force that a drive effect takes from what the motion requires, shape (n_equations, n_samples)."""
-    gain, reaching = _force_per_input(drive, {**values, **motion.record.constants}), _reaching(effect)
+    gain, reaching = force_per_input(drive, {**values, **motion.record.constants}), _reaching(effect)
     assert reaching is not None
     along, force = _required(drive, fit, motion, values)
     return np.asarray(along * (force - gain * reaching(force / gain, *own.values())))
 
 
-def _force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
+def force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
+    """Return the force of a drive for a unit of its signal; zero where it depends on the motion."""
     gain = derivative(drive.force, sp.Symbol(drive.name, real=True))
     known = {symbol.name for symbol in gain.free_symbols} <= numbers.keys()
     return float(evaluated(gain, numbers)) if known else 0.0

@@ -19,6 +19,7 @@ from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
+from rigsight.inverse.controller_terms import lost_by_controller, of_controller
 from rigsight.inverse.drive_terms import late_drive, lost, of_given, of_required
 from rigsight.inverse.equation_fit import EquationFit, generalized
 from rigsight.inverse.joint_force import JointMotion, joint_motion
@@ -93,6 +94,8 @@ class EffectTerms:
             if points is None:
                 yield from of_required(effect, self.fit, self.values, self.scales)
             yield from of_given(effect, self.fit, self.values, self.scales, points)
+        elif effect.place is Place.CONTROLLER:
+            yield from of_controller(effect, self.fit, self.values, self.scales, points)
         elif is_joint_force(effect) and not _is_resonance(effect):
             moved = self._motion_of(effect)
             yield from _of_joint(effect, self.fit, self.values, self.scales, moved, points)
@@ -125,6 +128,8 @@ class EffectTerms:
         elif effect.place is Place.ACTUATOR:
             drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
             rows = [lost(drive, effect, own, fit, m, values) for m in motions]
+        elif effect.place is Place.CONTROLLER:
+            rows = [lost_by_controller(effect, own, fit, m, values) for m in motions]
         else:
             along = zip(motions, self._motion_of(effect), strict=True)
             rows = [generalized(m, effect, own, values, moved) for m, moved in along]

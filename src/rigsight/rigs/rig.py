@@ -13,6 +13,7 @@ from rigsight.effects import symbols
 from rigsight.effects.effect import Effect, Place
 from rigsight.effects.symbols import derivative
 from rigsight.parameters import Parameter
+from rigsight.rigs.controller import Controller, controller_of
 from rigsight.rigs.evaluation import evaluated
 from rigsight.rigs.mechanism import Mechanism
 from rigsight.rigs.one_motion import Follower, Motion, follower_of
@@ -315,11 +316,19 @@ class Rig:
         found: Sequence[Drive | Joint | Sensor | RateState] = mechanism.joints
         if kind is Place.ACTUATOR:
             found = mechanism.drives
+        elif kind is Place.CONTROLLER:
+            found = [drive for drive in mechanism.drives if drive.name in self.controllers]
         elif kind is Place.SENSOR:
             found = mechanism.sensors
         elif kind is Place.LATERAL_DYNAMICS:
             found = mechanism.states
         return tuple(place.name for place in found)
+
+    @cached_property
+    def controllers(self) -> dict[str, Controller]:
+        """Control laws by the name of their drive."""
+        found = {drive.name: controller_of(self.mechanism, drive) for drive in self.mechanism.drives}
+        return {name: controller for name, controller in found.items() if controller is not None}
 
     def where(self, effect: Effect) -> str:
         """Return how results call the place of an effect.
@@ -375,6 +384,8 @@ class Rig:
         if effect.place is Place.SENSOR and effect.wave_number is not None:
             sensor = next(own for own in self.mechanism.sensors if own.name == self.acts_at(effect))
             return not any(c.rate in sensor.reads.free_symbols for c in self.mechanism.coordinates)
+        if effect.place is Place.CONTROLLER:
+            return self._controls(effect)
         if effect.at is None or effect.place not in (Place.DYNAMICS, Place.DISTURBANCE):
             return True
         mechanism = self.mechanism
@@ -384,6 +395,26 @@ class Rig:
         if joint.stiffness == 0 and (effect.spring is not None or effect.deflection is not None):
             return False
         return not effect.needs_inertia or joint.inertia is not None or mechanism.moves_inertia(joint.motion)
+
+    def _controls(self, effect: Effect) -> bool:
+        """Return False for an effect that would do at this controller what another one does already."""
+        controller = self.controllers[self.acts_at(effect)]
+        if effect.command_delay is not None or _smooths_command(effect):
+            return not controller.in_force  # There it is a delay or a lag of the drive.
+        reads_command = effect.reads(symbols.command)
+        if not effect.states and not reads_command and controller.error == controller.output:
+            return controller.in_force  # Else it is a dead zone or a saturation of the drive.
+        if reads_command or effect.reads(symbols.error):
+            return True
+        # Of the output alone: an integral of it beside that of the error, and a saturation beside that of the drive.
+        return controller.error != controller.output if effect.states else controller.in_force
+
+
+def _smooths_command(effect: Effect) -> bool:
+    """Return True for a controller's effect that puts a linear filter before its command."""
+    rates = [state.rate for state in effect.states]
+    is_replaced = effect.control is not None and derivative(effect.control, symbols.command) == -1
+    return is_replaced and not any(derivative(rate, symbols.command).has(symbols.command) for rate in rates)
 
 
 def joint_of(rig: Rig, effect: Effect) -> Joint:

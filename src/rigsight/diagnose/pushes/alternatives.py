@@ -37,9 +37,10 @@ _TIMES = 4
 def law_columns(responses: Responses, effect: Effect) -> Floats:
     """Return the responses to any other law of the signals that an effect reads, at its place; shape (n, n_columns)."""
     place = responses.context.rig.acts_at(effect)
-    if effect.place in (Place.SENSOR, Place.ACTUATOR):
+    if effect.place in (Place.SENSOR, Place.ACTUATOR, Place.CONTROLLER):
         # A static nonlinearity is not another form of a delay or lag, nor vice versa.
-        is_late = bool(effect.states) or effect.delay is not None or effect.reading_delay is not None
+        delays = (effect.delay, effect.reading_delay, effect.command_delay)
+        is_late = bool(effect.states) or any(delay is not None for delay in delays)
         if effect.place is Place.SENSOR:
             return (_changes_of if is_late else _readings_of)(responses, place)
         return (_signal_changes_of if is_late else _signals_of)(responses, place)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -94,7 +95,8 @@ def with_probes(rig: Rig) -> Rig:
 
     Each push is an input (see `push`), and all of them are in units of the parameter `PUSH_SIZE`. Behind the rig's own outputs
     stand the motion of each joint and what others load it with (see `motion_columns`, `load_columns`), the signal of each drive
-    and the way along which it pushes (see `signal_columns`, `way_columns`).
+    and the way along which it pushes (see `signal_columns`, `way_columns`), and output, error and command of each controller (see
+    `controller_columns`).
     """
     mechanism, size = rig.mechanism, _real(PUSH_SIZE)
     pushed = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
@@ -114,6 +116,9 @@ def with_probes(rig: Rig) -> Rig:
     shown += [Sensor(f"{_LOAD}{joint.name}", mechanism.carried_by(joint), "") for joint in mechanism.joints]
     shown += [Sensor(f"{_SENT}{drive.name}", _real(drive.name), "") for drive in mechanism.drives]
     shown += [Sensor(f"{_ALONG}{drive.name}", drive.along, "") for drive in mechanism.drives]
+    for name, law in rig.controllers.items():
+        parts = {"output": law.output, "error": law.error, "command": law.command}
+        shown += [Sensor(f"{part} of {name}", expression, "") for part, expression in parts.items()]
     order = (*mechanism.order, *(sensor.name for sensor in shown))
     return replace(
         rig,
@@ -156,6 +161,16 @@ def way_columns(rig: Rig) -> dict[str, int]:
     mechanism = rig.mechanism
     first = len(mechanism.sensors) + 2 * len(mechanism.joints) + len(mechanism.drives)
     return _columns(first, mechanism.drives)
+
+
+def controller_columns(rig: Rig) -> dict[str, tuple[int, int, int]]:
+    """Return the numbers of the outputs that show output, error and command of each controller, by the name of its drive."""
+    mechanism = rig.mechanism
+    first = len(mechanism.sensors) + 2 * len(mechanism.joints) + 2 * len(mechanism.drives)
+    return {
+        name: (at, at + 1, at + 2)
+        for name, at in zip(rig.controllers, itertools.count(first, 3), strict=False)
+    }
 
 
 def _columns(first: int, places: Sequence[Joint | Drive]) -> dict[str, int]:

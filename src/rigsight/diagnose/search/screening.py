@@ -26,6 +26,7 @@ from rigsight.diagnose.pushes.probes import (
     PUSH_SIZE,
     STIFFNESS,
     alone,
+    controller_columns,
     load_columns,
     motion_columns,
     push,
@@ -37,6 +38,7 @@ from rigsight.diagnose.search.starts import sized, start_values
 from rigsight.effects import Effect, Place, kind_of, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
+from rigsight.inverse.controller_output import ControllerSignals, changed_output
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
@@ -223,6 +225,8 @@ class Shortlist:
         if _is_late(effect):
             (delay,) = effect.parameters
             return [({delay.name: time}, self._late(place, time)) for time in self._times(effect)]
+        if effect.place is Place.CONTROLLER:
+            return [(own, self._controlled(effect, own)) for own in self._starts(effect)]
         structure, column = alone(effect)
         of_joint = STIFFNESS in structure.names
         starts = self._starts(effect)
@@ -252,6 +256,17 @@ class Shortlist:
             for own, signals in zip(starts, found, strict=True)
             if all(np.all(np.isfinite(added)) for added in signals)
         ]
+
+    def _controlled(self, effect: Effect, own: Mapping[str, float]) -> list[Floats]:
+        """Return what an effect adds to the output of its controller along each record."""
+        rig = self._context.rig
+        columns = list(controller_columns(rig)[rig.acts_at(effect)])
+        numbers = {p.name: own[p.name] for p in effect.parameters}
+        found = []
+        for record, out in zip(self._responses.records, self._responses.calm_outputs, strict=True):
+            signals = ControllerSignals(*out[:, columns].T)
+            found.append(changed_output(effect, numbers, signals, record.dt) - signals.output)
+        return found
 
     def _beside(self, place: str, effect: Effect, index: int) -> list[Floats]:
         """Return what else an effect sees: the load of its joint, the way along which its drive pushes."""
@@ -338,6 +353,7 @@ def structures_of_shortlist(
         if effect.pulsation is None
         and effect.wave_number is None
         and effect.lateral is None
+        and effect.place is not Place.CONTROLLER
         and not _is_late(effect)
     }
     return [compose(with_probes(rig), modelled), *by_themselves.values()]

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rigsight.effects import Place
+from rigsight.effects import Place, State
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.typical_size import size_of_signal
 from rigsight.records.record import Floats, Record
@@ -29,6 +30,8 @@ _SURELY = 3.0
 """Curvature of a path in standard deviations from which it is bent."""
 _MOST_EVALUATIONS = 100
 _HUGE = 1e6
+_OF_SIGNALS = (Place.ACTUATOR, Place.CONTROLLER, Place.SENSOR)
+_CONTROL = ("error", "command")
 
 
 def first_state(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
@@ -261,7 +264,7 @@ def _with_effects(
         (i, effect)
         for effect in structure.effects
         for i, name in enumerate(structure.state_names)
-        if name.startswith(f"{effect.name}.") and effect.place in (Place.ACTUATOR, Place.SENSOR)
+        if name.startswith(f"{effect.name}.") and effect.place in _OF_SIGNALS
     ]
     if not lagging:
         return state
@@ -276,7 +279,18 @@ def _with_effects(
             state[i] = float(signals[f"signal@{place}"][0])
         elif effect.place is Place.SENSOR and bases == {"x"}:
             state[i] = float(readings[place])
+        elif effect.place is Place.CONTROLLER:
+            followed = next(
+                one for one in effect.states if structure.state_names[i] == f"{effect.name}.{one.symbol.name}"
+            )
+            state[i] = _followed(followed, {part: float(signals[f"{part}@{place}"][0]) for part in _CONTROL})
     return state
+
+
+def _followed(state: State, signals: Mapping[str, float]) -> float:
+    """Return where the state of a controller's effect stays: at what it filters; zero for an integral."""
+    read = [name for name in signals if sp.Symbol(name, real=True) in state.rate.free_symbols]
+    return signals[read[0]] if state.symbol in state.rate.free_symbols and len(read) == 1 else 0.0
 
 
 def _resting_samples(record: Record, inputs: Sequence[str]) -> int:

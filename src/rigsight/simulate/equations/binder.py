@@ -104,11 +104,11 @@ class DefinedSignals:
         return symbol
 
     def define(
-        self, kind: Kind, effect: Effect, expression: sp.Expr, rate_of: sp.Symbol | None = None
+        self, kind: Kind, effect: Effect, expression: sp.Expr, rate_of: sp.Symbol | None = None, of: str = ""
     ) -> sp.Symbol:
-        """Return a symbol for an expression that an effect changes."""
+        """Return a symbol for an expression that an effect changes; ``of`` tells several of one kind apart."""
         # Names of effects and parameters contain no colon, so there is no conflict.
-        symbol = sp.Symbol(f"{effect.name}:{kind.value}", real=True)
+        symbol = sp.Symbol(f"{effect.name}{of}:{kind.value}", real=True)
         self.definitions.append(Definition(symbol, expression, kind, effect.name, rate_of))
         return symbol
 

@@ -1,14 +1,13 @@
 """Checks by simulation that an effect vanishes at null, stays finite, generates no energy and is recovered by a fit.
 
-Effects are simulated on one mass with a spring, lateral effects on the running gear, effects of a prescribed motion on an
-element. Each function returns a sentence that describes the error, or None.
+Effects are simulated on the rigs of `rigsight.workflow.own.effect_benches`. Each function returns a sentence that describes the
+error, or None.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,14 +17,13 @@ from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
 from rigsight.records.record import Floats
-from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, Signal, joint_of
+from rigsight.rigs import Rig, Signal, joint_of
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
+from rigsight.workflow.own.effect_benches import AXIS_BENCH, RESONANCE, Bench, bench_of
 
 PER_PERIOD = 200
 """Samples per period of a sine test."""
-RESONANCE = 10.0
-"""Angular frequency of the axis of the sine tests [rad/s]."""
 FULL, SMALL = 1.0, 0.3
 """Amplitudes of sine tests."""
 _NEAR_NULL = 1e-6
@@ -43,43 +41,6 @@ _NOISE_ALONE = 0.05
 _SIGMAS = 4.5
 _SEEN = 0.3
 """Largest relative standard error of a parameter that counts as determined."""
-
-
-@dataclass(frozen=True)
-class Bench:
-    """A rig with parameter values on which an effect is checked."""
-
-    # The rig and its numbers.
-    rig: Rig
-    values: dict[str, float]
-    output: str  # the output that the effect acts on
-    # The parameter values of the rig in the sweeps from which the effect must be recovered.
-    swept: dict[str, float]
-    free: tuple[str, ...]  # parameters of the rig that are fitted together with those of the effect
-
-
-AXIS_BENCH = Bench(
-    AXIS,
-    {"gain": 1.0, "m": 1.0, "d": 2.0, "k": RESONANCE**2, "x_off": 0.0, "force_off": 0.0},
-    "x",
-    {"gain": 2.0, "m": 1.5, "d": 4.0, "k": 300.0, "x_off": 1e-4, "force_off": 0.0},
-    ("m", "d", "k", "x_off"),
-)
-_GEAR_VALUES = {
-    "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98,
-    "psi_off": 1e-4, "y_off": 1e-4,
-}  # fmt: skip
-GEAR_BENCH = Bench(
-    RUNNING_GEAR, _GEAR_VALUES, "y", _GEAR_VALUES, ("J_z", "k_c", "k_d", "l_0", "c_y", "psi_off", "y_off")
-)
-_ELEMENT_VALUES = {"d": 2.0, "k": RESONANCE**2, "force_off": 0.0}
-ELEMENT_BENCH = Bench(ELEMENT, _ELEMENT_VALUES, "force", _ELEMENT_VALUES, ("d", "k", "force_off"))
-
-
-def bench_of(effect: Effect) -> Bench:
-    """Return the bench on which an effect is tried: the first that offers it."""
-    benches = (AXIS_BENCH, GEAR_BENCH, ELEMENT_BENCH)
-    return next((bench for bench in benches if bench.rig.offers(effect)), GEAR_BENCH)
 
 
 def sine_record(

@@ -85,8 +85,17 @@ def is_linear(effect: Effect) -> bool:
         canonical.deflection,
         canonical.deflection_rate,
     ]
+    signals += [canonical.output, canonical.error, canonical.command]
     signals += [state.symbol for state in effect.states]
-    laws = [effect.torque, effect.spring, effect.deflection, effect.drive, effect.lateral, effect.measured]
+    laws = [
+        effect.torque,
+        effect.spring,
+        effect.deflection,
+        effect.drive,
+        effect.lateral,
+        effect.measured,
+        effect.control,
+    ]
     laws += [state.rate for state in effect.states]
     return all(_is_linear_in(law, signals) for law in laws if law is not None) and all(
         state.limit is None for state in effect.states

@@ -1,0 +1,37 @@
+"""Delay of the command (of a bus, or of the controller's cycle).
+
+Equation
+--------
+The law reads ``command(t - T_m)``; its readings are in time.
+
+T_m: delay [s]; the effect vanishes at 0.
+
+Applies to goals that come over a bus. A delay of the drive delays the readings as well and takes damping from the loop. Where
+the law is the force of a position drive, a delay of the drive is the same, and this effect is not offered.
+
+Signature: phase that falls in proportion to frequency, at every amplitude, without a change of the damping of the loop.
+
+References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.parameters import Parameter
+
+T_m = sp.Symbol("T_m", real=True)
+
+COMMAND_DELAY = Effect(
+    name="command_delay",
+    place=Place.CONTROLLER,
+    family=Family.DELAY_OR_LAG,
+    summary="The controller receives its command late.",
+    parameters=(
+        Parameter(
+            "T_m", "delay", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    command_delay=T_m,
+)

@@ -1,0 +1,47 @@
+"""Filter of the command.
+
+Equation
+--------
+``T_c c_c' + c_c = command``, the law reads c_c in place of the command.
+
+T_c: time constant [s]; the effect vanishes at 0.
+
+Applies to controllers that smooth their goal. Where the law is the force of a position drive, a lag of the drive is the same,
+and this effect is not offered.
+
+Signature: lag behind the goal at every amplitude, without a change of the damping of the loop.
+
+References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), chapter 3.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.symbols import command, output
+from rigsight.parameters import Parameter
+
+T_c, c_c = sp.symbols("T_c c_c", real=True)
+
+COMMAND_FILTER = Effect(
+    name="command_filter",
+    place=Place.CONTROLLER,
+    family=Family.CONTROLLER,
+    summary="The controller follows a smoothed command.",
+    parameters=(
+        Parameter(
+            "T_c",
+            "time constant",
+            "time",
+            lower=0.0,
+            upper=1e6,
+            null=0.0,
+            starts=(0.05, 0.3),
+            search=(1e-3, 10.0),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    control=output - command + c_c,
+    states=(State(c_c, (command - c_c) / T_c, "input"),),
+)

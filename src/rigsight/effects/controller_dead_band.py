@@ -1,0 +1,44 @@
+"""Dead band of a controller.
+
+Equation
+--------
+The error counts only beyond +-e_0: ``error - e_0`` above, ``error + e_0`` below, zero between.
+
+e_0: half-width of the dead band, in units of the signal of the drive; the effect vanishes at 0.
+
+Applies to hobby servos, which rest within a dead band so that they do not hum.
+
+Signature: the reading stops short of the goal by up to the band, on the side from which it comes.
+
+References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), chapter 3.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.symbols import beyond, error, output
+from rigsight.parameters import Parameter
+
+e_0 = sp.Symbol("e_0", real=True)
+
+CONTROLLER_DEAD_BAND = Effect(
+    name="controller_dead_band",
+    place=Place.CONTROLLER,
+    family=Family.CONTROLLER,
+    summary="The controller ignores small errors.",
+    parameters=(
+        Parameter(
+            "e_0",
+            "half-width of the dead band",
+            "input",
+            lower=0.0,
+            upper=1e300,
+            null=0.0,
+            starts=(0.02, 0.1),
+            search=(0.0, 1.0),
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.FALLS),
+    control=output - error + beyond(error, e_0),
+)

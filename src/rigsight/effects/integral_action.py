@@ -1,0 +1,46 @@
+"""Integral action of a controller.
+
+Equation
+--------
+``z' = r_i error``, the controller puts out its law plus z.
+
+r_i: reciprocal of the integral time [1/s]; the effect vanishes at 0.
+
+Applies to servos that hold a load without a lasting error: PI and PID position controllers. It shows where weight or friction
+would keep the joint off its goal.
+
+Signature: the error at standstill creeps to zero; phase of the closed loop falls below its bandwidth.
+
+References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), chapter 3.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.symbols import error, output
+from rigsight.parameters import Parameter
+
+r_i, z = sp.symbols("r_i z", real=True)
+
+INTEGRAL_ACTION = Effect(
+    name="integral_action",
+    place=Place.CONTROLLER,
+    family=Family.CONTROLLER,
+    summary="The controller integrates its error.",
+    parameters=(
+        Parameter(
+            "r_i",
+            "reciprocal of the integral time",
+            "time^-1",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.1, 1.0),
+            search=(0.0, 20.0),
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    control=output + z,
+    states=(State(z, r_i * error, "input"),),
+)

@@ -1,0 +1,73 @@
+"""Integral and derivative action of a controller together.
+
+Equation
+--------
+``z' = r_i error``, ``e_f' = (error - e_f) / T_f``, the controller puts out its law plus ``z + T_v (error - e_f) / T_f``.
+
+r_i: reciprocal of the integral time [1/s]; the effect vanishes at 0, together with T_v.
+T_v: derivative time [s].
+T_f: time constant of the filter of the rate [s]; it acts like mass.
+
+Applies to PID controllers of which only the proportional gain is known. Beside free damping, feed-forward of the velocity with
+integral action is the same.
+
+Signature: no lasting error at standstill, and less lag behind fast goals.
+
+References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), chapter 3.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
+from rigsight.effects.symbols import error, output, time_size
+from rigsight.parameters import Parameter
+
+r_i, T_v, T_f, z, e_f = sp.symbols("r_i T_v T_f z e_f", real=True)
+
+PID_ACTION = Effect(
+    name="pid_action",
+    place=Place.CONTROLLER,
+    family=Family.CONTROLLER,
+    summary="The controller integrates its error and reacts to the rate of it.",
+    parameters=(
+        Parameter(
+            "r_i",
+            "reciprocal of the integral time",
+            "time^-1",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.1, 1.0),
+            search=(0.0, 20.0),
+        ),
+        Parameter(
+            "T_v",
+            "derivative time",
+            "time",
+            lower=0.0,
+            upper=1e6,
+            null=0.0,
+            starts=(0.05, 0.3),
+            search=(0.0, 3.0),
+        ),
+        Parameter(
+            "T_f",
+            "filter of the rate",
+            "time",
+            lower=1e-9,
+            upper=1e6,
+            starts=(0.02,),
+            search=(1e-3, 0.3),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    control=output + z + T_v * (error - e_f) / T_f,
+    states=(State(z, r_i * error, "input"), State(e_f, (error - e_f) / T_f, "input")),
+    starts=(
+        Start({"r_i": 0.1 / time_size, "T_v": 0.05 * time_size, "T_f": 0.02 * time_size}),
+        Start({"r_i": r_i, "T_v": 0.05 * time_size, "T_f": 0.02 * time_size}, parent="integral_action"),
+        Start({"r_i": 0.1 / time_size, "T_v": T_v, "T_f": T_f}, parent="derivative_action"),
+    ),
+)

@@ -1,0 +1,47 @@
+"""Integral action of the speed loop in a cascaded controller.
+
+Equation
+--------
+``z' = r_v output``, the controller puts out its law plus z. The law is proportional to the error of the speed, which the
+position loop commands: ``output = k_p error - k_v v``.
+
+r_v: reciprocal of the integral time of the speed loop [1/s]; the effect vanishes at 0.
+
+Applies to drives with a position loop around a PI speed loop, as industrial servos have. Without damping in the law it is the
+same as integral action, and is not offered.
+
+Signature: stiff against slow loads; a resonance at the bandwidth of the speed loop.
+
+References: H. Gross, J. Hamann and G. Wiegartner, *Electrical Feed Drives in Automation* (Publicis 2001), chapter 5.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.symbols import output
+from rigsight.parameters import Parameter
+
+r_v, z = sp.symbols("r_v z", real=True)
+
+SPEED_LOOP_INTEGRAL = Effect(
+    name="speed_loop_integral",
+    place=Place.CONTROLLER,
+    family=Family.CONTROLLER,
+    summary="A speed loop inside the position loop integrates.",
+    parameters=(
+        Parameter(
+            "r_v",
+            "reciprocal of the integral time",
+            "time^-1",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.3, 3.0),
+            search=(0.0, 50.0),
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    control=output + z,
+    states=(State(z, r_v * output, "input"),),
+)

@@ -1,0 +1,56 @@
+"""Feed-forward of the commanded velocity.
+
+Equation
+--------
+``c_f' = (command - c_f) / T_f``, the controller puts out its law plus ``T_w (command - c_f) / T_f``.
+
+T_w: gain of the commanded velocity over that of the position [s]; the effect vanishes at 0.
+T_f: time constant of the filter of the rate [s]; it acts like mass.
+
+Applies to drives that follow ramps without lag. Derivative action on the whole error differs by damping alone.
+
+Signature: the reading leads where damping would make it lag; nothing changes without a goal that moves.
+
+References: G. Ellis, *Control System Design Guide* (Elsevier 2012), chapter 8.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.symbols import command, output
+from rigsight.parameters import Parameter
+
+T_w, T_f, c_f = sp.symbols("T_w T_f c_f", real=True)
+
+VELOCITY_FEEDFORWARD = Effect(
+    name="velocity_feedforward",
+    place=Place.CONTROLLER,
+    family=Family.CONTROLLER,
+    summary="The controller adds the commanded velocity.",
+    parameters=(
+        Parameter(
+            "T_w",
+            "gain of the velocity over that of the position",
+            "time",
+            lower=0.0,
+            upper=1e6,
+            null=0.0,
+            starts=(0.05, 0.3),
+            search=(0.0, 3.0),
+        ),
+        Parameter(
+            "T_f",
+            "filter of the rate",
+            "time",
+            lower=1e-9,
+            upper=1e6,
+            starts=(0.02,),
+            search=(1e-3, 0.3),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    control=output + T_w * (command - c_f) / T_f,
+    states=(State(c_f, (command - c_f) / T_f, "input"),),
+)
