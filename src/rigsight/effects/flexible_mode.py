@@ -4,9 +4,11 @@ Equation
 --------
 ``torque = m_a (w_a^2 (x - q) + 2 zeta_a w_a (x' - q'))``,  ``q'' = w_a^2 (x - q) + 2 zeta_a w_a (x' - q')``
 
-======  ================================================== m_a     inertia of the second mass; the effect vanishes at 0 w_a
-its angular frequency where the main mass is held zeta_a  its damping ratio there ======
-==================================================
+======  ==================================================
+m_a     inertia of the second mass; the effect vanishes at 0
+w_a     its angular frequency where the main mass is held
+zeta_a  its damping ratio there
+======  ==================================================
 
 Applies to compliant couplings, frames, cables and sensors' brackets that ring. The rig's own inertia is that of the main mass
 alone.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.screening import Shortlist, Suspect
-from rigsight.effects import Effect
+from rigsight.effects import Effect, Family
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,10 @@ def search_places(context: FitContext, model: FittedModel, effects: Sequence[Eff
         key=lambda place: -place.share,
     )
     examined = {place.name for place in places if place.examined}
-    first = [e for e in effects if _stands_for_itself(e) or context.rig.acts_at(e) in examined]
+    at_places = [effect for effect in effects if context.rig.acts_at(effect) in examined]
+    # What is late in one place makes all readings behind it late: fits tell the places apart, if the records do.
+    is_late = max(own_shares, key=own_shares.__getitem__, default="") in {e.name for e in at_places if _is_late(e)}
+    first = [e for e in effects if _stands_for_itself(e) or e in at_places or (is_late and _is_late(e))]
     return Search(
         tuple(places),
         tuple(first),
@@ -82,6 +85,10 @@ def _promising(effects: Sequence[Effect], shares: Mapping[str, float]) -> tuple[
 def _stands_for_itself(effect: Effect) -> bool:
     """Return True for periodic and position-periodic effects, and those that are no push at a joint, a drive or a sensor."""
     return effect.pulsation is not None or effect.wave_number is not None or effect.lateral is not None
+
+
+def _is_late(effect: Effect) -> bool:
+    return effect.family is Family.DELAY_OR_LAG
 
 
 def _by_place(context: FitContext, suspects: Sequence[Suspect]) -> dict[str, float]:
