@@ -46,7 +46,8 @@ def of_controller(
     for own in grid_of(effect, [], scales) if points is None else points:
         whole = _columns(effect, own, fit, values)
         if whole is not None and any(map(np.any, whole)):
-            yield Term(effect, own, (), (), whole, (False,), is_given=True)
+            # Beside a free gain no force is given: it would make the masses vanish.
+            yield Term(effect, own, (), (), whole, (True,), is_given=not fit.gains)
 
 
 def _of_each(

@@ -63,7 +63,9 @@ def search_places(context: FitContext, model: FittedModel, effects: Sequence[Eff
     examined = {place.name for place in places if place.examined}
     at_places = [effect for effect in effects if context.rig.acts_at(effect) in examined]
     # What is late in one place makes all readings behind it late: fits tell the places apart, if the records do.
-    is_late = max(own_shares, key=own_shares.__getitem__, default="") in {e.name for e in at_places if _is_late(e)}
+    is_late = max(own_shares, key=own_shares.__getitem__, default="") in {
+        e.name for e in at_places if _is_late(e)
+    }
     first = [e for e in effects if _stands_for_itself(e) or e in at_places or (is_late and _is_late(e))]
     return Search(
         tuple(places),
