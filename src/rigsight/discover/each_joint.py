@@ -80,7 +80,9 @@ class MissingForce:
         joint, motion = self.motion.joint, self.regressed.motions[index]
         rest, stiffness = (evaluated(part, self.known) for part in (joint.rest, joint.stiffness))
         load = np.full_like(motion.x, np.nan)
-        moved = AlongJoint(motion.record, motion.x, motion.v, motion.acceleration, rest, stiffness, load)
+        moved = AlongJoint(
+            motion.record, motion.x, motion.v, motion.acceleration, rest, stiffness, load, load
+        )
         return effect_force(effect, own, moved)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from rigsight.effects.actuator_lag import ACTUATOR_LAG
 from rigsight.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS
+from rigsight.effects.back_driving_friction import BACK_DRIVING_FRICTION
 from rigsight.effects.backlash import BACKLASH
 from rigsight.effects.bouc_wen_hysteresis import BOUC_WEN_HYSTERESIS
 from rigsight.effects.command_delay import COMMAND_DELAY
@@ -34,6 +35,8 @@ from rigsight.effects.input_saturation import INPUT_SATURATION
 from rigsight.effects.integral_action import INTEGRAL_ACTION
 from rigsight.effects.iwan_hysteresis import IWAN_HYSTERESIS
 from rigsight.effects.load_dependent_friction import LOAD_DEPENDENT_FRICTION
+from rigsight.effects.load_dependent_stribeck_friction import LOAD_DEPENDENT_STRIBECK_FRICTION
+from rigsight.effects.lugre_friction import LUGRE_FRICTION
 from rigsight.effects.maxwell_branch import MAXWELL_BRANCH
 from rigsight.effects.periodic_disturbance import PERIODIC_DISTURBANCE
 from rigsight.effects.pid_action import PID_ACTION
@@ -61,7 +64,10 @@ CATALOGUE: tuple[Effect, ...] = (
     STRIBECK_FRICTION,
     DIRECTIONAL_FRICTION,
     LOAD_DEPENDENT_FRICTION,
+    LOAD_DEPENDENT_STRIBECK_FRICTION,
+    BACK_DRIVING_FRICTION,
     PRESLIDING_FRICTION,
+    LUGRE_FRICTION,
     QUADRATIC_DAMPING,
     DIRECTIONAL_DAMPING,
     POSITION_DEPENDENT_DAMPING,

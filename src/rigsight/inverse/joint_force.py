@@ -53,6 +53,7 @@ class JointMotion:
     rest: float
     stiffness: float
     load: Floats
+    driven: Floats
 
     @cached_property
     def directed(self) -> Floats:
@@ -103,7 +104,7 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
     places = equations.at_places(motion.z, motion.u, p)
     x, v = places[f"motion@{joint.name}"], places[f"rate@{joint.name}"]
     along = equations.slopes_along(motion.z, motion.u, p)[joint.name] if equations.n_coordinates else None
-    load = _load(motion, joint, numbers)
+    load, driven = (_along_motion(motion, part, numbers) for part in _carried(rig, joint))
     if along is None:
         # Of a joint along the prescribed coordinates themselves.
         acceleration = np.gradient(v, record.dt)
@@ -113,7 +114,8 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
     else:
         acceleration = np.einsum("ik,ik->k", along, motion.a)
         # With the drives as the motion requires them: the load of the recorded ones explains these by itself.
-        load = motion.filtered(load + nearest_force(along, motion.residual(values)))
+        missing = nearest_force(along, motion.residual(values))
+        load, driven = motion.filtered(load + missing), motion.filtered(driven + missing)
     return JointMotion(
         record,
         x,
@@ -122,11 +124,21 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
         evaluated(joint.rest, numbers),
         evaluated(joint.stiffness, numbers),
         load,
+        driven,
     )
 
 
-def _load(motion: RecordMotion, joint: Joint, numbers: Mapping[str, float]) -> Floats:
-    """Return what the joint carries with the drives as they are recorded, shape (n_samples,)."""
+def _carried(rig: Rig, joint: Joint) -> tuple[sp.Expr, sp.Expr]:
+    """Return what a joint carries, and the part of the drives, both with the drives as they are recorded."""
+    drives = {sp.Symbol(d.name, real=True): d.signal for d in rig.mechanism.drives}
+    still = {c.rate: sp.S.Zero for c in rig.mechanism.coordinates}
+    own = joint.stiffness * (joint.motion - joint.rest) + joint.force.xreplace(still)
+    carried, driven = rig.mechanism.carried_by(joint) + own, rig.mechanism.driven_by(joint)
+    return carried.xreplace(drives), driven.xreplace(drives)
+
+
+def _along_motion(motion: RecordMotion, carried: sp.Expr, numbers: Mapping[str, float]) -> Floats:
+    """Return an expression of the rig along a motion, shape (n_samples,)."""
     rig, equations = motion.equations.rig, motion.equations
     signals: dict[str, Any] = dict(numbers)
     for i, c in enumerate(rig.mechanism.free):
@@ -135,11 +147,6 @@ def _load(motion: RecordMotion, joint: Joint, numbers: Mapping[str, float]) -> F
         signals |= {c.symbol.name: motion.u[3 * i], c.rate.name: motion.u[3 * i + 1]}
     for signal in rig.inputs:
         signals[signal.name] = motion.record[signal.name]
-    carried = rig.mechanism.carried_by(joint)
-    drives = {sp.Symbol(d.name, real=True): d.signal for d in rig.mechanism.drives}
-    still = {c.rate: sp.S.Zero for c in rig.mechanism.coordinates}
-    own = joint.stiffness * (joint.motion - joint.rest) + joint.force.xreplace(still)
-    carried = (carried + own).xreplace(drives)
     names = sorted(symbol.name for symbol in carried.free_symbols)
     if not set(names) <= signals.keys():
         return np.full(motion.record.n_samples, np.nan)
@@ -164,26 +171,31 @@ def effect_force(effect: Effect, values: Mapping[str, float], motion: JointMotio
     if effect.states or (effect.deflection is None and effect.torque is None):
         return _simulated(effect, values, motion)
     if effect.deflection is not None:
-        return motion.stiffness * (_along(effect.deflection, values, motion, motion.load) - motion.x)
+        return motion.stiffness * (_along(effect.deflection, values, motion, 0.0) - motion.x)
     assert effect.torque is not None
     if not effect.reads(canonical.load):
-        return _along(effect.torque, values, motion, motion.load)
+        return _along(effect.torque, values, motion, 0.0)
     # A drive that overcomes friction loads the joint with it.
     force = np.zeros_like(motion.load)
     for _ in range(_ROUNDS):
-        force = _along(effect.torque, values, motion, motion.load + force)
+        force = _along(effect.torque, values, motion, force)
     return force
 
 
-def _along(expression: sp.Expr, values: Mapping[str, float], motion: JointMotion, load: Floats) -> Floats:
-    signals = (motion.x, motion.directed, motion.x + motion.rest, motion.acceleration, load)
+def _along(
+    expression: sp.Expr, values: Mapping[str, float], motion: JointMotion, overcome: Floats | float
+) -> Floats:
+    """Return a law along a motion whose drives also overcome a force."""
+    loads = motion.load + overcome, motion.driven + overcome
+    signals = (motion.x, motion.directed, motion.x + motion.rest, motion.acceleration, *loads)
     found = _compiled(expression, tuple(values))(*signals, *values.values())
     return np.array(np.broadcast_to(found, motion.x.shape), dtype=np.float64)
 
 
 @cache
 def _compiled(expression: sp.Expr, names: tuple[str, ...]) -> Any:
-    signals = (canonical.x, canonical.v, canonical.position, canonical.acceleration, canonical.load)
+    loads = canonical.load, canonical.driven
+    signals = (canonical.x, canonical.v, canonical.position, canonical.acceleration, *loads)
     own = [sp.Symbol(name, real=True) for name in names]
     return sp.lambdify((*signals, *own), expression, [FUNCTIONS, "numpy"], cse=True)
 

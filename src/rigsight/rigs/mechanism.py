@@ -183,22 +183,29 @@ class Mechanism:
 
     def carried_by(self, joint: Joint) -> sp.Expr:
         """Return what drives, weight and other joints' springs put on a joint: the push of drives less what the others do."""
-        # Of a joint along one coordinate that is all that acts along this coordinate while nothing moves. A joint between several
-        # coordinates carries the drives that push along its own motion; how weight is shared between such joints no equation
-        # says.
-        along = [c for c in self.coordinates if derivative(joint.motion, c.symbol) != 0]
+        # Of a joint along one coordinate that is all that acts along this coordinate while nothing moves. How weight is shared
+        # between joints of several coordinates no equation says.
+        along = self._coordinates_of(joint)
+        if len(along) > 1:
+            return self.driven_by(joint)
+        (coordinate,) = along
         at_rest = {c.rate: sp.Integer(0) for c in self.coordinates}
+        springs = [
+            derivative(other.motion, coordinate.symbol)
+            * (other.stiffness * (other.motion - other.rest) + other.force.xreplace(at_rest))
+            for other in self.joints
+            if other is not joint
+        ]
+        others = sp.Add(derivative(self.potential, coordinate.symbol), *springs)
+        return self.driven_by(joint) + others / derivative(joint.motion, coordinate.symbol)
+
+    def driven_by(self, joint: Joint) -> sp.Expr:
+        """Return the push of the drives on a joint; on one between several coordinates, of those along its own motion."""
+        along = self._coordinates_of(joint)
         if len(along) == 1:
             (coordinate,) = along
             slope = derivative(joint.motion, coordinate.symbol)
-            drives = [derivative(drive.along, coordinate.symbol) * drive.force for drive in self.drives]
-            springs = [
-                derivative(other.motion, coordinate.symbol)
-                * (other.stiffness * (other.motion - other.rest) + other.force.xreplace(at_rest))
-                for other in self.joints
-                if other is not joint
-            ]
-            return sp.Add(*drives, derivative(self.potential, coordinate.symbol), *springs) / slope
+            return sp.Add(*(derivative(d.along, coordinate.symbol) * d.force for d in self.drives)) / slope
         pushing = []
         for drive in self.drives:
             ratios = {derivative(drive.along, c.symbol) / derivative(joint.motion, c.symbol) for c in along}
@@ -206,6 +213,9 @@ class Mechanism:
             if len(ratios) == 1 and not others:
                 pushing.append(ratios.pop() * drive.force)
         return sp.Add(*pushing)
+
+    def _coordinates_of(self, joint: Joint) -> list[Coordinate]:
+        return [c for c in self.coordinates if derivative(joint.motion, c.symbol) != 0]
 
     def moves_inertia(self, expression: sp.Expr) -> bool:
         """Return True if a force along an expression of the coordinates moves a degree of freedom."""

@@ -256,7 +256,12 @@ class _Path:
             if effect.reads(canonical.load):
                 # Effects on the springs of other joints are left out, because the loads of two joints may depend on each other.
                 load = sp.Add(self._defined.bound(self._rig.mechanism.carried_by(joint)), *carried)
-                signals = {**signals, "load": self._defined.define(Kind.LOAD, effect, load)}
+                driven = self._defined.bound(self._rig.mechanism.driven_by(joint))
+                signals = {
+                    **signals,
+                    "load": self._defined.define(Kind.LOAD, effect, load),
+                    "driven": driven,
+                }
             torque = self._defined.define(
                 Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals)
             )

@@ -78,7 +78,7 @@ def _one_linear_system(effects: Sequence[Effect], rig: Rig) -> bool:
 def is_linear(effect: Effect) -> bool:
     """Return True if an effect leaves a linear rig linear."""
     signals = [canonical.x, canonical.v, canonical.u, canonical.reading, canonical.spring_torque]
-    signals += [canonical.position, canonical.load, canonical.acceleration]
+    signals += [canonical.position, canonical.load, canonical.driven, canonical.acceleration]
     signals += [
         canonical.creepage,
         canonical.lateral_displacement,

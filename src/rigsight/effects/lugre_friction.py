@@ -1,0 +1,89 @@
+"""LuGre friction: dry friction that builds up over a small displacement and falls from static to Coulomb level with speed.
+
+Equation
+--------
+``resisting torque = T_s z / x_p``,  ``z' = x' - |x'| z T_s / (x_p g)``,  ``g = T_c + (T_s - T_c) exp(-(x'/w_s)^2)``
+
+===  ============================================================================
+T_c  friction at high speed [force]; the effect vanishes where T_s is 0 as well
+T_s  friction at standstill [force]
+w_s  Stribeck velocity
+x_p  displacement over which the friction builds up; T_s / x_p is its stiffness
+===  ============================================================================
+
+Bristle damping is left out: records that slide do not determine it beside viscous damping.
+
+Applies to bearings and gears that reverse often and pass slowly through standstill. It is told from presliding friction by
+motion around w_s, and from Stribeck friction by motion within x_p.
+
+Signature: like presliding friction, with stick-slip at low speed.
+
+References: C. Canudas de Wit et al., IEEE TAC 40 (1995) 419.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
+from rigsight.effects.symbols import drive_size, v, v_size, x_size
+from rigsight.parameters import Parameter
+
+T_c, T_s, w_s, x_p, z = sp.symbols("T_c T_s w_s x_p z", real=True)
+
+_level = T_c + (T_s - T_c) * sp.exp(-((v / w_s) ** 2))
+
+LUGRE_FRICTION = Effect(
+    name="lugre_friction",
+    place=Place.DYNAMICS,
+    family=Family.DRY_FRICTION,
+    summary="Dry friction deflects like a spring before it slides, and falls with speed.",
+    parameters=(
+        Parameter(
+            "T_c",
+            "friction at high speed",
+            "drive",
+            lower=1e-12,
+            upper=1e12,
+            starts=(0.1, 0.3),
+            search=(1e-3, 2.0),
+        ),
+        Parameter(
+            "T_s",
+            "friction at standstill",
+            "drive",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.2, 0.5),
+            search=(0.0, 3.0),
+        ),
+        Parameter(
+            "w_s",
+            "Stribeck velocity",
+            "x time^-1",
+            lower=1e-12,
+            upper=1e12,
+            starts=(0.1, 0.3),
+            search=(1e-3, 3.0),
+            logarithmic=True,
+        ),
+        Parameter(
+            "x_p",
+            "displacement over which the friction builds up",
+            "x",
+            lower=1e-12,
+            upper=1e9,
+            starts=(0.1, 0.3),
+            search=(1e-3, 10.0),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(gain_trend=GainTrend.RISES),
+    torque=T_s * z / x_p,
+    states=(State(z, v - sp.Abs(v) * z * T_s / (x_p * _level), "x"),),
+    starts=(
+        Start({"T_c": 0.1 * drive_size, "T_s": 0.15 * drive_size, "w_s": 0.1 * v_size, "x_p": 0.1 * x_size}),
+        Start({"T_c": T_c, "T_s": 1.3 * T_c, "w_s": 0.1 * v_size, "x_p": x_p}, parent="presliding_friction"),
+        Start({"T_c": T_c, "T_s": T_s, "w_s": w_s, "x_p": 0.02 * x_size}, parent="stribeck_friction"),
+    ),
+)
