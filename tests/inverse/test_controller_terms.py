@@ -17,7 +17,7 @@ from rigsight.simulate import compose, simulate
 from .test_proposal import DT, T, campaign, proposed
 
 POSITION_DRIVE: Rig = read_rig_file(Path(__file__).parents[1] / "rigs" / "files" / "position_drive.toml")
-DRIVE_VALUES = {"m": 1.0, "d": 1.0, "k_p": 100.0, "k_v": 3.0}
+DRIVE_VALUES = {"m_l": 0.6, "m": 0.4, "d": 1.0, "k_p": 100.0, "k_v": 3.0}
 SERVO: Rig = RIGS["servo"]
 SERVO_VALUES = {"m": 1.0, "l": 0.15, "k_p": 2.0, "J": 0.01, "k_v": 3.0, "d": 0.5, "angle_off": 0.0}
 RIVALS = tuple(

@@ -24,6 +24,7 @@ from rigsight.effects.directional_friction import DIRECTIONAL_FRICTION
 from rigsight.effects.effect import Effect, Family
 from rigsight.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
 from rigsight.effects.end_stop import END_STOP
+from rigsight.effects.flexible_gear import FLEXIBLE_GEAR
 from rigsight.effects.flexible_mode import FLEXIBLE_MODE
 from rigsight.effects.free_play import FREE_PLAY
 from rigsight.effects.friction_compensation import FRICTION_COMPENSATION
@@ -80,6 +81,7 @@ CATALOGUE: tuple[Effect, ...] = (
     BACKLASH,
     ASYMMETRIC_STIFFNESS,
     FLEXIBLE_MODE,
+    FLEXIBLE_GEAR,
     INERTIA,
     INPUT_DELAY,
     ACTUATOR_LAG,

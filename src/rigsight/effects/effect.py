@@ -236,6 +236,8 @@ class Effect:
         Parameter values that simplify the equations (such as an exponent of 1): held first, released later.
     needs_inertia
         True if it makes no sense where the motion is prescribed.
+    needs_known_inertia
+        True if it is the same as another effect where all of the inertia is a parameter.
     at
         Name of the joint, drive, sensor or state of a rig at which it acts; None for the first of its kind.
     """
@@ -266,6 +268,7 @@ class Effect:
     starts: tuple[Start, ...] = ()
     special_cases: dict[str, float] = field(default_factory=dict)
     needs_inertia: bool = False
+    needs_known_inertia: bool = False
     at: str | None = None
 
     @property
@@ -303,6 +306,11 @@ class Effect:
             for parameter, symbol in symbols_of.items()
             if symbol not in in_states and not symbols.derivative(self.torque, symbol).has(symbol)
         )
+
+    @property
+    def is_push(self) -> bool:
+        """True if a force, a drive signal or a reading of the form that it has along a motion stands for it."""
+        return self.lateral is None and not self.needs_known_inertia
 
     @property
     def loses_sign(self) -> bool:

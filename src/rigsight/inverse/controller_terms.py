@@ -46,8 +46,8 @@ def of_controller(
     for own in grid_of(effect, [], scales) if points is None else points:
         whole = _columns(effect, own, fit, values)
         if whole is not None and any(map(np.any, whole)):
-            # Beside a free gain no force is given: it would make the masses vanish.
-            yield Term(effect, own, (), (), whole, (True,), is_given=not fit.gains)
+            # Beside a free gain no force is given, because it would make the masses vanish: its coefficient tells its size.
+            yield Term(effect, own, (), (), whole, (True,), is_given=not fit.gains, is_sized=bool(fit.gains))
 
 
 def _of_each(

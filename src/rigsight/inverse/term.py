@@ -15,6 +15,9 @@ from rigsight.identify.rig_equations import FUNCTIONS
 
 Floats = NDArray[np.float64]
 
+_SIZED = 1.5
+"""Factor by which the coefficient of a force of known size may differ from one (an assumption): that of the law beside it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Term:
@@ -28,9 +31,12 @@ class Term:
     columns: tuple[Floats, ...]
     one_sided: tuple[bool, ...]  # whether a coefficient cannot be negative
     is_given: bool = False  # whether the column is a force, not that of a unit of a number
+    is_sized: bool = False  # whether the column is a force whose coefficient must come out near one
 
     def allows(self, coefficients: Floats) -> bool:
         """Return whether coefficients, shape (n_parts,), have the sign and order that the effect needs."""
+        if self.is_sized and not np.all((coefficients > 1.0 / _SIZED) & (coefficients < _SIZED)):
+            return False
         if any(sided and own < 0.0 for sided, own in zip(self.one_sided, coefficients, strict=True)):
             return False
         numbers = {

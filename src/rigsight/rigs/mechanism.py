@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import permutations
@@ -13,6 +13,7 @@ import sympy as sp
 from sympy.simplify.fu import TR8
 
 from rigsight.effects.symbols import derivative
+from rigsight.parameters import Parameter
 from rigsight.rigs.parts import (
     Coordinate,
     Drive,
@@ -220,6 +221,14 @@ class Mechanism:
     def moves_inertia(self, expression: sp.Expr) -> bool:
         """Return True if a force along an expression of the coordinates moves a degree of freedom."""
         return any(derivative(expression, c.symbol) != 0 for c in self.free)
+
+    def has_known_inertia(self, expression: sp.Expr, parameters: Iterable[Parameter]) -> bool:
+        """Return True if a part of the kinetic energy of an expression's coordinates has no parameter."""
+        unknown = {sp.Symbol(p.name, real=True): sp.S.Zero for p in parameters}
+        known = self.kinetic.xreplace(unknown)
+        return not known.has(sp.zoo, sp.nan) and bool(
+            known.free_symbols & {c.rate for c in self.free if derivative(expression, c.symbol) != 0}
+        )
 
     @cached_property
     def has_short_inverse(self) -> bool:

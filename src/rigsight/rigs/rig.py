@@ -386,10 +386,12 @@ class Rig:
             return not any(c.rate in sensor.reads.free_symbols for c in self.mechanism.coordinates)
         if effect.place is Place.CONTROLLER:
             return self._controls(effect)
-        if effect.at is None or effect.place not in (Place.DYNAMICS, Place.DISTURBANCE):
-            return True
         mechanism = self.mechanism
         joint = joint_of(self, effect)
+        if effect.needs_known_inertia and not mechanism.has_known_inertia(joint.motion, self.parameters):
+            return False
+        if effect.at is None or effect.place not in (Place.DYNAMICS, Place.DISTURBANCE):
+            return True
         if effect.reads_inertia and joint.inertia is None and not mechanism.has_short_inverse:
             return False
         if joint.stiffness == 0 and (effect.spring is not None or effect.deflection is not None):

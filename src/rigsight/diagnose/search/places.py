@@ -86,7 +86,7 @@ def _promising(effects: Sequence[Effect], shares: Mapping[str, float]) -> tuple[
 
 def _stands_for_itself(effect: Effect) -> bool:
     """Return True for periodic and position-periodic effects, and those that are no push at a joint, a drive or a sensor."""
-    return effect.pulsation is not None or effect.wave_number is not None or effect.lateral is not None
+    return effect.pulsation is not None or effect.wave_number is not None or not effect.is_push
 
 
 def _is_late(effect: Effect) -> bool:

@@ -143,7 +143,7 @@ class Shortlist:
         """Return the response to each effect from each of its starts; those that are not finite or zero are left out."""
 
         def of_effect(effect: Effect) -> list[Response]:
-            if effect.lateral is not None:
+            if not effect.is_push:
                 formed, columns = self._starts(effect), self._in_the_equations(effect)
             else:
                 signals, columns = self._pushed_columns(effect)
@@ -352,7 +352,7 @@ def structures_of_shortlist(
         for effect in effects
         if effect.pulsation is None
         and effect.wave_number is None
-        and effect.lateral is None
+        and effect.is_push
         and effect.place is not Place.CONTROLLER
         and not _is_late(effect)
     }

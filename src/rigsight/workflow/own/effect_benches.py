@@ -47,6 +47,7 @@ _SERVO: dict[str, Any] = {
     "name": "position_drive",
     "summary": "A mass follows its goal.",
     "inputs": {"goal": {"unit": "m"}},
+    "constants": {"m_l": {"unit": "kg", "default": 0.6}},
     "parameters": {
         "m": {"unit": "kg", "lower": 1e-6},
         "d": {"unit": "N s/m", "lower": 0.0},
@@ -54,7 +55,7 @@ _SERVO: dict[str, Any] = {
         "k_v": {"unit": "N s/m", "lower": 0.0},
     },
     "coordinates": {"q": {"unit": "m"}},
-    "energy": {"kinetic": "m*d(q)^2/2"},
+    "energy": {"kinetic": "(m + m_l)*d(q)^2/2"},
     "joints": {"guide": {"motion": "q", "damping": "d"}},
     "drives": {
         "motor": {"signal": "goal", "force": "k_p*(motor - q) - k_v*d(q)", "along": "q"},
@@ -63,7 +64,7 @@ _SERVO: dict[str, Any] = {
 }
 _LAW = {"motor": {"signal": "k_p*(goal - x) - k_v*speed", "force": "motor", "along": "q"}}
 _SENSORS = {**_SERVO["sensors"], "speed": {"reads": "d(q)", "unit": "m/s"}}
-_SERVO_VALUES = {"m": 1.0, "d": 1.0, "k_p": RESONANCE**2, "k_v": 3.0}
+_SERVO_VALUES = {"m_l": 0.6, "m": 0.4, "d": 1.0, "k_p": RESONANCE**2, "k_v": 3.0}
 POSITION_DRIVE_BENCH = Bench(
     rig_of_tables(_SERVO, "Position drive"), _SERVO_VALUES, "x", _SERVO_VALUES, ("m", "d")
 )
