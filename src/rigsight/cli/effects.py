@@ -37,7 +37,7 @@ def list_effects(
         if quiet:
             return
         for effect in (*CATALOGUE, *own):
-            typer.echo(f"{effect.name:28}{effect.place.value:18}{equation_text(effect)}")
+            typer.echo(f"{effect.name:34}{effect.place.value:18}{equation_text(effect)}")
         if own:
             typer.echo(f"\nYour own, checked: {', '.join(effect.name for effect in own)}")
 

@@ -2,16 +2,17 @@
 
 Equation
 --------
-``resisting torque = T_s z / x_p``,  ``z' = x' - |x'| z T_s / (x_p g)``,  ``g = T_c + (T_s - T_c) exp(-(x'/w_s)^2)``
+``resisting torque = T_c (1 + s) z / x_p``,  ``z' = x' - |x'| z (1 + s) / (x_p g)``,  ``g = 1 + s exp(-(x'/w_s)^2)``
 
-===  ============================================================================
-T_c  friction at high speed [force]; the effect vanishes where T_s is 0 as well
-T_s  friction at standstill [force]
+===  ======================================================================================
+T_c  friction at high speed [force]; the effect vanishes at 0
+s    excess at standstill over high speed
 w_s  Stribeck velocity
-x_p  displacement over which the friction builds up; T_s / x_p is its stiffness
-===  ============================================================================
+x_p  displacement over which the friction builds up; T_c (1 + s) / x_p is its stiffness
+===  ======================================================================================
 
-Bristle damping is left out: records that slide do not determine it beside viscous damping.
+s is sought up to 3 and x_p below a fifth of the motion: beyond, the element makes loops of any shape, see hysteresis. Bristle
+damping is left out: records that slide do not determine it beside viscous damping.
 
 Applies to bearings and gears that reverse often and pass slowly through standstill. It is told from presliding friction by
 motion around w_s, and from Stribeck friction by motion within x_p.
@@ -27,9 +28,9 @@ from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Si
 from rigsight.effects.symbols import drive_size, v, v_size, x_size
 from rigsight.parameters import Parameter
 
-T_c, T_s, w_s, x_p, z = sp.symbols("T_c T_s w_s x_p z", real=True)
+T_c, T_s, s, w_s, x_p, z = sp.symbols("T_c T_s s w_s x_p z", real=True)
 
-_level = T_c + (T_s - T_c) * sp.exp(-((v / w_s) ** 2))
+_level = 1 + s * sp.exp(-((v / w_s) ** 2))
 
 LUGRE_FRICTION = Effect(
     name="lugre_friction",
@@ -41,20 +42,20 @@ LUGRE_FRICTION = Effect(
             "T_c",
             "friction at high speed",
             "drive",
-            lower=1e-12,
-            upper=1e12,
-            starts=(0.1, 0.3),
-            search=(1e-3, 2.0),
-        ),
-        Parameter(
-            "T_s",
-            "friction at standstill",
-            "drive",
             lower=0.0,
             upper=1e12,
             null=0.0,
-            starts=(0.2, 0.5),
-            search=(0.0, 3.0),
+            starts=(0.1, 0.3),
+            search=(0.0, 2.0),
+        ),
+        Parameter(
+            "s",
+            "excess at standstill over high speed",
+            "",
+            lower=0.0,
+            upper=3.0,
+            starts=(0.5, 1.0),
+            search=(0.02, 3.0),
         ),
         Parameter(
             "w_s",
@@ -63,7 +64,7 @@ LUGRE_FRICTION = Effect(
             lower=1e-12,
             upper=1e12,
             starts=(0.1, 0.3),
-            search=(1e-3, 3.0),
+            search=(1e-3, 0.5),
             logarithmic=True,
         ),
         Parameter(
@@ -72,18 +73,20 @@ LUGRE_FRICTION = Effect(
             "x",
             lower=1e-12,
             upper=1e9,
-            starts=(0.1, 0.3),
-            search=(1e-3, 10.0),
+            starts=(0.1, 0.03),
+            search=(1e-3, 0.2),
             logarithmic=True,
         ),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),
-    torque=T_s * z / x_p,
-    states=(State(z, v - sp.Abs(v) * z * T_s / (x_p * _level), "x"),),
+    torque=T_c * (1 + s) * z / x_p,
+    states=(State(z, v - sp.Abs(v) * z * (1 + s) / (x_p * _level), "x"),),
     starts=(
-        Start({"T_c": 0.1 * drive_size, "T_s": 0.15 * drive_size, "w_s": 0.1 * v_size, "x_p": 0.1 * x_size}),
-        Start({"T_c": T_c, "T_s": 1.3 * T_c, "w_s": 0.1 * v_size, "x_p": x_p}, parent="presliding_friction"),
-        Start({"T_c": T_c, "T_s": T_s, "w_s": w_s, "x_p": 0.02 * x_size}, parent="stribeck_friction"),
+        Start({"T_c": 0.1 * drive_size, "s": sp.Float(0.5), "w_s": 0.1 * v_size, "x_p": 0.1 * x_size}),
+        Start(
+            {"T_c": T_c, "s": sp.Float(0.3), "w_s": 0.1 * v_size, "x_p": x_p}, parent="presliding_friction"
+        ),
+        Start({"T_c": T_c, "s": T_s / T_c - 1, "w_s": w_s, "x_p": 0.02 * x_size}, parent="stribeck_friction"),
     ),
 )

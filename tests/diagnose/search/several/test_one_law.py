@@ -69,5 +69,7 @@ def test_the_best_pair_of_one_law_is_asked_for_all(scored) -> None:
 def test_linear_effects_are_known(effect) -> None:
     reidentified = {
         "flexible_mode", "maxwell_branch", "inertia", "actuator_lag", "input_delay", "sensor_lag", "sensor_delay", "time_shift",
+        "flexible_gear", "integral_action", "speed_loop_integral", "derivative_action", "pid_action", "velocity_feedforward",
+        "command_filter", "command_delay",
     }  # fmt: skip
     assert is_linear(effect) == (effect.name in reidentified)
