@@ -26,6 +26,7 @@ class ProposedStart:
 
     own: Mapping[str, float]  # its parameters
     numbers: Mapping[str, float]  # parameters of the equations beside it
+    unexplained: float = 1.0  # share of the squared missing force that it leaves
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ Key = tuple[Family, str]
 
 _MOST_CAUSES = 5
 """Families that are taken at most; a robot has three to five causes at once."""
-_WORTH = 0.03
+WORTH = 0.03
 """Least share of the residual that a further family must remove from stretches that it was not fitted to."""
 _SIGNIFICANCE = 0.01
 _DRAWS, _LIMITS = 100, (0.025, 0.975)
@@ -177,7 +177,7 @@ class Selection:
     def is_worth(self, after: float, before: float) -> bool:
         """Return whether a further family removes enough: of what was left before, and beside what the laws taken before err."""
         of_laws = LAW_ERROR**2 * max(self.regression.remainder([]) - before, 0.0)
-        return bool(before - after > max(max(_WORTH, self.by_chance) * before, of_laws))
+        return bool(before - after > max(max(WORTH, self.by_chance) * before, of_laws))
 
     def names(self, rig: Rig, key: Key, known: Sequence[tuple[Key, int, float]]) -> bool:
         """Return whether a family at a place is taken first beside known ones."""
@@ -222,8 +222,12 @@ class Selection:
             numbers=numbers.values(self.columns_of(selected)),
             numbers_beside=numbers,
             starts={
-                name: ProposedStart(_rounded(self._values(i, [])), _rounded(numbers.values(self.places[i])))
-                for name, (_, i) in starts.items()
+                name: ProposedStart(
+                    _rounded(self._values(i, [])),
+                    _rounded(numbers.values(self.places[i])),
+                    remainder / begun if begun > 0.0 else 1.0,
+                )
+                for name, (remainder, i) in starts.items()
             },
         )
 

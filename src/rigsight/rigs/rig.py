@@ -390,6 +390,8 @@ class Rig:
         joint = joint_of(self, effect)
         if effect.needs_known_inertia and not mechanism.has_known_inertia(joint.motion, self.parameters):
             return False
+        if effect.reads(symbols.driven) and effect.is_push and not self._has_two_loads(joint):
+            return False
         if effect.at is None or effect.place not in (Place.DYNAMICS, Place.DISTURBANCE):
             return True
         if effect.reads_inertia and joint.inertia is None and not mechanism.has_short_inverse:
@@ -397,6 +399,12 @@ class Rig:
         if joint.stiffness == 0 and (effect.spring is not None or effect.deflection is not None):
             return False
         return not effect.needs_inertia or joint.inertia is not None or mechanism.moves_inertia(joint.motion)
+
+    def _has_two_loads(self, joint: Joint) -> bool:
+        """Return True if a joint carries a drive, and a weight or a spring as well."""
+        driven = self.mechanism.driven_by(joint)
+        resists = self.mechanism.carried_by(joint) - driven + joint.stiffness + joint.force
+        return bool(driven != 0 and sp.expand(resists) != 0)
 
     def _controls(self, effect: Effect) -> bool:
         """Return False for an effect that would do at this controller what another one does already."""

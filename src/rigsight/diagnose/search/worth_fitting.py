@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.effects import Effect
 from rigsight.inverse import Proposal, ProposedStart
+from rigsight.inverse.selection import WORTH
 from rigsight.rigs import Rig
 
 
@@ -38,7 +39,12 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
         return everything
     near = {(c.family, c.where) for c in proposal.alone if c.share >= SEARCH.near_force * most}
     near |= {(cause.family, cause.where) for cause in proposal.taken}
-    named = tuple(e for e in effects if e.name in proposal.judged and (e.family, rig.where(e)) in near)
+    refined = _needless_refinements(effects, proposal.starts)
+    named = tuple(
+        e
+        for e in effects
+        if e.name in proposal.judged and (e.family, rig.where(e)) in near and e.name not in refined
+    )
     is_shown = proposal.noise is not None and proposal.noise < SEARCH.noise_of_force
     beside = (proposal.explained - most) / (1.0 - most) if most < 1.0 else 0.0
     is_rich = proposal.by_chance < VERDICT.larger_part
@@ -47,3 +53,15 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
         named = proposal.effects
     kept = tuple(e for e in effects if e.name not in proposal.judged or e in named)
     return WorthFitting(kept, named, is_shown, max(most, proposal.explained), proposal.starts)
+
+
+def _needless_refinements(effects: Sequence[Effect], starts: Mapping[str, ProposedStart]) -> set[str]:
+    """Return the names of forms of forms, such as LuGre friction, that leave hardly less along the motion than simpler ones."""
+    parents = {effect.name: [name for name in effect.parents if name in starts] for effect in effects}
+    found = set()
+    for name, simpler in parents.items():
+        if name in starts and any(parents.get(parent) for parent in simpler):
+            least = min(starts[parent].unexplained for parent in simpler)
+            if starts[name].unexplained > (1.0 - WORTH) * least:
+                found.add(name)
+    return found
