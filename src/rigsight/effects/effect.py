@@ -35,7 +35,7 @@ class Part:
 
 
 _MOTION = ("x", "v", "t", "k", "m", "position", "acceleration")
-_LOADED = (*_MOTION, "load", "driven")
+_LOADED = (*_MOTION, "load", "driven", "damped")
 _SPRING = (*_MOTION, "spring_torque", "deflection", "deflection_rate")
 _DRIVE = ("u", "v", "t")
 _CONTROL = ("output", "error", "command", "t")

@@ -2,7 +2,7 @@
 
 Equation
 --------
-``torque = (T_k - r driven) / (1 - r) - (load - driven)``,  ``T_k = r m (w_a^2 (x - s) + 2 zeta_a w_a (x' - s'))``,
+``torque = (T_k - r (driven - damped)) / (1 - r) - (load - driven)``,  ``T_k = r m (w_a^2 (x - s) + 2 zeta_a w_a (x' - s'))``,
 ``r m s'' = T_k - (load - driven)``
 
 ======  ==============================================================================
@@ -11,8 +11,8 @@ w_a     angular frequency of the link where the rotor is held
 zeta_a  its damping ratio there
 ======  ==============================================================================
 
-The rotor keeps ``(1 - r) m`` and the force of the drives, ``driven``; weight and springs, ``load - driven``, act on the link as
-if it were where the rotor is: the gear is stiff against them. The damping of the joint stays that of the rotor.
+The rotor keeps ``(1 - r) m``, the force of the drives, ``driven``, and that of the joint's damper, ``damped``. Weight and
+springs, ``load - driven``, act on the link as if it were where the rotor is: the gear is stiff against them.
 
 Applies to harmonic drives, belts and couplings of a joint whose model is rigid and whose link is known. Where the inertia of the
 joint is free, a flexible mode is the same, and this effect is not offered.
@@ -25,7 +25,7 @@ References: M. W. Spong, ASME J. Dyn. Syst. Meas. Control 109 (1987) 310, on fle
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.symbols import driven, load, m, time_size, v, x
+from rigsight.effects.symbols import damped, driven, load, m, time_size, v, x
 from rigsight.parameters import Parameter
 
 r, w_a, zeta_a, s, s_rate = sp.symbols("r w_a zeta_a s s_rate", real=True)
@@ -80,7 +80,7 @@ FLEXIBLE_GEAR = Effect(
     # It moves forces of the drive and of the weight from one mass to another: alone it is no passive element.
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
-    torque=(r * m * _pull - r * driven) / (1 - r) - _resists,
+    torque=(r * m * _pull - r * (driven - damped)) / (1 - r) - _resists,
     states=(State(s, s_rate, "x"), State(s_rate, _pull - _resists / (r * m), "x time^-1")),
     starts=tuple(_at(ratio) for ratio in (1.25, 2.4, 4.7, 10.0)),
     needs_inertia=True,

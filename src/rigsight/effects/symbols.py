@@ -22,6 +22,8 @@ load = sp.Symbol("load", real=True)
 """What a joint carries: the force of the drives along it less what its spring, weight and neighbors push along it."""
 driven = sp.Symbol("driven", real=True)
 """Part of `load` that the drives push."""
+damped = sp.Symbol("damped", real=True)
+"""Force of a joint's own damper."""
 u = sp.Symbol("u", real=True)
 """Input as it arrives at the effect (after the actuator effects in front of it)."""
 output = sp.Symbol("output", real=True)

@@ -11,9 +11,9 @@ import pytest
 from rigsight.campaign import Campaign
 from rigsight.diagnose import candidates_on, diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.search.places import search_places
+from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.single_effects import reidentify
-from rigsight.effects import effect_named, placed
+from rigsight.effects import Effect, effect_named, placed
 from rigsight.identify import characteristic_scales
 from rigsight.rigs import RIGS
 
@@ -32,17 +32,30 @@ HIDDEN = [
 
 @pytest.mark.parametrize(("name", "place", "values"), HIDDEN, ids=[f"{n}@{p}" for n, p, _ in HIDDEN])
 def test_the_place_comes_first(train: Any, name: str, place: str, values: dict[str, float]) -> None:
+    effects = candidates_on(TRAIN, EFFECTS)
+    search = searched(train, name, place, values, effects)
+    assert search.places[0].name == place
+    assert all(effect in search.effects for effect in effects if effect.at == place)
+    assert len(search.effects) + len(search.others) == len(effects)
+
+
+def test_what_is_late_is_looked_for_at_every_place(train: Any) -> None:
+    """A late drive makes all readings late: a place is left out for another kind of effect only."""
+    offered = [effect_named(n) for n in ("input_delay", "actuator_lag", "sensor_delay", "input_saturation")]
+    effects = candidates_on(TRAIN, offered)
+    search = searched(train, "sensor_delay", "load_angle", {"T_s": 0.02}, effects)
+    assert {e.name for e in effects} - {e.name for e in search.effects} <= {"input_saturation@motor"}
+
+
+def searched(
+    train: Any, name: str, place: str, values: dict[str, float], effects: tuple[Effect, ...]
+) -> Search:
     records = train.records([placed(effect_named(name), place)], values)
     fitted = tuple(record for record in records if record.role == "estimation")
     noise = {signal.name: train.noise for signal in TRAIN.outputs}
     scales = characteristic_scales(TRAIN, fitted, train.values)
     context = FitContext(TRAIN, fitted, fitted, fitted, scales, noise, frozenset(), train.values)
-    reidentified = reidentify(context, train.values)
-    effects = candidates_on(TRAIN, EFFECTS)
-    search = search_places(context, reidentified, effects)
-    assert search.places[0].name == place
-    assert all(effect in search.effects for effect in effects if effect.at == place)
-    assert len(search.effects) + len(search.others) == len(effects)
+    return search_places(context, reidentify(context, train.values), effects)
 
 
 @pytest.mark.slow

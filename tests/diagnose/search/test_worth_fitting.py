@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rigsight.diagnose.search.worth_fitting import worth_fitting
 from rigsight.effects import CATALOGUE, Effect, effect_named
-from rigsight.inverse import Proposal, ProposedCause
+from rigsight.inverse import Proposal, ProposedCause, ProposedStart
 from rigsight.rigs import AXIS
 
 
@@ -50,3 +50,18 @@ def test_of_families_that_explain_the_force_only_together_the_forms_that_were_ta
     worth = worth_fitting(AXIS, proposal, CATALOGUE)
     assert {effect.name for effect in worth.alone} == {"coulomb_friction", "cubic_stiffness"}
     assert worth.explained == 0.95
+
+
+def test_a_form_of_a_form_is_fitted_where_the_motion_shows_it() -> None:
+    """LuGre friction contains presliding and Stribeck friction, which contain Coulomb friction."""
+    best = cause("coulomb_friction", 0.8)
+    unexplained = {"coulomb_friction": 0.2, "stribeck_friction": 0.199, "presliding_friction": 0.18}
+    for of_lugre, is_fitted in ((0.179, False), (0.1, True)):
+        starts = {
+            name: ProposedStart({}, {}, left)
+            for name, left in {**unexplained, "lugre_friction": of_lugre}.items()
+        }
+        proposal = Proposal((best,), (best,), frozenset(starts), 0.8, 0.1, starts=starts)
+        kept = {effect.name for effect in worth_fitting(AXIS, proposal, CATALOGUE).alone}
+        assert unexplained.keys() <= kept
+        assert ("lugre_friction" in kept) == is_fitted

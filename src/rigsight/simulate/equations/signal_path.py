@@ -261,6 +261,7 @@ class _Path:
                     **signals,
                     "load": self._defined.define(Kind.LOAD, effect, load),
                     "driven": driven,
+                    "damped": self._defined.bound(joint.damping) * signals["v"],
                 }
             torque = self._defined.define(
                 Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals)
