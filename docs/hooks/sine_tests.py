@@ -70,7 +70,7 @@ def panels(effect: Effect) -> tuple[Panel, Panel]:
     if effect.place is Place.DISTURBANCE:
         return gain, _over_time(effect, bench, values, HARDLY_DRIVEN)
     if effect.lateral is not None or (
-        (effect.drive is not None or effect.control is not None) and not steady
+        (effect.drive is not None or effect.place is Place.CONTROLLER) and not steady
     ):
         return gain, _over_time(effect, bench, values, levels[1])
     if ELEMENT.offers(effect):

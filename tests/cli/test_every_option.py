@@ -90,6 +90,7 @@ GIVEN: dict[str, list[str]] = {
     "--trials": ["3"],
     "--trial": ["0"],
     "--design": ["laboratory"],
+    "--campaign": ["elsewhere"],
     "--campaigns": ["a", "--keys", "b"],
     "--keys": ["b", "--campaigns", "a"],
     "--merge": ["a"],

@@ -55,7 +55,7 @@ def test_an_output_with_an_effect_is_that_of_the_simulation() -> None:
     still = simulate(compose(POSITION_DRIVE), DRIVE_VALUES, record)
     error = goal - still["x"]
     signals = ControllerSignals(error - 0.03 * np.gradient(still["x"], DT), error, goal)
-    for effect in (e for e in CATALOGUE if e.control is not None or e.command_delay is not None):
+    for effect in (e for e in CATALOGUE if e.place is Place.CONTROLLER):
         null = effect.null_values()
         own = {p.name: null.get(p.name, 0.01) for p in effect.parameters}
         own = {name: 1e-6 if name.startswith("T_") and value == 0.0 else value for name, value in own.items()}

@@ -15,7 +15,7 @@ from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS
-from rigsight.robots import draft_rig, isaac_settings, load_model, sensor_readings, write_back
+from rigsight.robots import draft_rig, gap_of_written, isaac_settings, load_model, sensor_readings, write_back
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 
@@ -219,3 +219,56 @@ def test_isaac_settings_have_one_limit_for_both_directions(
 def test_controls_that_do_not_fit_are_refused(controls: np.ndarray, dt: float, said: str) -> None:
     with pytest.raises(InputError, match=said):
         sensor_readings(load_model(ARM), controls, dt)
+
+
+@pytest.mark.parametrize(
+    ("effects", "largest"),
+    [
+        ({"integral_action@shoulder_motor": {"r_i": 3.0}}, 2e-3),
+        ({"command_rate_limit@shoulder_motor": {"w_c": 1.0, "T_f": 2e-4}}, 1e-2),
+        ({"controller_saturation@shoulder_motor": {"o_max": 0.05}}, 2e-3),
+        (
+            {
+                "integral_action@shoulder_motor": {"r_i": 3.0},
+                "command_rate_limit@shoulder_motor": {"w_c": 1.0, "T_f": 2e-4},
+            },
+            1e-2,
+        ),
+    ],
+    ids=["integral", "rate", "force", "both"],
+)
+def test_what_a_controller_does_beyond_its_law_moves_the_written_model(
+    effects: Mapping[str, Mapping[str, float]], largest: float
+) -> None:
+    """MuJoCo limits a rate from step to step, which comes half a step late."""
+    ours = model_of({}, effects)
+    found = write_back(ours, ARM)
+    assert found.without_field == ()
+    controls = sweeping()
+    names = [signal.name for signal in ours.structure.rig.inputs]
+    record = Record("sweep", STEP, dict(zip(names, controls.T, strict=True)), {}, hold="zoh")
+    start = np.zeros(len(ours.structure.states))
+    here = simulate(ours.structure, ours.values, record, start)
+    plain = simulate(compose(ours.structure.rig), model_of({}, {}).values, record)
+    measured = record.with_signals(**{s.name: here[s.name] for s in ours.structure.rig.outputs})
+    found.model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_RK4)
+    for one in gap_of_written(found.model, found.draft, ours, [measured], [start]):
+        assert one.there < largest
+        assert one.here < 1e-4
+    assert (
+        max(np.std(plain[n] - here[n]) / np.std(here[n]) for n in here.signals if n not in names)
+        > 5 * largest
+    )
+
+
+def test_records_of_another_rig_are_refused() -> None:
+    ours = model_of({}, {})
+    found = write_back(ours, ARM)
+    names = [signal.name for signal in ours.structure.rig.inputs]
+    still = Record("still", STEP, {name: np.zeros(20) for name in names}, {}, hold="zoh")
+    start = np.zeros(len(ours.structure.states))
+    with pytest.raises(InputError, match="No record has a reading"):
+        gap_of_written(found.model, found.draft, ours, [still], [start])
+    without = Record("without", STEP, {names[0]: np.zeros(20)}, {}, hold="zoh")
+    with pytest.raises(InputError, match=f"no signal '{names[1]}'"):
+        gap_of_written(found.model, found.draft, ours, [without], [start])

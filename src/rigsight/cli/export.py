@@ -66,6 +66,15 @@ def export(
             help="For mjcf and isaac: the MuJoCo model or URDF from which rigsight init made the rig.",
         ),
     ] = None,
+    campaign: Annotated[
+        Path | None,
+        typer.Option(
+            "--campaign",
+            metavar="CAMPAIGN",
+            show_default="(none)",
+            help="For mjcf: simulate the validation records of this campaign in MuJoCo with the written model.",
+        ),
+    ] = None,
     effects: OwnEffects = None,
     rigs: OwnRigs = None,
     json: Json = False,
@@ -90,11 +99,18 @@ def export(
             step=step,
             source_only=source_only,
             robot=mjcf,
+            campaign=campaign,
             own_effects=own_effects(effects or [], check=False),
             own_rigs=own_rigs(rigs or []).values(),
         )
     if json:
-        fields = {"written": list(written.written), "without_field": list(written.without_field)}
+        fields: dict[str, object] = {
+            "written": list(written.written),
+            "without_field": list(written.without_field),
+        }
+        gap = {one.sensor: {"mujoco": one.there, "model": one.here} for one in written.gap}
+        if gap:
+            fields["gap"] = gap
         show_as_json({"target": to, "file": str(written.path), **(fields if mjcf is not None else {})})
     elif not quiet:
         typer.echo(f"{to}: {written.path}")
@@ -102,3 +118,7 @@ def export(
             typer.echo(f"Written: {line}")
         for line in written.without_field:
             typer.echo(f"No field for: {line}")
+        for one in written.gap:
+            typer.echo(
+                f"Gap in {one.sensor} in MuJoCo: {one.there:.3g}, in the model: {one.here:.3g} (NRMSE, validation)"
+            )

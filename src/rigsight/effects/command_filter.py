@@ -17,7 +17,7 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.symbols import command, output
+from rigsight.effects.symbols import command
 from rigsight.parameters import Parameter
 
 T_c, c_c = sp.symbols("T_c c_c", real=True)
@@ -42,6 +42,6 @@ COMMAND_FILTER = Effect(
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
-    control=output - command + c_c,
+    command=c_c,
     states=(State(c_c, (command - c_c) / T_c, "input"),),
 )

@@ -19,7 +19,7 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.symbols import beyond, clamp, command, output
+from rigsight.effects.symbols import beyond, clamp, command
 from rigsight.parameters import Parameter
 
 w_c, T_f, c_l = sp.symbols("w_c T_f c_l", real=True)
@@ -54,6 +54,6 @@ COMMAND_RATE_LIMIT = Effect(
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
-    control=output - beyond(command - c_l, w_c * T_f),
+    command=command - beyond(command - c_l, w_c * T_f),
     states=(State(c_l, clamp((command - c_l) / T_f, w_c), "input"),),
 )

@@ -49,6 +49,7 @@ PARTS = {
     "drive": Part((Place.ACTUATOR,), "drive = {}", _DRIVE, _DRIVE),
     "delay": Part((Place.ACTUATOR,), "drive = u(t - {})"),
     "control": Part((Place.CONTROLLER,), "controller output = {}", _CONTROL, _CONTROL),
+    "command": Part((Place.CONTROLLER,), "command = {}", ("command", "t"), ("command", "t")),
     "command_delay": Part((Place.CONTROLLER,), "command = command(t - {})"),
     "lateral": Part((Place.LATERAL_DYNAMICS,), "lateral rate = {}", _CONTACT),
     "measured": Part((Place.SENSOR,), "measured = {}", _READING, _READING),
@@ -207,6 +208,8 @@ class Effect:
         Time by which the input arrives late [s].
     control
         Output of a controller in terms of ``output``, ``error``, ``command`` and states.
+    command
+        What the controller takes for its command, in terms of ``command`` and states.
     command_delay
         Time by which the command reaches the controller late [s].
     lateral
@@ -255,6 +258,7 @@ class Effect:
     drive: sp.Expr | None = None
     delay: sp.Expr | None = None
     control: sp.Expr | None = None
+    command: sp.Expr | None = None
     command_delay: sp.Expr | None = None
     lateral: sp.Expr | None = None
     measured: sp.Expr | None = None

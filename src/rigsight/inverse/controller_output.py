@@ -52,10 +52,14 @@ def changed_output(effect: Effect, own: Mapping[str, float], signals: Controller
         rows, command = np.arange(signals.command.size, dtype=np.float64), signals.command
         late = float(effect.command_delay.xreplace(numbers))
         return np.asarray(signals.output - command + np.interp(rows - late / dt, rows, command))
-    assert effect.control is not None
     courses = [_course(state, numbers, signals, dt) for state in effect.states]
     symbols = tuple(state.symbol for state in effect.states)
-    changed = _compiled(effect.control.xreplace(numbers), (*symbols, *_READ))(*courses, *_arrays(signals))
+    law = (
+        effect.control
+        if effect.control is not None
+        else canonical.output - canonical.command + effect.command
+    )
+    changed = _compiled(law.xreplace(numbers), (*symbols, *_READ))(*courses, *_arrays(signals))
     return np.array(np.broadcast_to(changed, signals.output.shape), dtype=np.float64)
 
 

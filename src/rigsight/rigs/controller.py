@@ -53,7 +53,8 @@ def controller_of(mechanism: Mechanism, drive: Drive) -> Controller | None:
         law, limits = _inside_limits(signal)
         return Controller(*_parts(mechanism, law, inputs), in_force=False, limits=limits)
     own = sp.Symbol(drive.name, real=True)
-    force = _without_names(mechanism, drive.force)
+    # Limits of the force stay where they are: what changes inside them is the drive's own signal.
+    force, _ = _inside_limits(_without_names(mechanism, drive.force))
     gain = derivative(force, own)
     if gain == 0 or gain.free_symbols & (_motion(mechanism) | {own}):
         return None

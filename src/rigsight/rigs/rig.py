@@ -423,8 +423,9 @@ class Rig:
 def _smooths_command(effect: Effect) -> bool:
     """Return True for a controller's effect that puts a linear filter before its command."""
     rates = [state.rate for state in effect.states]
-    is_replaced = effect.control is not None and derivative(effect.control, symbols.command) == -1
-    return is_replaced and not any(derivative(rate, symbols.command).has(symbols.command) for rate in rates)
+    return effect.command is not None and not any(
+        derivative(rate, symbols.command).has(symbols.command) for rate in rates
+    )
 
 
 def joint_of(rig: Rig, effect: Effect) -> Joint:

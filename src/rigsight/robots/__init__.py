@@ -14,3 +14,5 @@ from rigsight.robots.tree import load_spec as load_spec
 from rigsight.robots.writing_back import WrittenBack as WrittenBack
 from rigsight.robots.writing_back import with_gears as with_gears
 from rigsight.robots.writing_back import write_back as write_back
+from rigsight.robots.written_run import WrittenGap as WrittenGap
+from rigsight.robots.written_run import gap_of_written as gap_of_written

@@ -92,6 +92,41 @@ def _filtered(element: Any, values: Mapping[str, float], _: Any) -> str | None:
     return None
 
 
+def _regulated(element: Any, values: Mapping[str, float], _: Any) -> str | None:
+    """Make a position controller one with integral action and a limited rate of its control."""
+    import mujoco
+
+    kp, kv = -float(element.biasprm[1]), -float(element.biasprm[2])
+    ki, slewmax = 0.0, 0.0
+    if element.gaintype == mujoco.mjtGain.mjGAIN_PID:
+        ki, slewmax = float(element.gainprm[0]), float(element.dynprm[1])
+    elif not _is_position_controller(element) or element.dyntype != mujoco.mjtDyn.mjDYN_NONE:
+        return "the actuator is no position controller, or has a filter"
+    ki += kp * values.get("r_i", 0.0)
+    slewmax = values.get("w_c", slewmax)
+    # Its only control remains the goal: by itself it would take one for the velocity, too.
+    goal = int(mujoco.mjtCtrlInput.mjINPUT_POS)
+    element.set_to_pid(kp=kp, kv=kv, ki=ki or -1.0, slewmax=slewmax or -1.0, ctrlspec=goal)
+    return None
+
+
+def _force_limited(element: Any, values: Mapping[str, float], _: Any) -> str | None:
+    if not _is_position_controller(element):
+        return "the actuator is no position controller"
+    size = values["o_max"] * abs(float(element.biasprm[1]))
+    element.forcerange[:] = (-size, size)
+    element.forcelimited = True
+    return None
+
+
+def _is_position_controller(element: Any) -> bool:
+    import mujoco
+
+    is_affine = element.biastype == mujoco.mjtBias.mjBIAS_AFFINE and element.biasprm[1] < 0.0
+    of_gain = element.gaintype == mujoco.mjtGain.mjGAIN_PID or element.gainprm[0] == -element.biasprm[1]
+    return bool(is_affine and of_gain)
+
+
 EFFECT_FIELDS: Mapping[str, EffectField] = {
     "coulomb_friction": EffectField("joint", "frictionloss", _added("frictionloss", "T_c")),
     "quadratic_damping": EffectField("joint", "damping, second number", _added("damping", "c_2", 1)),
@@ -100,6 +135,9 @@ EFFECT_FIELDS: Mapping[str, EffectField] = {
     "input_delay": EffectField("actuator", "delay", _late("T_d")),
     "input_saturation": EffectField("actuator", "ctrlrange", _limited),
     "actuator_lag": EffectField("actuator", "dyntype filterexact", _filtered),
+    "integral_action": EffectField("actuator", "gaintype pid, integral gain", _regulated),
+    "command_rate_limit": EffectField("actuator", "gaintype pid, largest rate", _regulated),
+    "controller_saturation": EffectField("actuator", "forcerange", _force_limited),
     "sensor_delay": EffectField("sensor", "delay", _late("T_s")),
 }
 """By the name of the effect, as of MuJoCo 4.0."""
@@ -118,7 +156,15 @@ class WrittenBack:
     without_field: tuple[str, ...]  # descriptions of what MuJoCo has no field for
 
 
-def write_back(model: Model, source: Path) -> WrittenBack:
+@dataclass(frozen=True)
+class WrittenModel(WrittenBack):
+    """A MuJoCo model that was written, ready to run."""
+
+    model: mujoco.MjModel  # compiled
+    draft: RigDraft  # how its parts are called in the rig
+
+
+def write_back(model: Model, source: Path) -> WrittenModel:
     """Return the MuJoCo model of a file with the numbers and effects of a rig that was made from it."""
     robot = read_for(model, source)
     structure = model.structure
@@ -262,9 +308,9 @@ class _Writer:
     def _called(self, element: str, index: int) -> str:
         return f"{element} '{self._elements[element][index].name or index}'"
 
-    def finished(self, source: Path) -> WrittenBack:
+    def finished(self, source: Path) -> WrittenModel:
         try:
-            self._spec.compile()
+            model = self._spec.compile()
             text = self._spec.to_xml()
         except ValueError as error:
             raise InputError(f"{source}: MuJoCo rejects it with the new values: {error}") from None
@@ -273,7 +319,13 @@ class _Writer:
         lines += [f"MuJoCo has no field for {line}" for line in self._without_field]
         # An XML comment must not contain two hyphens in a row.
         comment = "\n".join(lines).replace("--", "- -")
-        return WrittenBack(f"<!-- {comment} -->\n{text}", tuple(self._written), tuple(self._without_field))
+        return WrittenModel(
+            f"<!-- {comment} -->\n{text}",
+            tuple(self._written),
+            tuple(self._without_field),
+            model,
+            self._draft,
+        )
 
 
 def with_gears(spec: mujoco.MjSpec, draft: RigDraft) -> mujoco.MjModel:

@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.export import TARGETS, export_model
+from rigsight.identify.fit.first_states import first_state
+from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import named_model
 from rigsight.workflow.run.results import check_target, write_together
+
+if TYPE_CHECKING:
+    from rigsight.robots import WrittenGap
 
 
 @dataclass(frozen=True)
@@ -23,6 +29,7 @@ class WrittenFile:
     path: Path  # the file
     written: tuple[str, ...] = ()  # descriptions of the changed fields of a robot model
     without_field: tuple[str, ...] = ()  # descriptions of what the file has no field for
+    gap: tuple[WrittenGap, ...] = ()  # of each sensor, where records were given
 
 
 ROBOT_TARGETS = {"mjcf": ".xml", "isaac": ".yaml"}
@@ -38,6 +45,7 @@ def run_export(
     step: float | None = None,
     source_only: bool = False,
     robot: Path | None = None,
+    campaign: Path | None = None,
     own_effects: Sequence[Effect] = (),
     own_rigs: Iterable[Rig] = (),
 ) -> WrittenFile:
@@ -47,9 +55,12 @@ def run_export(
     if target in ROBOT_TARGETS:
         if hold is not None or source_only or (step is not None and target != "isaac"):
             raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")
-        return _robot(read, target, robot, out, step)
+        records = () if campaign is None else _validation(campaign, target, own_effects, own_rigs)
+        return _robot(read, target, robot, out, step, records)
     if robot is not None:
         raise InputError(f"--mjcf applies only to {' and '.join(ROBOT_TARGETS)}; leave it out for {target}.")
+    if campaign is not None:
+        raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
     chosen = TARGETS[target]
     file = _target_file(read, out, chosen.name, chosen.suffix)
     content = export_model(
@@ -65,10 +76,26 @@ def run_export(
     return WrittenFile(file)
 
 
+def _validation(
+    campaign: Path, target: str, own_effects: Sequence[Effect], own_rigs: Iterable[Rig]
+) -> tuple[Record, ...]:
+    """Return the validation records of a campaign."""
+    from rigsight.workflow.campaign.read_campaign import read_campaign
+
+    if target != "mjcf":
+        raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
+    return read_campaign(campaign, own_effects, own_rigs).validation
+
+
 def _robot(
-    model: Model, target: str, robot: Path | None, out: str | Path | None, step: float | None
+    model: Model,
+    target: str,
+    robot: Path | None,
+    out: str | Path | None,
+    step: float | None,
+    records: Sequence[Record],
 ) -> WrittenFile:
-    from rigsight.robots import isaac_settings, write_back
+    from rigsight.robots import gap_of_written, isaac_settings, write_back
 
     if robot is None:
         raise InputError(
@@ -80,7 +107,15 @@ def _robot(
         raise InputError(
             f"{file} is the model of the robot itself and is not overwritten; name another file with --out."
         )
-    written = write_back(model, robot) if target == "mjcf" else isaac_settings(model, robot, step)
+    if target == "mjcf":
+        back = write_back(model, robot)
+        starts = [
+            first_state(model.structure, record, {**model.values, **record.constants}) for record in records
+        ]
+        gap = gap_of_written(back.model, back.draft, model, records, starts) if records else ()
+        write_together(file.parent, {file.name: back.text})
+        return WrittenFile(file, back.written, back.without_field, gap)
+    written = isaac_settings(model, robot, step)
     write_together(file.parent, {file.name: written.text})
     return WrittenFile(file, written.written, written.without_field)
 

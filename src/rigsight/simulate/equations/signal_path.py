@@ -207,6 +207,12 @@ class _Path:
                 parts = [part.xreplace(arriving) for part in parts]
         output, error, command = parts
         for effect in effects:
+            if effect.command is not None:
+                states += self._defined.states(effect, {"command": command})
+                followed = self._binder.effect(effect, effect.command, {"command": command})
+                followed = self._defined.define(Kind.DRIVE, effect, followed)
+                output, error, command = output + followed - command, error + followed - command, followed
+        for effect in effects:
             if effect.control is not None:
                 signals = {"output": output, "error": error, "command": command}
                 states += self._defined.states(effect, signals)

@@ -7,6 +7,7 @@ its goal, with its controller as the force of a position drive and as the signal
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from rigsight.effects import Effect
@@ -65,21 +66,22 @@ _SERVO: dict[str, Any] = {
 _LAW = {"motor": {"signal": "k_p*(goal - x) - k_v*speed", "force": "motor", "along": "q"}}
 _SENSORS = {**_SERVO["sensors"], "speed": {"reads": "d(q)", "unit": "m/s"}}
 _SERVO_VALUES = {"m_l": 0.6, "m": 0.4, "d": 1.0, "k_p": RESONANCE**2, "k_v": 3.0}
-POSITION_DRIVE_BENCH = Bench(
-    rig_of_tables(_SERVO, "Position drive"), _SERVO_VALUES, "x", _SERVO_VALUES, ("m", "d")
-)
-CONTROL_LAW_BENCH = Bench(
-    rig_of_tables({**_SERVO, "name": "control_law", "drives": _LAW, "sensors": _SENSORS}, "Control law"),
-    _SERVO_VALUES,
-    "x",
-    _SERVO_VALUES,
-    ("m", "d"),
-)
 _ELEMENT_VALUES = {"d": 2.0, "k": RESONANCE**2, "force_off": 0.0}
 ELEMENT_BENCH = Bench(ELEMENT, _ELEMENT_VALUES, "force", _ELEMENT_VALUES, ("d", "k", "force_off"))
 
 
+@cache
+def _with_controller() -> tuple[Bench, Bench]:
+    """Return the position drive, and the mass whose control law is the signal of its drive."""
+    of_law = {**_SERVO, "name": "control_law", "drives": _LAW, "sensors": _SENSORS}
+    rigs = rig_of_tables(_SERVO, "Position drive"), rig_of_tables(of_law, "Control law")
+    drive, law = (Bench(rig, _SERVO_VALUES, "x", _SERVO_VALUES, ("m", "d")) for rig in rigs)
+    return drive, law
+
+
 def bench_of(effect: Effect) -> Bench:
     """Return the bench on which an effect is tried: the first that offers it."""
-    benches = (AXIS_BENCH, GEAR_BENCH, ELEMENT_BENCH, POSITION_DRIVE_BENCH, CONTROL_LAW_BENCH)
-    return next((bench for bench in benches if bench.rig.offers(effect)), GEAR_BENCH)
+    for bench in (AXIS_BENCH, GEAR_BENCH, ELEMENT_BENCH):
+        if bench.rig.offers(effect):
+            return bench
+    return next((bench for bench in _with_controller() if bench.rig.offers(effect)), GEAR_BENCH)

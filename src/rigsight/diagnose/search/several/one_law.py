@@ -95,6 +95,7 @@ def is_linear(effect: Effect) -> bool:
         effect.lateral,
         effect.measured,
         effect.control,
+        effect.command,
     ]
     laws += [state.rate for state in effect.states]
     return all(_is_linear_in(law, signals) for law in laws if law is not None) and all(
