@@ -83,8 +83,8 @@ def of_given(
         for motion, gain in zip(fit.motions, per_input, strict=True):
             equations, p = motion.equations, motion.equations.parameters(values, motion.record)
             along = equations.slopes_along(motion.z, motion.u, p)[drive.name]
-            force = equations.at_places(motion.z, motion.u, p)[f"force@{drive.name}"]
-            lost_force = force - gain * reaching(force / gain, *own.values())
+            given = equations.at_places(motion.z, motion.u, p)[f"signal@{drive.name}"]
+            lost_force = gain * (given - reaching(given, *own.values()))
             columns.append(motion.thinned(along * lost_force)[None])
         if all(np.all(np.isfinite(column)) for column in columns) and any(map(np.any, columns)):
             yield Term(effect, own, (), (), tuple(columns), (False,), is_given=True)
@@ -121,8 +121,8 @@ def lost(
     """Return the force that a drive effect takes from what the motion requires, shape (n_equations, n_samples)."""
     gain, reaching = force_per_input(drive, {**values, **motion.record.constants}), _reaching(effect)
     assert reaching is not None
-    along, force = _required(drive, fit, motion, values)
-    return np.asarray(along * (force - gain * reaching(force / gain, *own.values())))
+    along, needed = _required(drive, gain, fit, motion, values)
+    return np.asarray(along * gain * (needed - reaching(needed, *own.values())))
 
 
 def force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
@@ -133,14 +133,15 @@ def force_per_input(drive: Drive, numbers: Mapping[str, float]) -> float:
 
 
 def _required(
-    drive: Drive, fit: EquationFit, motion: RecordMotion, values: Mapping[str, float]
+    drive: Drive, gain: float, fit: EquationFit, motion: RecordMotion, values: Mapping[str, float]
 ) -> tuple[Floats, Floats]:
-    """Return how a drive enters the equations, shape (n_equations, n_samples), and the force that the motion requires of it."""
+    """Return how a drive enters the equations, shape (n_equations, n_samples), and the signal that the motion requires of it."""
+    # Of a position drive that is another goal, and not another force.
     equations = motion.equations
     along, missing = _through_drive(drive.name, motion, values, fit.residual(motion, values))
     p = equations.parameters(values, motion.record)
-    given = equations.at_places(motion.z, motion.u, p)[f"force@{drive.name}"]
-    return along, motion.filtered(missing + given)
+    given = equations.at_places(motion.z, motion.u, p)[f"signal@{drive.name}"]
+    return along, motion.filtered(missing / gain + given)
 
 
 def _through_drive(
