@@ -36,7 +36,7 @@ HIDDEN = (
     "command_delay",
     "coulomb_friction",
 )
-SAME = {"controller_dead_band": ("input_dead_zone",), "command_filter": ("actuator_lag",)}
+SAME = {("controller_dead_band", LAWS[0]): "input_dead_zone", ("command_filter", LAWS[1]): "actuator_lag"}
 """Effects of a drive that do the same: a dead zone of a signal that is proportional to the error, a lag of the goal."""
 RIG = """name = "servo"
 summary = "A position servo turns a link."
@@ -247,7 +247,10 @@ def run_trial(seed: int, out: Path, n_jobs: int) -> dict[str, object]:
         "verdict": diagnosis.verdict,
         "named": list(diagnosis.effects),
         "right": {(family_of(e), w) for e, w in zip(diagnosis.effects, diagnosis.where, strict=False)}
-        <= {(family_of(name), place) for name in (servo.hidden, *SAME.get(servo.hidden, ()))}
+        <= {
+            (family_of(name), place)
+            for name in (servo.hidden, SAME.get((servo.hidden, servo.law), servo.hidden))
+        }
         and bool(diagnosis.effects),
         "probability": None if first is None else first.probability,
         "gain": None if gain is None else [gain.value / servo.gain, gain.std / servo.gain],
