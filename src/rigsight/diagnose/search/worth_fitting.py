@@ -56,8 +56,17 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
 
 
 def _needless_refinements(effects: Sequence[Effect], starts: Mapping[str, ProposedStart]) -> set[str]:
-    """Return the names of forms of forms, such as LuGre friction, that leave hardly less along the motion than simpler ones."""
-    parents = {effect.name: [name for name in effect.parents if name in starts] for effect in effects}
+    """Return the names of forms of forms, such as LuGre friction, that leave hardly less along the motion than simpler ones.
+
+    A form of another family is another cause: a loop is fitted beside the presliding friction that it contains.
+    """
+    families = {effect.name: effect.family for effect in effects}
+    parents = {
+        effect.name: [
+            name for name in effect.parents if name in starts and families.get(name) == effect.family
+        ]
+        for effect in effects
+    }
     found = set()
     for name, simpler in parents.items():
         if name in starts and any(parents.get(parent) for parent in simpler):
