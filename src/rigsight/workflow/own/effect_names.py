@@ -64,4 +64,12 @@ def candidates_of(campaign: Campaign, effects: Sequence[Effect]) -> list[Effect]
     named = [effect for effect in effects if effect.at is None] + [
         *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
     ]
-    return candidates_on(campaign.rig, named, campaign.modelled)
+    found = candidates_on(campaign.rig, named, campaign.modelled)
+    modelled = {kind_of(effect.name) for effect in campaign.modelled}
+    if named and not found and not any(kind_of(effect.name) in modelled for effect in named):
+        listed = ", ".join(f"'{effect.name}'" for effect in named)
+        raise InputError(
+            f"The candidates: {listed} cannot act on {campaign.rig.name}. "
+            "'rigsight effects' lists all with their kind of place."
+        )
+    return found
