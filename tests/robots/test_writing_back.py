@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -242,8 +243,7 @@ def test_what_a_controller_does_beyond_its_law_moves_the_written_model(
 ) -> None:
     """MuJoCo limits a rate from step to step, which comes half a step late."""
     ours = model_of({}, effects)
-    found = write_back(ours, ARM)
-    assert found.without_field == ()
+    assert write_back(ours, ARM).without_field == ()
     controls = sweeping()
     names = [signal.name for signal in ours.structure.rig.inputs]
     record = Record("sweep", STEP, dict(zip(names, controls.T, strict=True)), {}, hold="zoh")
@@ -251,10 +251,9 @@ def test_what_a_controller_does_beyond_its_law_moves_the_written_model(
     here = simulate(ours.structure, ours.values, record, start)
     plain = simulate(compose(ours.structure.rig), model_of({}, {}).values, record)
     measured = record.with_signals(**{s.name: here[s.name] for s in ours.structure.rig.outputs})
-    found.model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_RK4)
-    for one in gap_of_written(found.model, found.draft, ours, [measured], [start]):
-        assert one.there < largest
-        assert one.here < 1e-4
+    for one in gap_of_written(ours, ARM, [measured], [start]):
+        assert one.in_mujoco < largest
+        assert one.in_model < 1e-4
     assert (
         max(np.std(plain[n] - here[n]) / np.std(here[n]) for n in here.signals if n not in names)
         > 5 * largest
@@ -263,12 +262,33 @@ def test_what_a_controller_does_beyond_its_law_moves_the_written_model(
 
 def test_records_of_another_rig_are_refused() -> None:
     ours = model_of({}, {})
-    found = write_back(ours, ARM)
     names = [signal.name for signal in ours.structure.rig.inputs]
     still = Record("still", STEP, {name: np.zeros(20) for name in names}, {}, hold="zoh")
     start = np.zeros(len(ours.structure.states))
     with pytest.raises(InputError, match="No record has a reading"):
-        gap_of_written(found.model, found.draft, ours, [still], [start])
+        gap_of_written(ours, ARM, [still], [start])
     without = Record("without", STEP, {names[0]: np.zeros(20)}, {}, hold="zoh")
     with pytest.raises(InputError, match=f"no signal '{names[1]}'"):
-        gap_of_written(found.model, found.draft, ours, [without], [start])
+        gap_of_written(ours, ARM, [without], [start])
+
+
+def test_a_payload_of_a_record_is_written_for_its_run() -> None:
+    ours = model_of({}, {})
+    payload = next(name for name in ours.values if name.endswith("_mass"))
+    heavier = {payload: 1.5 * ours.values[payload]}
+    names = [signal.name for signal in ours.structure.rig.inputs]
+    record = Record(
+        "sweep", STEP, dict(zip(names, sweeping().T, strict=True)), {}, hold="zoh", constants=heavier
+    )
+    start = np.zeros(len(ours.structure.states))
+    moved = simulate(ours.structure, {**ours.values, **heavier}, record, start)
+    measured = record.with_signals(**{s.name: moved[s.name] for s in ours.structure.rig.outputs})
+    for one in gap_of_written(ours, ARM, [measured], [start]):
+        assert one.in_mujoco < 2e-3
+    for one in gap_of_written(ours, ARM, [replace(measured, constants={})], [start]):
+        assert one.in_mujoco > 1e-2
+
+
+def test_a_limit_that_the_model_has_already_stays_where_it_is_narrower() -> None:
+    wide = model_of({}, {"controller_saturation@shoulder_motor": {"o_max": 100.0}})
+    assert write_back(wide, ARM).model.actuator_forcerange[0] == pytest.approx([-40.0, 40.0])

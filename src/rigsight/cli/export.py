@@ -108,7 +108,7 @@ def export(
             "written": list(written.written),
             "without_field": list(written.without_field),
         }
-        gap = {one.sensor: {"mujoco": one.there, "model": one.here} for one in written.gap}
+        gap = {one.sensor: {"mujoco": one.in_mujoco, "model": one.in_model} for one in written.gap}
         if gap:
             fields["gap"] = gap
         show_as_json({"target": to, "file": str(written.path), **(fields if mjcf is not None else {})})
@@ -120,5 +120,5 @@ def export(
             typer.echo(f"No field for: {line}")
         for one in written.gap:
             typer.echo(
-                f"Gap in {one.sensor} in MuJoCo: {one.there:.3g}, in the model: {one.here:.3g} (NRMSE, validation)"
+                f"Gap in {one.sensor}: {one.in_mujoco:.2%} in MuJoCo, {one.in_model:.2%} in rigsight (validation records)"
             )

@@ -45,7 +45,7 @@ class Controller:
 
 def controller_of(mechanism: Mechanism, drive: Drive) -> Controller | None:
     """Return the law by which a drive follows a recorded input and reacts to the motion; None for a drive that does not."""
-    signal = _without_names(mechanism, drive.signal)
+    signal = mechanism.written_out(drive.signal)
     inputs = {sp.Symbol(name, real=True) for name in mechanism.inputs}
     if not signal.free_symbols & inputs:
         return None
@@ -54,7 +54,7 @@ def controller_of(mechanism: Mechanism, drive: Drive) -> Controller | None:
         return Controller(*_parts(mechanism, law, inputs), in_force=False, limits=limits)
     own = sp.Symbol(drive.name, real=True)
     # Limits of the force stay where they are: what changes inside them is the drive's own signal.
-    force, _ = _inside_limits(_without_names(mechanism, drive.force))
+    force, _ = _inside_limits(mechanism.written_out(drive.force))
     gain = derivative(force, own)
     if gain == 0 or gain.free_symbols & (_motion(mechanism) | {own}):
         return None
@@ -79,13 +79,6 @@ def _parts(mechanism: Mechanism, law: sp.Expr, inputs: set[sp.Symbol]) -> tuple[
     still = law.xreplace(dict.fromkeys(rates | of_speed, sp.S.Zero))
     error = still if still.free_symbols & _motion(mechanism) else law
     return law, error, sp.expand(law - law.xreplace(dict.fromkeys(inputs, sp.S.Zero)))
-
-
-def _without_names(mechanism: Mechanism, expression: sp.Expr) -> sp.Expr:
-    """Return an expression with named signals written out."""
-    for symbol, signal in reversed(list(mechanism.signals.items())):
-        expression = expression.xreplace({symbol: signal})
-    return expression
 
 
 def _inside_limits(signal: sp.Expr) -> tuple[sp.Expr, sp.Expr]:

@@ -69,6 +69,10 @@ class Mechanism:
         """The joint that effects at drives and sensors read; without joints, the first motion, which nothing resists."""
         return self.joints[0] if self.joints else Joint("", self.coordinates[0].symbol)
 
+    def joint_named(self, name: str | None) -> Joint:
+        """Return a joint by its name; the first one for any other name."""
+        return next((joint for joint in self.joints if joint.name == name), self.first_joint)
+
     @cached_property
     def has_one_motion(self) -> bool:
         """True for one joint along the one coordinate, moved by one input or following it, without feedback."""
@@ -182,23 +186,16 @@ class Mechanism:
         )
         return self.rate(expression) + along
 
+    def written_out(self, expression: sp.Expr) -> sp.Expr:
+        """Return an expression without named signals."""
+        for symbol, signal in reversed(list(self.signals.items())):
+            expression = expression.xreplace({symbol: signal})
+        return expression
+
     def carried_by(self, joint: Joint) -> sp.Expr:
         """Return what drives, weight and other joints' springs put on a joint: the push of drives less what the others do."""
-        # Of a joint along one coordinate that is all that acts along this coordinate while nothing moves. How weight is shared
-        # between joints of several coordinates no equation says.
-        along = self._coordinates_of(joint)
-        if len(along) > 1:
-            return self.driven_by(joint)
-        (coordinate,) = along
-        at_rest = {c.rate: sp.Integer(0) for c in self.coordinates}
-        springs = [
-            derivative(other.motion, coordinate.symbol)
-            * (other.stiffness * (other.motion - other.rest) + other.force.xreplace(at_rest))
-            for other in self.joints
-            if other is not joint
-        ]
-        others = sp.Add(derivative(self.potential, coordinate.symbol), *springs)
-        return self.driven_by(joint) + others / derivative(joint.motion, coordinate.symbol)
+        # Of a joint along one coordinate that is all that acts along this coordinate while nothing moves.
+        return self.driven_by(joint) + self.resisted_by(joint)
 
     def driven_by(self, joint: Joint) -> sp.Expr:
         """Return the push of the drives on a joint; on one between several coordinates, of those along its own motion."""
@@ -214,6 +211,22 @@ class Mechanism:
             if len(ratios) == 1 and not others:
                 pushing.append(ratios.pop() * drive.force)
         return sp.Add(*pushing)
+
+    def resisted_by(self, joint: Joint) -> sp.Expr:
+        """Return what weight and other joints' springs resist a joint with."""
+        along = self._coordinates_of(joint)
+        if len(along) != 1:
+            return sp.S.Zero  # How weight is shared between joints of several coordinates no equation says.
+        (coordinate,) = along
+        at_rest = {c.rate: sp.Integer(0) for c in self.coordinates}
+        springs = [
+            derivative(other.motion, coordinate.symbol)
+            * (other.stiffness * (other.motion - other.rest) + other.force.xreplace(at_rest))
+            for other in self.joints
+            if other is not joint
+        ]
+        weight = derivative(self.potential, coordinate.symbol)
+        return sp.Add(weight, *springs) / derivative(joint.motion, coordinate.symbol)
 
     def _coordinates_of(self, joint: Joint) -> list[Coordinate]:
         return [c for c in self.coordinates if derivative(joint.motion, c.symbol) != 0]

@@ -9,13 +9,13 @@ from typing import Any
 
 import sympy as sp
 
-from rigsight.effects import symbols
 from rigsight.effects.effect import Effect, Place
 from rigsight.effects.symbols import derivative
 from rigsight.parameters import Parameter
 from rigsight.rigs.controller import Controller, controller_of
 from rigsight.rigs.evaluation import evaluated
 from rigsight.rigs.mechanism import Mechanism
+from rigsight.rigs.offered import suits_place
 from rigsight.rigs.one_motion import Follower, Motion, follower_of
 from rigsight.rigs.parts import Drive, Joint, RateState, Sensor, Signal
 from rigsight.units import unit_text
@@ -365,9 +365,9 @@ class Rig:
             return False
         if effect.place is Place.LATERAL_DYNAMICS:
             return self.follower is not None
-        if not self.places(effect.place) or not self._suits(effect):
-            return False
-        if effect.reads(symbols.acceleration) and not self._is_prescribed(effect):
+        if not self.places(effect.place) or not suits_place(
+            effect, self.acts_at(effect), self.mechanism, self.controllers, self.parameters
+        ):
             return False
         if self.is_driven or effect.shifts_the_record:
             return True
@@ -375,60 +375,7 @@ class Rig:
             not effect.needs_inertia or joint_of(self, effect).inertia is not None
         )
 
-    def _is_prescribed(self, effect: Effect) -> bool:
-        """Return True if an effect acts where the motion is prescribed: there its acceleration is known."""
-        return not self.mechanism.moves_inertia(joint_of(self, effect).motion)
-
-    def _suits(self, effect: Effect) -> bool:
-        """Return False for an effect of a spring or of a mass at a joint that has none, or of a position at a sensor of speed."""
-        if effect.place is Place.SENSOR and effect.wave_number is not None:
-            sensor = next(own for own in self.mechanism.sensors if own.name == self.acts_at(effect))
-            return not any(c.rate in sensor.reads.free_symbols for c in self.mechanism.coordinates)
-        if effect.place is Place.CONTROLLER:
-            return self._controls(effect)
-        mechanism = self.mechanism
-        joint = joint_of(self, effect)
-        if effect.needs_known_inertia and not mechanism.has_known_inertia(joint.motion, self.parameters):
-            return False
-        if effect.reads(symbols.driven) and effect.is_push and not self._has_two_loads(joint):
-            return False
-        if effect.at is None or effect.place not in (Place.DYNAMICS, Place.DISTURBANCE):
-            return True
-        if effect.reads_inertia and joint.inertia is None and not mechanism.has_short_inverse:
-            return False
-        if joint.stiffness == 0 and (effect.spring is not None or effect.deflection is not None):
-            return False
-        return not effect.needs_inertia or joint.inertia is not None or mechanism.moves_inertia(joint.motion)
-
-    def _has_two_loads(self, joint: Joint) -> bool:
-        """Return True if a joint carries a drive, and a weight or a spring as well."""
-        driven = self.mechanism.driven_by(joint)
-        resists = self.mechanism.carried_by(joint) - driven + joint.stiffness + joint.force
-        return bool(driven != 0 and sp.expand(resists) != 0)
-
-    def _controls(self, effect: Effect) -> bool:
-        """Return False for an effect that would do at this controller what another one does already."""
-        controller = self.controllers[self.acts_at(effect)]
-        if effect.command_delay is not None or _smooths_command(effect):
-            return not controller.in_force  # There it is a delay or a lag of the drive.
-        reads_command = effect.reads(symbols.command)
-        if not effect.states and not reads_command and controller.error == controller.output:
-            return controller.in_force  # Else it is a dead zone or a saturation of the drive.
-        if reads_command or effect.reads(symbols.error):
-            return True
-        # Of the output alone: an integral of it beside that of the error, and a saturation beside that of the drive.
-        return controller.error != controller.output if effect.states else controller.in_force
-
-
-def _smooths_command(effect: Effect) -> bool:
-    """Return True for a controller's effect that puts a linear filter before its command."""
-    rates = [state.rate for state in effect.states]
-    return effect.command is not None and not any(
-        derivative(rate, symbols.command).has(symbols.command) for rate in rates
-    )
-
 
 def joint_of(rig: Rig, effect: Effect) -> Joint:
     """Return the joint at which an effect acts; the first one for an effect at a drive, a sensor or a state."""
-    mechanism = rig.mechanism
-    return next((joint for joint in mechanism.joints if joint.name == effect.at), mechanism.first_joint)
+    return rig.mechanism.joint_named(effect.at)

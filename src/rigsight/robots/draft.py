@@ -62,6 +62,12 @@ class RigDraft:
         """Return the number of a joint once each with a gear has its second joint behind it."""
         return joint + sum(gear.joint < joint for gear in self.gears.values())
 
+    def joint_of_coordinates(self) -> dict[str, int]:
+        """Return the number of the joint of each coordinate, once each joint with a gear has its second one behind it."""
+        joints = {name: self.index_with_gears(index) for name, index in self.joints.items()}
+        behind = {gear.coordinate: self.index_with_gears(gear.joint) + 1 for gear in self.gears.values()}
+        return joints | behind
+
     @property
     def is_as_it_is(self) -> bool:
         """True if bodies are left to MuJoCo."""

@@ -75,8 +75,7 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     own.actuator_dyntype[exact] = int(mujoco.mjtDyn.mjDYN_FILTER)
     data = mujoco.MjData(own)
     rng = np.random.default_rng(0)
-    joints = {name: draft.index_with_gears(index) for name, index in draft.joints.items()}
-    joints |= {gear.coordinate: draft.index_with_gears(gear.joint) + 1 for gear in draft.gears.values()}
+    joints = draft.joint_of_coordinates()
     coordinates = {name: int(own.jnt_qposadr[index]) for name, index in joints.items()}
     for name in draft.joints:
         slides = int(own.jnt_type[joints[name]]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -137,11 +136,19 @@ def sensor_readings(model: mujoco.MjModel, controls: Floats, dt: float) -> Float
         raise InputError(
             f"dt must be a multiple of the model's step of {model.opt.timestep:g} s, got {dt:g} s."
         )
-    data = mujoco.MjData(model)
-    readings = np.empty((len(controls), model.nsensordata))
-    for reported, reading in zip(controls, readings, strict=True):
-        data.ctrl[:] = reported
+    return driven_run(model, mujoco.MjData(model), controls, round(steps))[0]
+
+
+def driven_run(
+    model: mujoco.MjModel, data: mujoco.MjData, controls: Floats, n_steps: int
+) -> tuple[Floats, Floats]:
+    """Run a model from a state under controls that hold for so many steps: sensors and positions before each."""
+    import mujoco
+
+    readings, positions = np.empty((len(controls), model.nsensordata)), np.empty((len(controls), model.nq))
+    for control, reading, position in zip(controls, readings, positions, strict=True):
+        data.ctrl[:] = control
         mujoco.mj_forward(model, data)
-        reading[:] = data.sensordata
-        mujoco.mj_step(model, data, round(steps))
-    return readings
+        reading[:], position[:] = data.sensordata, data.qpos
+        mujoco.mj_step(model, data, n_steps)
+    return readings, positions

@@ -114,7 +114,10 @@ def _force_limited(element: Any, values: Mapping[str, float], _: Any) -> str | N
     if not _is_position_controller(element):
         return "the actuator is no position controller"
     size = values["o_max"] * abs(float(element.biasprm[1]))
-    element.forcerange[:] = (-size, size)
+    low, high = -size, size
+    if element.forcerange[0] < element.forcerange[1]:
+        low, high = max(low, float(element.forcerange[0])), min(high, float(element.forcerange[1]))
+    element.forcerange[:] = (low, high)
     element.forcelimited = True
     return None
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -12,12 +12,10 @@ from rigsight.errors import InputError
 from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.record import Floats
-from rigsight.robots.draft import RigDraft
+from rigsight.robots.free_run import driven_run
+from rigsight.robots.writing_back import WrittenModel, write_back
 from rigsight.simulate import simulate
 from rigsight.simulate.model import Model
-
-if TYPE_CHECKING:
-    import mujoco
 
 
 @dataclass(frozen=True)
@@ -25,94 +23,82 @@ class WrittenGap:
     """NRMSE of one sensor, of all records together."""
 
     sensor: str
-    there: float  # of MuJoCo with the written model
-    here: float  # of the model
+    in_mujoco: float  # with the written model
+    in_model: float
 
 
 def gap_of_written(
-    written: mujoco.MjModel,
-    draft: RigDraft,
-    model: Model,
-    records: Sequence[Record],
-    starts: Sequence[Floats],
+    model: Model, source: Path, records: Sequence[Record], starts: Sequence[Floats]
 ) -> tuple[WrittenGap, ...]:
-    """Simulate records with a written model and with its source, both from one state.
+    """Simulate records with a model and with the MuJoCo model into which it is written, both from one state.
 
     Parameters
     ----------
-    written
-        The MuJoCo model with the numbers and effects.
-    draft
-        How its parts are called in the rig.
     model
-        The model that was written.
+        The model that is written; constants of a record replace its own, in both.
+    source
+        MJCF or URDF file from which the rig was made.
     records
-        With the signals of the rig.
+        With the controls and readings of the rig.
     starts
         State of the model at the first sample of each, shape (n_states,) each.
 
     Raises
     ------
     InputError
-        If a record lacks a control of the MuJoCo model, or its sensors are none of those of the rig.
+        If a record lacks a control of the MuJoCo model, or no record has a reading of it.
     """
     measured: dict[str, list[Floats]] = {}
     residuals: dict[str, list[tuple[Floats, Floats]]] = {}
+    written: dict[tuple[tuple[str, float], ...], WrittenModel] = {}
     for record, state in zip(records, starts, strict=True):
-        values = {**model.values, **{k: v for k, v in record.constants.items() if k in model.values}}
-        here = simulate(model.structure, values, record, state)
-        start = dict(zip(model.structure.state_names, state, strict=True))
-        there = _readings(written, draft, record, start)
-        for name in (s.name for s in model.structure.rig.outputs if s.name in record and s.name in there):
+        own = replace(model, values={**model.values, **record.constants})
+        key = tuple(sorted(record.constants.items()))
+        if key not in written:
+            written[key] = write_back(own, source)
+        start = dict(zip(model.structure.state_names, map(float, state), strict=True))
+        in_mujoco = _readings(written[key], record, start)
+        in_model = simulate(model.structure, own.values, record, state)
+        for name in (s.name for s in model.structure.rig.outputs if s.name in record and s.name in in_mujoco):
             measured.setdefault(name, []).append(record[name])
-            residuals.setdefault(name, []).append((record[name] - there[name], record[name] - here[name]))
+            residuals.setdefault(name, []).append(
+                (record[name] - in_mujoco[name], record[name] - in_model[name])
+            )
     if not measured:
         raise InputError(
             "No record has a reading that the MuJoCo model has too: give a campaign of the rig's records."
         )
     found = []
     for name, readings in measured.items():
-        own = np.concatenate(readings)
         parts = (np.concatenate(part) for part in zip(*residuals[name], strict=True))
-        found.append(WrittenGap(name, *(nrmse(part, own) for part in parts)))
+        found.append(WrittenGap(name, *(nrmse(part, np.concatenate(readings)) for part in parts)))
     return tuple(found)
 
 
-def _readings(
-    model: mujoco.MjModel, draft: RigDraft, record: Record, start: dict[str, float]
-) -> dict[str, Floats]:
-    """Return what the sensors of the MuJoCo model show along a record; positions of joints where it has none."""
+def _readings(written: WrittenModel, record: Record, start: Mapping[str, float]) -> dict[str, Floats]:
+    """Return what the sensors of a MuJoCo model show along a record; positions of joints where it has none."""
     import mujoco
 
-    missing = [name for name, index in draft.controls.items() if index >= 0 and name not in record]
-    if missing:
-        raise InputError(
-            f"Record '{record.name}' has no signal '{missing[0]}', a control of the MuJoCo model."
-        )
+    model, draft = written.model, written.draft
+    controls = np.zeros((record.n_samples, model.nu))
+    for name, index in draft.controls.items():
+        if index < 0:
+            continue
+        if name not in record:
+            raise InputError(f"Record '{record.name}' has no signal '{name}', a control of the MuJoCo model.")
+        controls[:, model.actuator_ctrladr[index]] = record[name]
     n_steps = max(1, round(record.dt / float(model.opt.timestep)))
     model.opt.timestep = record.dt / n_steps
-    data = mujoco.MjData(model)
-    joints = {name: draft.index_with_gears(index) for name, index in draft.joints.items()}
-    joints |= {gear.coordinate: draft.index_with_gears(gear.joint) + 1 for gear in draft.gears.values()}
+    data, joints = mujoco.MjData(model), draft.joint_of_coordinates()
     for name, joint in joints.items():
         data.qpos[model.jnt_qposadr[joint]] = start[name]
         data.qvel[model.jnt_dofadr[joint]] = start[f"d({name})"]
-    controls = np.zeros((record.n_samples, model.nu))
-    for name, index in draft.controls.items():
-        if index >= 0:
-            controls[:, model.actuator_ctrladr[index]] = record[name]
-    shown = np.empty((record.n_samples, model.nsensordata))
-    moved = np.empty((record.n_samples, model.nq))
-    for row, (control, reading) in enumerate(zip(controls, shown, strict=True)):
-        data.ctrl[:] = control
-        mujoco.mj_forward(model, data)
-        reading[:], moved[row] = data.sensordata, data.qpos
-        mujoco.mj_step(model, data, n_steps)
-    reads = {sensor.name: str(sensor.reads) for sensor in draft.rig.mechanism.sensors}
+    shown, positions = driven_run(model, data, controls, n_steps)
+    places = {sensor.name: str(sensor.reads) for sensor in draft.rig.mechanism.sensors}
     return {
         name: shown[:, model.sensor_adr[index]]
         if index >= 0
-        else moved[:, model.jnt_qposadr[joints[reads[name]]]]
+        else positions[:, model.jnt_qposadr[joints[places[name]]]]
         for name, index in draft.sensors.items()
-        if index >= 0 or reads[name] in joints
+        if index >= 0 or places[name] in joints
     }

@@ -84,7 +84,18 @@ def _validation(
 
     if target != "mjcf":
         raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
-    return read_campaign(campaign, own_effects, own_rigs).validation
+    found = read_campaign(campaign, own_effects, own_rigs).validation
+    if not found:
+        raise InputError(f'{campaign} has no validation record: give one of its records role = "validation".')
+    return found
+
+
+def _gap(model: Model, robot: Path, records: Sequence[Record]) -> tuple[WrittenGap, ...]:
+    """Return the gap in MuJoCo and in the model, both from the states that the first samples of the records show."""
+    from rigsight.robots import gap_of_written
+
+    starts = [first_state(model.structure, r, {**model.values, **r.constants}) for r in records]
+    return gap_of_written(model, robot, records, starts)
 
 
 def _robot(
@@ -95,7 +106,7 @@ def _robot(
     step: float | None,
     records: Sequence[Record],
 ) -> WrittenFile:
-    from rigsight.robots import gap_of_written, isaac_settings, write_back
+    from rigsight.robots import isaac_settings, write_back
 
     if robot is None:
         raise InputError(
@@ -109,10 +120,7 @@ def _robot(
         )
     if target == "mjcf":
         back = write_back(model, robot)
-        starts = [
-            first_state(model.structure, record, {**model.values, **record.constants}) for record in records
-        ]
-        gap = gap_of_written(back.model, back.draft, model, records, starts) if records else ()
+        gap = _gap(model, robot, records) if records else ()
         write_together(file.parent, {file.name: back.text})
         return WrittenFile(file, back.written, back.without_field, gap)
     written = isaac_settings(model, robot, step)
