@@ -10,6 +10,8 @@ import pytest
 
 from rigsight.effects import CATALOGUE, Place, effect_named
 from rigsight.inverse.controller_output import ControllerSignals, changed_output
+from rigsight.inverse.equation_fit import record_motions
+from rigsight.inverse.joint_force import joint_motion
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig, read_rig_file
 from rigsight.simulate import compose, simulate
@@ -61,3 +63,16 @@ def test_an_output_with_an_effect_is_that_of_the_simulation() -> None:
         own = {name: 1e-6 if name.startswith("T_") and value == 0.0 else value for name, value in own.items()}
         changed = changed_output(effect, own, signals, DT)
         assert changed == pytest.approx(signals.output, abs=1e-3), effect.name
+
+
+def test_the_load_behind_a_control_law_follows_from_recorded_readings() -> None:
+    own = campaign(SERVO, SERVO_VALUES, [], (0.2,))
+    (motion,) = record_motions(SERVO, own.records, SERVO_VALUES)
+    (joint,) = SERVO.mechanism.joints
+    record = own.records[0]
+    duty = np.clip(SERVO_VALUES["k_p"] * (record["goal"] - record["angle"]), -1.0, 1.0)
+    weight = SERVO_VALUES["m"] * 9.81 * SERVO_VALUES["l"] * np.sin(record["angle"])
+    load = SERVO_VALUES["k_v"] * duty + weight
+    inside = slice(500, -500)
+    error = joint_motion(motion, joint, SERVO_VALUES).load - load
+    assert np.std(error[inside]) < 0.05 * np.std(load)

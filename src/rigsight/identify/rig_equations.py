@@ -137,7 +137,7 @@ class RigEquations:
     def at_places(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
         """Return motion and forces of joints and drives, shape (n_samples,) each."""
         # ``motion@J`` (from rest), ``rate@J``, ``spring@J``, ``damper@J``, ``own@J`` (other resisting forces) of a joint,
-        # ``signal@D`` and ``force@D`` of a drive, ``output@D``, ``error@D`` and ``command@D`` of its controller.
+        # ``signal@D`` and ``force@D`` of a drive, ``error@D`` and ``command@D`` of its controller.
         rows = self._evaluated(self._of_places[1], z, u, p)
         return dict(zip(self._of_places[0], rows, strict=True))
 
@@ -277,7 +277,6 @@ class RigEquations:
             wanted |= {f"signal@{drive.name}": drive.signal, f"force@{drive.name}": drive.force}
         for name, law in self.rig.controllers.items():
             wanted |= {
-                f"output@{name}": law.output,
                 f"error@{name}": law.error,
                 f"command@{name}": law.command,
             }

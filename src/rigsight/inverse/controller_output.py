@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -14,12 +16,13 @@ from rigsight.effects import Effect, State
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.identify.rig_equations import FUNCTIONS
+from rigsight.rigs import Controller
 
 Floats = NDArray[np.float64]
 
 _SUBSTEPS = 4
 """Steps in the time constant of a state that follows a nonlinear law."""
-_OF_NUMBERS = {"positive_part": lambda x: max(x, 0.0), "sign": lambda x: (x > 0.0) - (x < 0.0)}
+_OF_NUMBERS = {"positive_part": lambda x: max(x, 0.0)}
 """Kinks of single numbers, many times as fast as those of arrays."""
 _READ = (canonical.output, canonical.error, canonical.command)
 
@@ -31,6 +34,13 @@ class ControllerSignals:
     output: Floats
     error: Floats
     command: Floats
+
+
+def limits_of(law: Controller, numbers: Mapping[str, float]) -> Callable[[Floats], Floats]:
+    """Return the signal of a drive as a function of the output of its controller."""
+    known = {sp.Symbol(name, real=True): value for name, value in numbers.items()}
+    limited = _compiled(law.limited(canonical.output).xreplace(known), (canonical.output,))
+    return lambda output: np.asarray(limited(output), dtype=np.float64)
 
 
 def changed_output(effect: Effect, own: Mapping[str, float], signals: ControllerSignals, dt: float) -> Floats:
@@ -47,37 +57,35 @@ def changed_output(effect: Effect, own: Mapping[str, float], signals: Controller
     dt
         Sample time [s].
     """
-    numbers = {sp.Symbol(name, real=True): value for name, value in own.items()}
+    parts, symbols = (signals.output, signals.error, signals.command), _symbols(own)
     if effect.command_delay is not None:
-        rows, command = np.arange(signals.command.size, dtype=np.float64), signals.command
-        late = float(effect.command_delay.xreplace(numbers))
-        return np.asarray(signals.output - command + np.interp(rows - late / dt, rows, command))
-    courses = [_course(state, numbers, signals, dt) for state in effect.states]
-    symbols = tuple(state.symbol for state in effect.states)
-    law = (
-        effect.control
-        if effect.control is not None
-        else canonical.output - canonical.command + effect.command
-    )
-    changed = _compiled(law.xreplace(numbers), (*symbols, *_READ))(*courses, *_arrays(signals))
+        late = float(_compiled(effect.command_delay, symbols)(*own.values()))
+        rows = np.arange(signals.command.size, dtype=np.float64)
+        followed = np.interp(rows - late / dt, rows, signals.command)
+        return np.asarray(signals.output - signals.command + followed)
+    courses = [_course(state, own, parts, dt) for state in effect.states]
+    law = effect.control
+    if law is None:
+        law = canonical.output - canonical.command + effect.command
+    arguments = (*(state.symbol for state in effect.states), *_READ, *symbols)
+    changed = _compiled(law, arguments)(*courses, *parts, *own.values())
     return np.array(np.broadcast_to(changed, signals.output.shape), dtype=np.float64)
 
 
 def _course(
-    state: State, numbers: Mapping[sp.Symbol, float], signals: ControllerSignals, dt: float
+    state: State, own: Mapping[str, float], parts: tuple[Floats, Floats, Floats], dt: float
 ) -> Floats:
     """Return a state along a record; it begins where it would stay at the first sample, or at zero."""
-    rate = state.rate.xreplace(numbers)
-    slope = derivative(rate, state.symbol)
-    if not slope.is_number:
-        function = sp.lambdify((state.symbol, *_READ), rate, [_OF_NUMBERS, "math"])
-        return _stepped(function, signals, dt, min(numbers.values()))
-    push = np.broadcast_to(
-        _compiled(rate.xreplace({state.symbol: sp.S.Zero}), _READ)(*_arrays(signals)), signals.output.shape
-    )
-    if slope == 0:
+    symbols, numbers = _symbols(own), own.values()
+    slope = _slope(state.rate, state.symbol)
+    if not slope.free_symbols <= set(symbols):
+        function = _compiled(state.rate, (state.symbol, *_READ, *symbols), of_numbers=True)
+        return _stepped(function, parts, dt, own)
+    s = float(_compiled(slope, symbols)(*numbers))
+    rate = _compiled(state.rate, (state.symbol, *_READ, *symbols))(0.0, *parts, *numbers)
+    push = np.broadcast_to(rate, parts[0].shape)
+    if s == 0.0:
         return np.concatenate([[0.0], np.cumsum(0.5 * dt * (push[1:] + push[:-1]))])
-    s = float(slope)
     kept = np.exp(s * dt)
     # The integral of exp(s (dt - t)) times the two ends of a push that is linear between samples.
     of_end = (kept - 1.0 - s * dt) / (s**2 * dt)
@@ -87,22 +95,33 @@ def _course(
     return np.concatenate([[-push[0] / s], later])
 
 
-def _stepped(rate: Callable[..., float], signals: ControllerSignals, dt: float, shortest: float) -> Floats:
+def _stepped(
+    rate: Callable[..., float], parts: tuple[Floats, Floats, Floats], dt: float, own: Mapping[str, float]
+) -> Floats:
     """Return a state that follows the command by a nonlinear law, in steps of a part of the shortest time of this law."""
-    steps = _SUBSTEPS * max(1, int(np.ceil(dt / shortest)))
-    rows = list(zip(*(own.tolist() for own in _arrays(signals)), strict=True))
+    steps, numbers = _SUBSTEPS * max(1, int(np.ceil(dt / min(own.values())))), tuple(own.values())
+    rows = list(zip(*(part.tolist() for part in parts), strict=True))
     value, course = rows[0][-1], []
     for row in rows:
         course.append(value)
         for _ in range(steps):
-            value += dt / steps * rate(value, *row)
+            value += dt / steps * rate(value, *row, *numbers)
     return np.array(course)
 
 
-def _arrays(signals: ControllerSignals) -> tuple[Floats, Floats, Floats]:
-    return signals.output, signals.error, signals.command
+def _symbols(own: Mapping[str, float]) -> tuple[sp.Symbol, ...]:
+    return tuple(sp.Symbol(name, real=True) for name in own)
 
 
-def _compiled(expression: sp.Expr, arguments: tuple[sp.Symbol, ...]) -> Callable[..., Floats]:
-    compiled: Callable[..., Floats] = sp.lambdify(arguments, expression, [FUNCTIONS, "numpy"])
+@lru_cache(maxsize=64)
+def _slope(rate: sp.Expr, state: sp.Symbol) -> sp.Expr:
+    return derivative(rate, state)
+
+
+@lru_cache(maxsize=256)
+def _compiled(
+    expression: sp.Expr, arguments: tuple[sp.Symbol, ...], of_numbers: bool = False
+) -> Callable[..., Any]:
+    modules = [_OF_NUMBERS, "math"] if of_numbers else [FUNCTIONS, "numpy"]
+    compiled: Callable[..., Any] = sp.lambdify(arguments, expression, modules)
     return compiled

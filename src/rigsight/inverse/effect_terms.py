@@ -19,7 +19,7 @@ from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
-from rigsight.inverse.controller_terms import lost_by_controller, of_controller
+from rigsight.inverse.controller_terms import ControlledMotion, controlled_motion, of_controller
 from rigsight.inverse.drive_terms import late_drive, lost, of_given, of_required
 from rigsight.inverse.equation_fit import EquationFit, generalized
 from rigsight.inverse.joint_force import JointMotion, joint_motion
@@ -62,6 +62,7 @@ class EffectTerms:
     def __init__(self, fit: EquationFit, values: Mapping[str, float], scales: Mapping[str, float]) -> None:
         self.fit, self.values, self.scales = fit, values, scales
         self._moved: dict[str, list[JointMotion]] = {}
+        self._controllers: dict[str, list[ControlledMotion]] = {}
         self._of_lateness: dict[tuple[str, float], tuple[Floats, ...] | None] = {}
 
     def of(self, effect: Effect) -> Iterator[Term]:
@@ -95,7 +96,9 @@ class EffectTerms:
                 yield from of_required(effect, self.fit, self.values, self.scales)
             yield from of_given(effect, self.fit, self.values, self.scales, points)
         elif effect.place is Place.CONTROLLER:
-            yield from of_controller(effect, self.fit, self.values, self.scales, points)
+            if self.fit.motions[0].equations.n_coordinates:
+                controlled = self._controlled(effect)
+                yield from of_controller(effect, controlled, self.scales, points, bool(self.fit.gains))
         elif is_joint_force(effect) and not _is_resonance(effect):
             moved = self._motion_of(effect)
             yield from _of_joint(effect, self.fit, self.values, self.scales, moved, points)
@@ -129,7 +132,7 @@ class EffectTerms:
             drive = next(drive for drive in fit.rig.mechanism.drives if drive.name == fit.rig.acts_at(effect))
             rows = [lost(drive, effect, own, fit, m, values) for m in motions]
         elif effect.place is Place.CONTROLLER:
-            rows = [lost_by_controller(effect, own, fit, m, values) for m in motions]
+            rows = [moved.lost(effect, own) for moved in self._controlled(effect)]
         else:
             along = zip(motions, self._motion_of(effect), strict=True)
             rows = [generalized(m, effect, own, values, moved) for m, moved in along]
@@ -184,6 +187,12 @@ class EffectTerms:
         if not self.fit.motions[0].equations.n_states:
             return [np.zeros(0) for _ in self.fit.motions]
         return [motion.by_motion(self.values) for motion in self.fit.motions]
+
+    def _controlled(self, effect: Effect) -> list[ControlledMotion]:
+        drive = self.fit.rig.acts_at(effect)
+        if drive not in self._controllers:
+            self._controllers[drive] = [controlled_motion(m, drive, self.values) for m in self.fit.motions]
+        return self._controllers[drive]
 
     def _motion_of(self, effect: Effect) -> list[JointMotion]:
         joint = joint_of(self.fit.rig, effect)

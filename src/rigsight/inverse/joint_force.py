@@ -104,7 +104,10 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
     places = equations.at_places(motion.z, motion.u, p)
     x, v = places[f"motion@{joint.name}"], places[f"rate@{joint.name}"]
     along = equations.slopes_along(motion.z, motion.u, p)[joint.name] if equations.n_coordinates else None
-    load, driven = (_along_motion(motion, part, numbers) for part in _carried(rig, joint))
+    still = {c.rate: sp.S.Zero for c in rig.mechanism.coordinates}
+    own = joint.stiffness * (joint.motion - joint.rest) + joint.force.xreplace(still)
+    driven = motion.along(rig.mechanism.driven_by(joint), values)
+    load = driven + motion.along(rig.mechanism.resisted_by(joint) + own, values)
     if along is None:
         # Of a joint along the prescribed coordinates themselves.
         acceleration = np.gradient(v, record.dt)
@@ -126,32 +129,6 @@ def joint_motion(motion: RecordMotion, joint: Joint, values: Mapping[str, float]
         load,
         driven,
     )
-
-
-def _carried(rig: Rig, joint: Joint) -> tuple[sp.Expr, sp.Expr]:
-    """Return what a joint carries, and the part of the drives, both with the drives as they are recorded."""
-    drives = {sp.Symbol(d.name, real=True): d.signal for d in rig.mechanism.drives}
-    still = {c.rate: sp.S.Zero for c in rig.mechanism.coordinates}
-    own = joint.stiffness * (joint.motion - joint.rest) + joint.force.xreplace(still)
-    carried, driven = rig.mechanism.carried_by(joint) + own, rig.mechanism.driven_by(joint)
-    return carried.xreplace(drives), driven.xreplace(drives)
-
-
-def _along_motion(motion: RecordMotion, carried: sp.Expr, numbers: Mapping[str, float]) -> Floats:
-    """Return an expression of the rig along a motion, shape (n_samples,)."""
-    rig, equations = motion.equations.rig, motion.equations
-    signals: dict[str, Any] = dict(numbers)
-    for i, c in enumerate(rig.mechanism.free):
-        signals |= {c.symbol.name: motion.z[i], c.rate.name: motion.z[equations.n_coordinates + i]}
-    for i, c in enumerate(rig.mechanism.prescribed):
-        signals |= {c.symbol.name: motion.u[3 * i], c.rate.name: motion.u[3 * i + 1]}
-    for signal in rig.inputs:
-        signals[signal.name] = motion.record[signal.name]
-    names = sorted(symbol.name for symbol in carried.free_symbols)
-    if not set(names) <= signals.keys():
-        return np.full(motion.record.n_samples, np.nan)
-    function = sp.lambdify([sp.Symbol(name, real=True) for name in names], carried, "numpy")
-    return np.asarray(np.broadcast_to(function(*(signals[name] for name in names)), motion.record.n_samples))
 
 
 def effect_force(effect: Effect, values: Mapping[str, float], motion: JointMotion) -> Floats:

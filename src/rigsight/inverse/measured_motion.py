@@ -7,15 +7,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import butter, sosfiltfilt
 
-from rigsight.identify.rig_equations import RigEquations, equations_of
+from rigsight.identify.rig_equations import FUNCTIONS, RigEquations, equations_of
 from rigsight.identify.start.measured_states import measured_states, sensor_factors
 from rigsight.inverse.smooth_signals import shifted, slope
 from rigsight.records import Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, reading_symbol
 from rigsight.simulate.prescribed_motion import accelerated_motion, smooth_motion
 
 Floats = NDArray[np.float64]
@@ -123,6 +124,35 @@ class RecordMotion:
         drives = equations.rig.mechanism.drives
         driven = sum((along[d.name] * given[f"force@{d.name}"] for d in drives), np.zeros_like(inertia))
         return np.asarray(inertia), np.asarray(driven)
+
+    def along(self, expression: sp.Expr, values: Mapping[str, float]) -> Floats:
+        """Return an expression of the rig along the motion, with inputs and readings as they are recorded, shape (n_samples,).
+
+        It is not a number where it reads what the record does not hold.
+
+        Parameters
+        ----------
+        expression
+            As declared, without forces of joints.
+        values
+            Constants and parameters by name.
+        """
+        mechanism, record, n = self.equations.rig.mechanism, self.record, self.equations.n_coordinates
+        drives = {sp.Symbol(drive.name, real=True): drive.signal for drive in mechanism.drives}
+        declared = mechanism.written_out(mechanism.written_out(expression).xreplace(drives))
+        numbers = {**values, **record.constants}
+        signals: dict[sp.Symbol, Floats | float] = {sp.Symbol(k, real=True): v for k, v in numbers.items()}
+        signals |= {sp.Symbol(name, real=True): record[name] for name in mechanism.inputs}
+        signals |= {reading_symbol(s.name): record[s.name] for s in mechanism.sensors if s.name in record}
+        for i, c in enumerate(mechanism.free):
+            signals |= {c.symbol: self.z[i], c.rate: self.z[n + i]}
+        for i, c in enumerate(mechanism.prescribed):
+            signals |= {c.symbol: self.u[3 * i], c.rate: self.u[3 * i + 1]}
+        read = tuple(sorted(declared.free_symbols, key=str))
+        if not signals.keys() >= set(read):
+            return np.full(record.n_samples, np.nan)
+        found = sp.lambdify(read, declared, [FUNCTIONS, "numpy"])(*(signals[symbol] for symbol in read))
+        return np.array(np.broadcast_to(found, record.n_samples), dtype=np.float64)
 
     def with_reading_changed(
         self, name: str, change: Floats, values: Mapping[str, float]

@@ -63,10 +63,10 @@ def search_places(context: FitContext, model: FittedModel, effects: Sequence[Eff
     examined = {place.name for place in places if place.examined}
     at_places = [effect for effect in effects if context.rig.acts_at(effect) in examined]
     # What is late in one place makes all readings behind it late: fits tell the places apart, if the records do.
-    is_late = max(own_shares, key=own_shares.__getitem__, default="") in {
-        e.name for e in at_places if _is_late(e)
-    }
-    first = [e for e in effects if _stands_for_itself(e) or e in at_places or (is_late and _is_late(e))]
+    suspected = max(own_shares, key=own_shares.__getitem__, default="")
+    is_late = any(_is_late(effect) for effect in effects if effect.name == suspected)
+    everywhere = [effect for effect in effects if is_late and _is_late(effect)]
+    first = [e for e in effects if _stands_for_itself(e) or e in at_places or e in everywhere]
     return Search(
         tuple(places),
         tuple(first),

@@ -38,7 +38,7 @@ from rigsight.diagnose.search.starts import sized, start_values
 from rigsight.effects import Effect, Place, kind_of, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
-from rigsight.inverse.controller_output import ControllerSignals, changed_output
+from rigsight.inverse.controller_output import ControllerSignals, changed_output, limits_of
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
@@ -258,14 +258,15 @@ class Shortlist:
         ]
 
     def _controlled(self, effect: Effect, own: Mapping[str, float]) -> list[Floats]:
-        """Return what an effect adds to the output of its controller along each record."""
-        rig = self._context.rig
-        columns = list(controller_columns(rig)[rig.acts_at(effect)])
+        """Return what an effect of a controller adds to the signal of its drive along each record."""
+        rig, found = self._context.rig, []
+        drive = rig.acts_at(effect)
         numbers = {p.name: own[p.name] for p in effect.parameters}
-        found = []
         for record, out in zip(self._responses.records, self._responses.calm_outputs, strict=True):
-            signals = ControllerSignals(*out[:, columns].T)
-            found.append(changed_output(effect, numbers, signals, record.dt) - signals.output)
+            signals = ControllerSignals(*out[:, list(controller_columns(rig)[drive])].T)
+            limits = limits_of(rig.controllers[drive], {**self._responses.values, **record.constants})
+            changed = changed_output(effect, numbers, signals, record.dt)
+            found.append(limits(changed) - limits(signals.output))
         return found
 
     def _beside(self, place: str, effect: Effect, index: int) -> list[Floats]:
