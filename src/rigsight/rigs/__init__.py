@@ -9,7 +9,6 @@ from rigsight.rigs.built_in import is_built_in_motion as is_built_in_motion
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.built_in import rotational as rotational
 from rigsight.rigs.controller import Controller as Controller
-from rigsight.rigs.controller import controller_of as controller_of
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.mechanism import has_short_inverse as has_short_inverse
 from rigsight.rigs.one_motion import Follower as Follower

@@ -1,8 +1,8 @@
 """Insertion of effects into the equations of a rig: one pass along its places, which builds an `EquationTree`.
 
-At a drive: ``controller -> limits -> delays -> static effects and lags -> generalized force``; the controller of a position drive
-comes last, because its law is the force. At a joint: ``motion -> effects on deflection ->
-spring -> effects on its torque``, and other torques in parallel. At a sensor: ``reading -> effects -> delays``.
+At a drive: ``signal -> delays -> static effects and lags -> generalized force``. Its controller comes before that, or last where
+the law is the force (`rigsight.simulate.equations.controller_path`). At a joint: ``motion -> effects on deflection -> spring ->
+effects on its torque``, and other torques in parallel. At a sensor: ``reading -> effects -> delays``.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import sympy as sp
 from rigsight.effects import Effect, Energy, Place
 from rigsight.effects import symbols as canonical
 from rigsight.effects.symbols import derivative
-from rigsight.rigs import Controller, Drive, Joint, Rig, Sensor, controller_of, force_symbol, reading_symbol
+from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
 from rigsight.simulate.equations.binder import Binder, DefinedSignals
+from rigsight.simulate.equations.controller_path import ControllerPath
 from rigsight.simulate.equations.structure import ahead_name, bandwidth_name, input_symbols
 from rigsight.simulate.equations.tree import (
     EquationsOfMotion,
@@ -172,64 +173,23 @@ class _Path:
 
     def _drive(self, drive: Drive) -> list[FirstOrderState]:
         """Chain the effects of a drive and of its controller: the one that computes its signal acts before it."""
-        changes = self._at(drive.name, Place.CONTROLLER)
-        controller = controller_of(self._rig.mechanism, drive) if changes else None
         lags: list[FirstOrderState] = []
-        if controller is None or controller.in_force:
-            source = self._defined.bound(drive.signal)
-        else:
-            source = controller.limited(self._controlled(drive, controller, changes, None, lags))
-        source = self._sent(drive, self._defined.name(Kind.DRIVE, drive.name, source), lags)
-        if controller is not None and controller.in_force:
-            source = self._controlled(drive, controller, changes, source, lags)
+        changes = self._at(drive.name, Place.CONTROLLER)
+        if not changes:
+            source = self._sent(drive, self._defined.bound(drive.signal), lags)
+            self._defined.stands_for(sp.Symbol(drive.name, real=True), source)
+            return lags
+        law, n_inputs = self._rig.controllers[drive.name], len(self._rig.mechanism.inputs)
+        path = ControllerPath(self._binder, self._defined, n_inputs, drive, law, changes)
+        source = self._defined.bound(drive.signal) if law.in_force else path.signal()
+        source = self._sent(drive, source, lags)
+        source = path.goal_for(source) if law.in_force else source
         self._defined.stands_for(sp.Symbol(drive.name, real=True), source)
-        return lags
-
-    def _controlled(
-        self,
-        drive: Drive,
-        controller: Controller,
-        effects: Sequence[Effect],
-        goal: sp.Expr | None,
-        states: list[FirstOrderState],
-    ) -> sp.Expr:
-        """Return the output of a controller with its effects; for a law in the force, the signal of the drive that gives it."""
-        own = {} if goal is None else {sp.Symbol(drive.name, real=True): goal}
-        parts = [
-            self._defined.bound(part).xreplace(own)
-            for part in (controller.output, controller.error, controller.command)
-        ]
-        law = parts[0]
-        for effect in effects:
-            if effect.command_delay is not None:
-                delay = self._binder.effect(effect, effect.command_delay, {})
-                arriving = self._late_inputs(parts[0].free_symbols, effect, delay)
-                parts = [part.xreplace(arriving) for part in parts]
-        output, error, command = parts
-        for effect in effects:
-            if effect.command is not None:
-                states += self._defined.states(effect, {"command": command})
-                followed = self._binder.effect(effect, effect.command, {"command": command})
-                followed = self._defined.define(Kind.DRIVE, effect, followed)
-                output, error, command = output + followed - command, error + followed - command, followed
-        for effect in effects:
-            if effect.control is not None:
-                signals = {"output": output, "error": error, "command": command}
-                states += self._defined.states(effect, signals)
-                changed = self._binder.effect(effect, effect.control, signals)
-                output = self._defined.define(Kind.DRIVE, effect, changed)
-        return output if goal is None else goal + output - law
-
-    def _late_inputs(self, read: set[sp.Symbol], effect: Effect, delay: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-        """Return the inputs that a law reads with what stands for each where it arrives late."""
-        symbols = (input_symbols(index)[0] for index in range(len(self._rig.mechanism.inputs)))
-        return {
-            value: self._defined.define(Kind.DRIVE, effect, late(value, delay), of=" " * number)
-            for number, value in enumerate(value for value in symbols if value in read)
-        }
+        return [*path.states, *lags]
 
     def _sent(self, drive: Drive, source: sp.Expr, lags: list[FirstOrderState]) -> sp.Expr:
         """Chain the actuator effects, delays first, because static effects and lags may as well act on the delayed signal."""
+        source = self._defined.name(Kind.DRIVE, drive.name, source)
         effects = self._at(drive.name, Place.ACTUATOR)
         for effect in effects:
             if effect.delay is not None:
