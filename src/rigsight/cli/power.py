@@ -78,7 +78,7 @@ def _table(found: Power) -> Table:
     from rich.markup import escape
     from rich.table import Table
 
-    from rigsight.report.wording import unit_text
+    from rigsight.report.wording import effect_label, unit_text
 
     table = Table("Effect", "Where", "Named from", box=box.SIMPLE)
     for size in found.sizes:
@@ -87,5 +87,5 @@ def _table(found: Power) -> Table:
             for name, (value, unit) in size.parameters.items()
         ]
         words = values[0] + (f" (with {', '.join(values[1:])})" if values[1:] else "") if values else ""
-        table.add_row(size.effect.replace("_", " "), escape(size.where), escape(words or size.reason))
+        table.add_row(effect_label(size.effect), escape(size.where), escape(words or size.reason))
     return table

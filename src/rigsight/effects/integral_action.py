@@ -9,6 +9,8 @@ r_i: reciprocal of the integral time [1/s]; the effect vanishes at 0.
 Applies to servos that hold a load without a lasting error: PI and PID position controllers. It shows where weight or friction
 would keep the joint off its goal.
 
+An integral faster than the motion makes the loop unstable: starts are below the reciprocal of its time.
+
 Signature: the error at standstill creeps to zero; phase of the closed loop falls below its bandwidth.
 
 References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), chapter 3.
@@ -35,7 +37,7 @@ INTEGRAL_ACTION = Effect(
             lower=0.0,
             upper=1e12,
             null=0.0,
-            starts=(0.1, 1.0),
+            starts=(0.1, 0.3),
             search=(0.0, 20.0),
         ),
     ),

@@ -11,6 +11,8 @@ T_f: time constant of the filter of the rate [s]; it acts like mass.
 Applies to PID controllers of which only the proportional gain is known. Beside free damping, feed-forward of the velocity with
 integral action is the same.
 
+An integral faster than the motion makes the loop unstable: starts are below the reciprocal of its time.
+
 Signature: no lasting error at standstill, and less lag behind fast goals.
 
 References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), chapter 3.
@@ -37,7 +39,7 @@ PID_ACTION = Effect(
             lower=0.0,
             upper=1e12,
             null=0.0,
-            starts=(0.1, 1.0),
+            starts=(0.1, 0.3),
             search=(0.0, 20.0),
         ),
         Parameter(

@@ -10,6 +10,8 @@ r_v: reciprocal of the integral time of the speed loop [1/s]; the effect vanishe
 Applies to drives with a position loop around a PI speed loop, as industrial servos have. Without damping in the law it is the
 same as integral action, and is not offered.
 
+An integral faster than the motion makes the loop unstable: starts are below the reciprocal of its time.
+
 Signature: stiff against slow loads; a resonance at the bandwidth of the speed loop.
 
 References: H. Gross, J. Hamann and G. Wiegartner, *Electrical Feed Drives in Automation* (Publicis 2001), chapter 5.
@@ -36,7 +38,7 @@ SPEED_LOOP_INTEGRAL = Effect(
             lower=0.0,
             upper=1e12,
             null=0.0,
-            starts=(0.3, 3.0),
+            starts=(0.3, 0.1),
             search=(0.0, 50.0),
         ),
     ),

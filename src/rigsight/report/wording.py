@@ -19,13 +19,22 @@ from rigsight.report.quantities import gap_percent
 
 TIMES = "\u00d7"
 _WITHOUT_EFFECT = "no effect, refitted parameters"
-_PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck", "iwan": "Iwan"}
+_PROPER_NAMES = {
+    "bouc wen": "Bouc-Wen",
+    "coulomb": "Coulomb",
+    "stribeck": "Stribeck",
+    "iwan": "Iwan",
+    "maxwell": "Maxwell",
+    "lugre": "LuGre",
+    "pid ": "PID ",
+}
 _SEPARATES = 1.0
 """RMS difference in standard deviations of the noise below which an experiment does not help."""
 _DECIDES = 100.0
 """RMS difference in standard deviations of the noise above which a larger one decides no more: models err by more than noise."""
 _PLACES = {
     "actuator": "at the actuator",
+    "controller": "at the controller",
     "sensor": "at the sensor",
     "disturbance": "as a disturbance from outside",
     "lateral_dynamics": "in the lateral dynamics",
