@@ -41,7 +41,7 @@ def index_page() -> str:
         [
             "# The catalogue of effects",
             "",
-            f"A diagnosis can name these {len(CATALOGUE)} effects, and up to three of them at once. Each page is generated from "
+            f"A diagnosis can name these {len(CATALOGUE)} effects, and up to five of them at once. Each page is generated from "
             "the file that declares the effect: the equation shown is the one that is simulated and fitted.",
             "",
             "| effect | where it acts | description |",

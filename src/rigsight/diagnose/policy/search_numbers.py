@@ -210,7 +210,7 @@ class SearchNumbers:
     most_effects: int = number(
         3,
         "convention",
-        "Number of effects that a model has at most: no blind trial hides more.",
+        "Number of effects up to which the search adds one at a time; sets that are selected along the motion may be larger.",
     )
     finest_steps: int = number(
         4,
