@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.identify.rig_equations import equations_of
 from rigsight.records.record import Hold, Record
-from rigsight.rigs import RIGS, Rig, has_short_inverse, mechanism
+from rigsight.rigs import RIGS, Rig, has_short_inverse, mechanism, rig_of_tables
 from rigsight.simulate import (
     Structure,
     carries_tangents,
@@ -26,6 +27,8 @@ from rigsight.simulate import (
     simulate_sets,
     simulate_tangents,
 )
+from rigsight.simulate.compiled import kernel_source
+from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.equations.elimination import Elimination
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.straight_line import straight_line
@@ -209,3 +212,31 @@ def test_an_inertia_that_is_no_formula_is_told(monkeypatch: pytest.MonkeyPatch) 
     reported = replace(rig, mechanism=replace(rig.mechanism, joints=joints))
     assert reported.offers(placed(reading, "elbow"))
     assert compose(reported, [placed(reading, "elbow")]).elimination is not None
+
+
+@pytest.mark.parametrize(("n_links", "integrated"), [(3, True), (4, False)])
+def test_derivatives_of_long_arms_are_differences(
+    monkeypatch: pytest.MonkeyPatch, n_links: int, integrated: bool
+) -> None:
+    monkeypatch.setattr(mechanism, "MOST_COUPLED", 1)
+    links = [f"a{i}" for i in range(n_links)]
+    moved = [f"d({link})^2" for link in links]
+    coupled = [f"d({one})*d({two})*cos({one} - {two})/4" for one, two in pairwise(links)]
+    arm = rig_of_tables(
+        {
+            "name": "chain",
+            "summary": "Links that move one another.",
+            "inputs": {"u": {"unit": "N m", "about": "torque"}},
+            "coordinates": {link: {"unit": "rad"} for link in links},
+            "constants": {"J": {"unit": "kg m^2", "about": "inertia", "default": 1.0}},
+            "parameters": {"d": {"unit": "N m s/rad", "about": "damping", "default": 1.0}},
+            "energy": {"kinetic": f"J*({' + '.join([*moved, *coupled])})/2"},
+            "joints": {link: {"motion": link, "damping": "d"} for link in links},
+            "drives": {"motor": {"signal": "u", "force": "motor", "along": links[0]}},
+            "sensors": {"y": {"reads": links[-1], "unit": "rad"}},
+        },
+        "chain",
+    )
+    structure = compose(arm)
+    assert structure.elimination is not None
+    assert kernel_source.carries_tangents(KernelEquations(structure)) == integrated

@@ -48,7 +48,7 @@ class Binder:
 
     def rig(self, expression: sp.Expr) -> sp.Expr:
         """Bind an expression of the rig's declaration."""
-        return expression.xreplace({s: self._own[s] for s in expression.free_symbols if s in self._own})
+        return expression.xreplace(self._own)
 
     def effect(self, effect: Effect, expression: sp.Expr, signals: Mapping[str, sp.Expr]) -> sp.Expr:
         """Bind an expression of an effect; `signals` are the expressions of the canonical symbols, by name."""
@@ -86,8 +86,10 @@ class DefinedSignals:
 
     def bound(self, expression: sp.Expr) -> sp.Expr:
         """Bind an expression of the rig, with drives and sensors after their effects."""
+        # Asked once: sympy walks through the whole expression, which is long on an arm of six joints.
+        read = expression.free_symbols
         for symbol, signal in self._signals.items():
-            if symbol in expression.free_symbols and symbol not in self._values:
+            if symbol in read and symbol not in self._values:
                 self._values[symbol] = self.name(Kind.SIGNAL, symbol.name, self.bound(signal))
         return self.binder.rig(expression).xreplace(self._values)
 
