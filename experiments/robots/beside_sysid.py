@@ -10,26 +10,25 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from blind_in_mujoco import DT, NOISE, STEP, drawn, write_records
+from blind_in_mujoco import DT, NOISE, drawn, write_records
 from mujoco import sysid
 from numpy.typing import NDArray
 
 from rigsight.robots import sensor_readings
 
-HELD = round(DT / STEP)
-"""Steps of MuJoCo for which a control is held."""
+RUNS = ("run_1", "run_2", "valid")
 
 
 def records_of(folder: Path, model: mujoco.MjModel) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Return controls and readings of each record, shape (n, n_controls) and (n, n_sensors)."""
     found = []
-    for name in ("run_1", "run_2", "valid"):
+    for name in RUNS:
         columns = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
         found.append((columns[:, 1 : 1 + model.nu], columns[:, 1 + model.nu :]))
     return found
 
 
-def fitted(xml: str, folder: Path, fields: tuple[str, ...]) -> tuple[mujoco.MjModel, float]:
+def fitted(xml: str, folder: Path, fields: tuple[str, ...], dt: float = DT) -> tuple[mujoco.MjModel, float]:
     """Return the model with fields of all joints fitted to the estimation records, and the seconds that took."""
     spec = mujoco.MjSpec.from_string(xml)
     model = spec.compile()
@@ -50,16 +49,17 @@ def fitted(xml: str, folder: Path, fields: tuple[str, ...]) -> tuple[mujoco.MjMo
     runs = records_of(folder, model)[:2]
     # It stamps a reading with the time at the end of the step that it begins.
     controls, shown, states = [], [], []
+    step = float(model.opt.timestep)
     for goals, readings in runs:
-        held = np.repeat(goals, HELD, axis=0)
+        held = np.repeat(goals, round(dt / step), axis=0)
         controls.append(
             sysid.TimeSeries(
-                STEP * np.arange(len(held)), held, sysid.TimeSeries.compute_all_control_mapping(model)
+                step * np.arange(len(held)), held, sysid.TimeSeries.compute_all_control_mapping(model)
             )
         )
         shown.append(
             sysid.TimeSeries(
-                DT * np.arange(len(goals)) + STEP,
+                dt * np.arange(len(goals)) + step,
                 readings,
                 sysid.TimeSeries.compute_all_sensor_mapping(model),
             )
@@ -89,10 +89,10 @@ def _set(joint: mujoco.MjsJoint, field: str, value: float) -> None:
         setattr(joint, field, value)
 
 
-def error(model: mujoco.MjModel, folder: Path) -> float:
+def error(model: mujoco.MjModel, folder: Path, dt: float = DT) -> float:
     """Return the RMS error on the withheld record in noise floors, the worst of the sensors."""
     goals, readings = records_of(folder, model)[2]
-    left = sensor_readings(model, goals, DT) - readings
+    left = sensor_readings(model, goals, dt) - readings
     return float(np.max(np.sqrt(np.mean(left**2, axis=0)))) / NOISE
 
 

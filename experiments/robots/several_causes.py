@@ -1,4 +1,4 @@
-"""Arms of three joints in MuJoCo with three to five causes at several places: which are named, with which share?"""
+"""Arms of three or six joints in MuJoCo with causes at several places: which are named, with which share?"""
 
 from __future__ import annotations
 
@@ -19,8 +19,12 @@ from rigsight.workflow.diagnose import run_diagnose
 from rigsight.workflow.init import run_init_from_mjcf
 
 Floats = NDArray[np.float64]
-JOINTS = ("turn", "lift", "elbow")
-AXES = ("0 0 1", "0 1 0", "0 1 0")
+JOINTS = ("turn", "lift", "elbow", "roll", "bend", "twist")
+AXES = ("0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
+ASIDE = (0.1, 0.0, 0.0, 0.0, 0.0, 0.05)
+"""How far each link reaches beside the one above [m]."""
+WEAKER = (1.0, 1.0, 0.6, 0.2, 0.2, 0.1)
+"""Gains, damping and rotors of the joints as a share of those of the first two."""
 DT, STEP, SECONDS, NOISE = 0.004, 0.001, 10.0, 2e-4
 """Sample time and MuJoCo's step [s], length of a record [s], noise of an encoder [rad]."""
 AT_JOINT = ("coulomb_friction", "quadratic_damping", "cubic_stiffness", "torque_ripple")
@@ -56,9 +60,13 @@ class Arm:
     reach: Floats
     causes: tuple[Cause, ...]
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return JOINTS[: len(self.lengths)]
+
     def mjcf(self, causes: Sequence[Cause], armature: Floats) -> str:
         """Return the arm as MJCF with the causes that MuJoCo knows."""
-        friction, late, lagging = np.zeros(3), np.zeros(3), np.zeros(3)
+        friction, late, lagging = np.zeros((3, len(self.joints)))
         for cause in causes:
             for effect, sizes in (
                 ("coulomb_friction", friction),
@@ -68,12 +76,12 @@ class Arm:
                 if cause.effect == effect:
                     sizes[cause.joint] = cause.size
         bodies, actuators, sensors = "", "", ""
-        for i, name in enumerate(JOINTS):
+        for i, name in enumerate(self.joints):
             at = f"0 0 {-self.lengths[i - 1] if i > 1 else (1.0 if i == 0 else 0.0)}"
             bodies += (
                 f'<body name="link_{i}" pos="{at}"><joint name="{name}" axis="{AXES[i]}" damping="{self.damping[i]}"'
                 f' armature="{armature[i]}" frictionloss="{friction[i]}"/>'
-                f'<geom type="capsule" fromto="{"0 0 0 0.1 0 0" if i == 0 else f"0 0 0 0 0 {-self.lengths[i]}"}"'
+                f'<geom type="capsule" fromto="0 0 0 {ASIDE[i]} 0 {-self.lengths[i] if i else 0}"'
                 f' size="0.02" mass="{self.masses[i]}" contype="0" conaffinity="0"/>'
             )
             delay = f' delay="{late[i]}" nsample="100"' if late[i] else ""
@@ -85,12 +93,12 @@ class Arm:
             sensors += f'<jointpos name="{name}_angle" joint="{name}"/>'
         return (
             f'<mujoco model="arm"><compiler angle="radian"/><option timestep="{STEP}" integrator="RK4"/>'
-            f"<worldbody>{bodies}{'</body>' * 3}</worldbody><actuator>{actuators}</actuator>"
+            f"<worldbody>{bodies}{'</body>' * len(self.joints)}</worldbody><actuator>{actuators}</actuator>"
             f"<sensor>{sensors}</sensor></mujoco>"
         )
 
     def moved(self, causes: Sequence[Cause], controls: Floats) -> Floats:
-        """Return the angles of the arm with these causes, shape (n, 3)."""
+        """Return the angles of the arm with these causes, shape (n, n_joints)."""
 
         def passive(_: mujoco.MjModel, data: mujoco.MjData) -> None:
             for cause in causes:
@@ -129,23 +137,24 @@ class Arm:
         return cause
 
     def controls(self, run: int) -> Floats:
-        """Return sweeps of the goals, shape (n, 3)."""
+        """Return sweeps of the goals, shape (n, n_joints)."""
         t = DT * np.arange(round(SECONDS / DT))
         sweep = 2 * np.pi * (0.2 * t + 1.2 * t**2 / SECONDS) + run
         goals = [
-            (0.6, 1.0, 0.8)[run] * reach * np.sin((1.0, 1.6, 1.3)[i] * sweep + i)
+            (0.6, 1.0, 0.8)[run] * reach * np.sin((1.0, 1.6, 1.3, 0.8, 1.9, 1.1)[i] * sweep + i)
             for i, reach in enumerate(self.reach)
         ]
         return np.column_stack(goals) * np.clip(t / 0.5, 0.0, 1.0)[:, None]
 
 
-def drawn(seed: int) -> Arm:
-    """Draw an arm and three to five causes at it, each of a size that is felt at its joint."""
-    rng = np.random.default_rng([31, seed])
-    spots = [(e, i) for e in AT_JOINT for i in range(3)] + [(e, i) for e in AT_DRIVE for i in range(3)]
-    lengths, masses = rng.uniform(0.2, 0.35, 3), rng.uniform(0.3, 0.9, 3)
-    gains = rng.uniform(15.0, 40.0, 3) * (1.0, 1.0, 0.6)
-    armature = rng.uniform(0.005, 0.03, 3)
+def drawn(seed: int, n_joints: int = 3, n_causes: int | None = None) -> Arm:
+    """Draw an arm and three to five causes at it, or so many, each of a size that is felt at its joint."""
+    rng, n, weaker = np.random.default_rng([31, seed]), n_joints, np.array(WEAKER[:n_joints])
+    light = weaker if n > 3 else np.ones(n)  # a wrist is short and light
+    spots = [(e, i) for e in AT_JOINT for i in range(n)] + [(e, i) for e in AT_DRIVE for i in range(n)]
+    lengths, masses = rng.uniform(0.2, 0.35, n) * np.sqrt(light), rng.uniform(0.3, 0.9, n) * light
+    gains = rng.uniform(15.0, 40.0, n) * weaker
+    armature = rng.uniform(0.005, 0.03, n) * light
     causes: list[Cause] = []
     for at in rng.permutation(len(spots)):
         effect, joint = spots[at]
@@ -160,33 +169,37 @@ def drawn(seed: int) -> Arm:
             "actuator_lag": 0.01,
         }[effect]
         causes.append(Cause(effect, joint, float(size), int(rng.integers(8, 30))))
-        if len(causes) == 3 + seed % 3:
+        if len(causes) == (n_causes or 3 + seed % 3):
             break
     arm = Arm(
         lengths,
         masses,
         gains,
-        rng.uniform(0.1, 0.5, 3),
+        rng.uniform(0.1, 0.5, n) * light,
         armature,
-        armature * rng.uniform(0.5, 1.5, 3),
-        rng.uniform(0.4, 0.7, 3),
+        armature * rng.uniform(0.5, 1.5, n),
+        rng.uniform(0.4, 0.7, n),
         tuple(causes),
     )
     return replace(arm, causes=tuple(arm.sized(cause, rng.uniform(*MOVED)) for cause in causes))
 
 
-def run_arm(seed: int, out: Path, n_jobs: int) -> dict[str, object]:
-    """Diagnose an arm with the whole catalogue and return what came out."""
-    arm, folder = drawn(seed), out / f"arm_{seed:02d}"
+def write_records(arm: Arm, seed: int, folder: Path) -> None:
+    """Write the user's model of an arm and three records of the true one."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "arm.xml").write_text(arm.mjcf((), arm.given), encoding="utf-8")
     rng = np.random.default_rng([32, seed])
-    header = ",".join(["t", *(f"{j}_motor_ctrl" for j in JOINTS), *(f"{j}_angle" for j in JOINTS)])
+    header = ",".join(["t", *(f"{j}_motor_ctrl" for j in arm.joints), *(f"{j}_angle" for j in arm.joints)])
     for run, name in enumerate(("run_1", "run_2", "valid")):
         goals = arm.controls(run)
         angles = arm.moved(arm.causes, goals) + rng.normal(scale=NOISE, size=goals.shape)
         rows = np.column_stack([DT * np.arange(len(goals)), goals, angles])
         np.savetxt(folder / f"{name}.csv", rows, delimiter=",", header=header, comments="")
+
+
+def run_arm(arm: Arm, seed: int, folder: Path, n_jobs: int) -> dict[str, object]:
+    """Diagnose an arm with the whole catalogue and return what came out."""
+    write_records(arm, seed, folder)
     begun = time.perf_counter()
     run_init_from_mjcf(folder, folder / "arm.xml")
     diagnosis = run_diagnose(folder, folder / "results", seed=0, n_jobs=n_jobs)
@@ -228,7 +241,8 @@ def main() -> None:
     for seed in range(*choice.arms):
         result = choice.out / f"arm_{seed:02d}.json"
         if not result.exists():
-            result.write_text(json.dumps(run_arm(seed, choice.out, choice.jobs)), encoding="utf-8")
+            own = run_arm(drawn(seed), seed, choice.out / f"arm_{seed:02d}", choice.jobs)
+            result.write_text(json.dumps(own), encoding="utf-8")
         print(result.read_text(encoding="utf-8"), flush=True)
 
 

@@ -101,6 +101,36 @@ def test_every_field_is_the_one_that_the_effect_means(tmp_path: Path) -> None:
         assert np.std(ours[name] - theirs[:, i]) < 1e-2 * np.std(theirs[:, i])
 
 
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("torque_ripple", {"T_sin": 0.2, "T_cos": -0.15, "kappa": 7.3}),
+        ("presliding_friction", {"T_c": 0.15, "x_p": 0.02}),
+        ("lugre_friction", {"T_c": 0.12, "s": 0.8, "w_s": 0.3, "x_p": 0.02}),
+    ],
+)
+def test_what_mujoco_has_in_motors_alone_is_an_idle_motor(
+    tmp_path: Path, effect: str, values: Mapping[str, float]
+) -> None:
+    # MuJoCo reads the state of a motor one step ahead, so that its friction errs with the step.
+    fine = tmp_path / ARM.name
+    fine.write_text(ARM.read_text("utf-8").replace('timestep="0.001"', 'timestep="0.0002"'), encoding="utf-8")
+    model = model_of({}, {f"{effect}@elbow": values})
+    found = write_back(model, fine)
+    assert found.without_field == ()
+    written, before = mujoco.MjModel.from_xml_string(found.text), mujoco.MjModel.from_xml_path(str(fine))
+    assert written.nu == before.nu
+    controls = sweeping(2000)
+    theirs, without = (run(own, np.repeat(controls, 5, axis=0))[::5, :2] for own in (written, before))
+    inputs = dict(zip((signal.name for signal in model.structure.rig.inputs), controls.T, strict=True))
+    units = {"shoulder_motor_ctrl": "rad", "elbow_drive_ctrl": "N m"}
+    record = Record("sweep", STEP, inputs, units, hold="zoh")
+    ours = simulate(model.structure, model.values, record, np.zeros(len(model.structure.states)))
+    for i, name in enumerate(("angle_1", "angle_2")):
+        changed = np.std(without[:, i] - theirs[:, i])
+        assert np.std(ours[name] - theirs[:, i]) < 3e-3 * changed
+
+
 @pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
 def test_a_delay_that_is_no_whole_number_of_steps_is_kept_on_average(tmp_path: Path, integrator: str) -> None:
     arm = tmp_path / ARM.name

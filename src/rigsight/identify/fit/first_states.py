@@ -103,7 +103,9 @@ def _rig_state(
     """
     p = equations.parameters(values, record)
     u = equations.inputs_of(record.slice(0, min(record.n_samples, _FIRST_SAMPLES)))[1][:, :1]
-    begin = _equilibrium(equations, u, p)
+    begin = _declared(equations, p)
+    if pull > 0.0:
+        begin = _equilibrium(equations, begin, u, p)
     seen = [i for i, name in enumerate(equations.sensor_names) if name in record]
     if not seen or begin.size == 0:
         return begin
@@ -185,12 +187,17 @@ def _without(record: Record, offsets: Mapping[str, float]) -> Record:
     return record.with_signals(**own) if own else record
 
 
-def _equilibrium(equations: RigEquations, u: Floats, p: Floats) -> Floats:
-    """Return the equilibrium under an input closest to the declared start; states without a restoring force stay at the start."""
-    n, state = equations.n_coordinates, np.zeros(equations.n_states)
-    values = dict(zip(equations.structure.names, p, strict=True))
+def _declared(equations: RigEquations, p: Floats) -> Floats:
+    """Return the declared start, zero for states without one."""
+    state, values = np.zeros(equations.n_states), dict(zip(equations.structure.names, p, strict=True))
     for symbol, expression in equations.rig.mechanism.initial.items():
         state[equations.state_names.index(symbol.name)] = evaluated(expression, values)
+    return state
+
+
+def _equilibrium(equations: RigEquations, declared: Floats, u: Floats, p: Floats) -> Floats:
+    """Return the equilibrium under an input closest to the declared start; states without a restoring force stay at the start."""
+    n, state = equations.n_coordinates, declared.copy()
     held = np.ones(state.size, dtype=bool)
     held[n : 2 * n] = False
     resting = np.where(held, state, 0.0)
