@@ -27,15 +27,20 @@ _SYMBOLS = ("t", "u", "psi", "y", "x", "reference", "force")
 _IN_PART = 0.9
 """Below what a unit that fits makes clear: a word that is shared is a hint, no more."""
 _QUANTITIES = {
-    "angle": ("position", "pos", "q"),
-    "slide": ("position", "pos", "q"),
-    "speed": ("velocity", "vel", "qd", "dq"),
-    "velocity": ("speed", "vel", "qd", "dq"),
+    "angle": ("position", "positions", "pos", "q", "state"),
+    "slide": ("position", "positions", "pos", "q", "state"),
+    "speed": ("velocity", "velocities", "vel", "qd", "dq"),
+    "velocity": ("speed", "velocities", "vel", "qd", "dq"),
     "torque": ("effort", "tau", "current"),
     "force": ("effort", "current"),
     "ctrl": ("effort", "command", "commands", "action", "tau", "current"),
 }
 """What a log of a robot calls the quantities of its joints."""
+_COMMANDED = frozenset({
+    "action", "cmd", "command", "commanded", "commands", "desired", "goal", "goals", "reference", "setpoint", "target", "targets",
+})  # fmt: skip
+_MEASURED = frozenset({"actual", "feedback", "measured", "observation", "state", "states"})
+_EFFORTS = frozenset({"current", "effort", "efforts", "tau", "torque"})
 _FILLERS = frozenset({"motor", "joint", "actuator"})
 # A last word without brackets is a unit only if it can hardly be anything else: x_a is no length of years.
 _UNITS_BEHIND = frozenset({
@@ -79,6 +84,8 @@ def closeness(name: str, signal: str) -> float:
     # A name from a rig file: its words may be in another order or among others.
     own, inside = set(asked.split()), set(words.split())
     shared = own & inside
+    if all(word.isdigit() for word in shared):
+        shared = set()
     if shared and "/" in bare:
         # A log of a robot has a group for each quantity, and in it the joints: position/elbow.
         own = own - _FILLERS or own
@@ -86,6 +93,17 @@ def closeness(name: str, signal: str) -> float:
         shared = {word for word in own if inside & {word, *_QUANTITIES.get(word, ())}}
     by_words = 2.0 if own and shared == own else _IN_PART * len(shared) / max(1, len(own))
     return max(by_words, by_other_names)
+
+
+def is_command(name: str) -> bool:
+    """Return True for the channel of a log, which has groups, that is called like a command."""
+    return "/" in name and bool(_COMMANDED & set(_words(name).split()))
+
+
+def is_reading(name: str) -> bool:
+    """Return True for the channel of a log that is called like a reading, and is no effort, which drives as well."""
+    words = set(_words(name).split())
+    return "/" in name and bool(_MEASURED & words) and not (_EFFORTS | _COMMANDED) & words
 
 
 def plain_words(name: str) -> str:

@@ -184,7 +184,8 @@ def proposed_records(
             left_out.append((file.name, "no channel looks like a signal of the rig"))
         else:
             proposals.append(one)
-    return proposals or list(found.values()), left_out if proposals or not found else []
+    used = proposals or list(found.values())
+    return [part for one in used for part in one.each_stretch], left_out if proposals or not found else []
 
 
 def campaign_text(

@@ -16,10 +16,12 @@ from rigsight.records.channel_summary import step_and_gaps
 from rigsight.records.channel_units import has_si, in_drive_unit, is_a
 from rigsight.records.clocks import increases, is_time
 from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
+from rigsight.records.formats.known import LOGS
 from rigsight.records.read_record import TIME
 from rigsight.records.record import Floats
 from rigsight.records.signals import repeated_period
 from rigsight.rigs import Rig
+from rigsight.workflow.campaign.motion_stretches import moving_stretches
 from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, distinguishing, guess_file
 
 # Share of samples that equal the one before: above it the input rests but for a few jumps.
@@ -56,6 +58,18 @@ class Proposal:
     amplitude: float | None
     lines: tuple[str, ...]  # lines of TOML below ``role``, with what must be checked as comments
     n_blanks: int  # how many values are left to be filled in
+    stretches: tuple[tuple[float, float], ...] = ()  # of a log of a robot: those in which it moves [s]
+
+    @property
+    def each_stretch(self) -> tuple[Proposal, ...]:
+        """A record for each stretch of motion; the file itself where it is not divided."""
+        if not self.stretches:
+            return (self,)
+        remark = "# [s], one stretch of motion between pauses; check"
+        return tuple(
+            replace(self, lines=(f"start = {begin:.2f}  {remark}", f"end = {end:.2f}", *self.lines))
+            for begin, end in self.stretches
+        )
 
     def toml(self, role: Role, remark: str = "", hold: str = ASSUMED_HOLD) -> str:
         """Return the ``[[records]]`` entry, for a role that is explained by a remark, with the line on the hold of the input."""
@@ -94,7 +108,20 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     lines += timing
     if columns:
         lines += ["[records.columns]", *columns]
-    return Proposal(name or path.name, guess, kind, amplitude, tuple(lines), timing_blanks + column_blanks)
+    stretches = tuple(_stretches(guess)) if file.format in LOGS else ()
+    return Proposal(
+        name or path.name, guess, kind, amplitude, tuple(lines), timing_blanks + column_blanks, stretches
+    )
+
+
+def _stretches(guess: FileGuess) -> list[tuple[float, float]]:
+    """Return the stretches in which what is known of a robot moves; empty where no command or no reading is known."""
+    n_inputs = len(guess.rig.inputs)
+    driving, read = (
+        [one.channel for one in part if one.channel is not None]
+        for part in (guess.signals[:n_inputs], guess.signals[n_inputs:])
+    )
+    return moving_stretches([*driving, *read]) if driving and read else []
 
 
 def quoted(text: str) -> str:
@@ -149,11 +176,10 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     needed = _needed(guess)
     remaining = _remaining(guess, channels)
     for one in (guess.time, *guess.signals):
-        if one.channel is not None and one.is_alone:
+        if one.channel is not None and one.assumed:
             (line,) = _column(one, guess.clocks)
             mark = "; " if "  # " in line else "  # "
-            why = "it rises throughout" if one.signal == TIME else "the only remaining channel"
-            lines.append(f"{line}{mark}guessed: {why}; check")
+            lines.append(f"{line}{mark}guessed: {one.assumed}; check")
         elif one.channel is not None:
             lines += _column(one, guess.clocks)
         elif one.candidates:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from rigsight.records.channel_names import closeness, split_unit
+from rigsight.records.channel_names import closeness, is_command, is_reading, split_unit
 from rigsight.records.channel_units import DRIVES, has_si, is_a
 from rigsight.records.clocks import own_clocks
 from rigsight.records.formats.channel import Channel
@@ -31,7 +31,7 @@ class Guess:
     unit: str | None = None  # unit of the channel: stated by the file, or else in its name
     is_stated: bool = False  # whether the file itself states the unit, in a place made for it
     candidates: tuple[str, ...] = ()  # names of the channels that match equally well, if there are several
-    is_alone: bool = False  # whether the only reason for the guess is that no other channel remains
+    assumed: str = ""  # the only reason for the guess, where it is not the channel's name
 
     @property
     def is_clear(self) -> bool:
@@ -174,7 +174,7 @@ def _completed_by_unit(
         own, alone = guesses[lacking[0]], remaining[0]
         unit = _unit_of(alone)
         if not own.candidates and (unit is None or not has_si(own.si) or is_a(unit, own.si)):
-            guesses[lacking[0]] = replace(_of_channel(own, alone), is_alone=True)
+            guesses[lacking[0]] = replace(_of_channel(own, alone), assumed="the only remaining channel")
     return tuple(guesses)
 
 
@@ -191,20 +191,62 @@ def _guess_rig(
 ) -> FileGuess:
     time, _ = _guess(TIME, "s", channels, ())
     if rising is not None and not time.is_clear and not time.candidates:
-        time = replace(_of_channel(time, rising), is_alone=True)
+        time = replace(_of_channel(time, rising), assumed="it rises throughout")
     taken = [*times, *([time.channel] if time.channel is not None else [])]
-    signals = (*rig.inputs, *rig.outputs)
+    signals, names = (*rig.inputs, *rig.outputs), _names_of(rig)
     found, score = {}, 0.0
     # Signals with a clear name come first, so that no other signal takes their channel.
     for signal in sorted(
-        signals, key=lambda s: -max((closeness(c.name, s.name) for c in channels), default=0.0)
+        signals, key=lambda s: -max((_closeness(c, names[s.name]) for c in channels), default=0.0)
     ):
-        guess, closest = _guess(signal.name, signal.unit, channels, taken)
+        suited = [c for c in channels if _suits(c, signal.name, signal in rig.inputs)]
+        guess, closest = _guess(signal.name, signal.unit, suited, taken, names[signal.name])
         if guess.channel is not None:
             taken.append(guess.channel)
             score += closest
         found[signal.name] = guess
+    found |= _commands_in_order([found[signal.name] for signal in rig.inputs], channels)
     return FileGuess(rig, time, tuple(found[signal.name] for signal in signals), score / len(signals))
+
+
+def _names_of(rig: Rig) -> dict[str, tuple[str, ...]]:
+    """Return the names of each signal: its own, and in logs of robots the quantity of the coordinate that it reads or moves."""
+    mechanism = rig.mechanism
+    quantities = {c.symbol: f"{c.name} angle" for c in mechanism.coordinates}
+    quantities |= {c.rate: f"{c.name} velocity" for c in mechanism.coordinates}
+    called = {s.name: quantities[s.reads] for s in mechanism.sensors if s.reads in quantities}
+    moved = {c.symbol: f"{c.name} ctrl" for c in mechanism.coordinates}
+    called |= {
+        d.signal.name: moved[d.along] for d in mechanism.drives if d.signal.is_Symbol and d.along in moved
+    }
+    own = (signal.name for signal in (*rig.inputs, *rig.outputs))
+    return {name: (name, called[name]) if name in called else (name,) for name in own}
+
+
+def _closeness(channel: Channel, names: Sequence[str]) -> float:
+    return max(closeness(channel.name, name) for name in names)
+
+
+def _suits(channel: Channel, signal: str, drives: bool) -> bool:
+    """Return False for a command in the place of a reading, and the reverse, unless it has the name of the signal."""
+    wrong = is_reading if drives else is_command
+    return not wrong(channel.name) or channel.short_name == signal
+
+
+def _commands_in_order(inputs: Sequence[Guess], channels: Sequence[Channel]) -> dict[str, Guess]:
+    """Return the inputs as the entries of the only list of commands without names that has as many; empty if there is none."""
+    lists: dict[str, list[Channel]] = {}
+    for channel in channels:
+        if channel.short_name.isdecimal() and is_command(channel.name):
+            lists.setdefault(channel.group, []).append(channel)
+    fitting = [own for own in lists.values() if len(own) == len(inputs)]
+    if len(fitting) != 1 or any(own.is_clear for own in inputs):
+        return {}
+    ordered = sorted(fitting[0], key=lambda channel: int(channel.short_name))
+    return {
+        own.signal: replace(_of_channel(own, channel), assumed="in the order of the drives")
+        for own, channel in zip(inputs, ordered, strict=True)
+    }
 
 
 def _are_of_regression(channels: Sequence[Channel]) -> bool:
@@ -215,12 +257,12 @@ def _are_of_regression(channels: Sequence[Channel]) -> bool:
 
 
 def _guess(
-    signal: str, si: str, channels: Sequence[Channel], taken: Sequence[Channel]
+    signal: str, si: str, channels: Sequence[Channel], taken: Sequence[Channel], names: Sequence[str] = ()
 ) -> tuple[Guess, float]:
-    """Return the possible channels of a signal, and how well they match."""
+    """Return the possible channels of a signal, which may have several names, and how well they match."""
     scores: list[tuple[float, Channel]] = []
     for channel in channels:
-        score = 0.0 if channel in taken else closeness(channel.name, signal)
+        score = 0.0 if channel in taken else _closeness(channel, names or (signal,))
         if score > 0.0:
             unit = _unit_of(channel)
             if unit is not None and has_si(si):

@@ -1,0 +1,71 @@
+"""Where does a robot move in a log? Its stretches of motion between pauses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import label, maximum_filter1d, minimum_filter1d
+
+from rigsight.records.channel_units import factor
+from rigsight.records.formats.channel import Channel, as_floats
+from rigsight.records.record import Floats
+
+_STEP = 0.02
+"""Time step at which channels are compared [s]."""
+_PAUSE, _SHORTEST = 2.0, 1.0
+"""Shortest pause and shortest motion [s]."""
+_LEAD = 0.5
+"""Rest in front of and behind a motion that belongs to its record [s]: it shows the equilibrium."""
+_STILL = 1e-3
+"""Share of its range that a channel may drift in a pause, if its noise is smaller."""
+_WIDTH = 8.0
+"""Width of a band in standard deviations that noise of a pause stays within."""
+_MOST_STEPS = 3_000_000
+
+
+def moving_stretches(channels: Sequence[Channel]) -> list[tuple[float, float]]:
+    """Return begin and end of each stretch of motion [s], by the time of the file; empty with fewer than two."""
+    series = [one for channel in channels if (one := _series(channel)) is not None]
+    if not series:
+        return []
+    begin = max(float(stamps[0]) for stamps, _ in series)
+    end = min(float(stamps[-1]) for stamps, _ in series)
+    if not 2.0 * _SHORTEST + _PAUSE < end - begin < _STEP * _MOST_STEPS:
+        return []
+    grid = np.arange(begin, end, _STEP)
+    resting = np.ones(grid.size, dtype=bool)
+    for stamps, samples in series:
+        resting &= _resting(np.interp(grid, stamps, samples), _noise(samples))
+    numbered, count = label(~resting)
+    places = [np.flatnonzero(numbered == number + 1) for number in range(count)]
+    moved = [(grid[own[0]], grid[own[-1]]) for own in places if own.size * _STEP >= _SHORTEST]
+    if len(moved) < 2:
+        return []
+    return [(max(begin, float(first) - _LEAD), min(end, float(last) + _LEAD)) for first, last in moved]
+
+
+def _series(channel: Channel) -> tuple[Floats, Floats] | None:
+    """Return time [s] and samples of a channel that has a time of its own; None for any other."""
+    if channel.axis is None or channel.n_samples < 2:
+        return None
+    samples, stamps = as_floats(channel.load()), channel.axis.stamps() * factor(channel.axis.unit, "s")
+    usable = np.isfinite(samples) & np.isfinite(stamps)
+    samples, stamps = samples[usable], stamps[usable]
+    ordered = stamps.size > 1 and bool(np.all(np.diff(stamps) >= 0.0))
+    return (stamps, samples) if ordered else None
+
+
+def _noise(samples: Floats) -> float:
+    """Return the standard deviation of white noise, which is all that most second differences show."""
+    bends = np.diff(samples, 2)
+    return float(np.median(np.abs(bends))) / 0.6745 / np.sqrt(6.0) if bends.size else 0.0
+
+
+def _resting(samples: Floats, noise: float) -> NDArray[np.bool_]:
+    """Return where a channel stays within a band for the length of a pause, shape (n_samples,)."""
+    width = round(_PAUSE / _STEP)
+    span = maximum_filter1d(samples, width) - minimum_filter1d(samples, width)
+    quiet = span <= max(_WIDTH * noise, _STILL * float(np.ptp(samples)))
+    return np.asarray(maximum_filter1d(quiet.astype(np.uint8), width), dtype=bool)
