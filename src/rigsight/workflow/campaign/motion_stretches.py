@@ -14,30 +14,32 @@ from rigsight.records.record import Floats
 
 _STEP = 0.02
 """Time step at which channels are compared [s]."""
-_PAUSE, _SHORTEST = 2.0, 1.0
+_PAUSE, _SHORTEST = 1.0, 1.0
 """Shortest pause and shortest motion [s]."""
 _LEAD = 0.5
 """Rest in front of and behind a motion that belongs to its record [s]: it shows the equilibrium."""
-_STILL = 1e-3
-"""Share of its range that a channel may drift in a pause, if its noise is smaller."""
-_WIDTH = 8.0
+_HELD, _STILL = 1e-3, 1e-2
+"""Shares of their ranges that a command and a reading may change in a pause, beside their noise: a joint creeps to its rest."""
+_WIDTH = 7.0
 """Width of a band in standard deviations that noise of a pause stays within."""
 _MOST_STEPS = 3_000_000
 
 
-def moving_stretches(channels: Sequence[Channel]) -> list[tuple[float, float]]:
+def moving_stretches(commands: Sequence[Channel], readings: Sequence[Channel]) -> list[tuple[float, float]]:
     """Return begin and end of each stretch of motion [s], by the time of the file; empty with fewer than two."""
-    series = [one for channel in channels if (one := _series(channel)) is not None]
+    each = [(channel, _HELD) for channel in commands] + [(channel, _STILL) for channel in readings]
+    series = [(*one, still) for channel, still in each if (one := _series(channel)) is not None]
     if not series:
         return []
-    begin = max(float(stamps[0]) for stamps, _ in series)
-    end = min(float(stamps[-1]) for stamps, _ in series)
+    begin = max(float(stamps[0]) for stamps, _, _ in series)
+    end = min(float(stamps[-1]) for stamps, _, _ in series)
     if not 2.0 * _SHORTEST + _PAUSE < end - begin < _STEP * _MOST_STEPS:
         return []
     grid = np.arange(begin, end, _STEP)
     resting = np.ones(grid.size, dtype=bool)
-    for stamps, samples in series:
-        resting &= _resting(np.interp(grid, stamps, samples), _noise(samples))
+    for stamps, samples, still in series:
+        band = _WIDTH * _noise(samples) + still * float(np.ptp(samples))
+        resting &= _resting(np.interp(grid, stamps, samples), band)
     numbered, count = label(~resting)
     places = [np.flatnonzero(numbered == number + 1) for number in range(count)]
     moved = [(grid[own[0]], grid[own[-1]]) for own in places if own.size * _STEP >= _SHORTEST]
@@ -63,9 +65,8 @@ def _noise(samples: Floats) -> float:
     return float(np.median(np.abs(bends))) / 0.6745 / np.sqrt(6.0) if bends.size else 0.0
 
 
-def _resting(samples: Floats, noise: float) -> NDArray[np.bool_]:
-    """Return where a channel stays within a band for the length of a pause, shape (n_samples,)."""
+def _resting(samples: Floats, band: float) -> NDArray[np.bool_]:
+    """Return where samples stay within a band for the length of a pause, shape (n_samples,)."""
     width = round(_PAUSE / _STEP)
     span = maximum_filter1d(samples, width) - minimum_filter1d(samples, width)
-    quiet = span <= max(_WIDTH * noise, _STILL * float(np.ptp(samples)))
-    return np.asarray(maximum_filter1d(quiet.astype(np.uint8), width), dtype=bool)
+    return np.asarray(maximum_filter1d((span <= band).astype(np.uint8), width), dtype=bool)

@@ -121,7 +121,7 @@ def _stretches(guess: FileGuess) -> list[tuple[float, float]]:
         [one.channel for one in part if one.channel is not None]
         for part in (guess.signals[:n_inputs], guess.signals[n_inputs:])
     )
-    return moving_stretches([*driving, *read]) if driving and read else []
+    return moving_stretches(driving, read) if driving and read else []
 
 
 def quoted(text: str) -> str:
