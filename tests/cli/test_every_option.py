@@ -98,6 +98,7 @@ GIVEN: dict[str, list[str]] = {
     "--cluster": ["tcp://10.0.0.1:8786"],
     "--model": ["axis"],
     "--gear": ["elbow=500", "--mjcf", "arm.xml"],
+    "--lock": ["elbow=0.5", "--mjcf", "arm.xml"],
     "--as-it-is": ["--mjcf", "arm.xml"],
 }
 VALUES_OF = {
@@ -111,6 +112,7 @@ REFUSED = {
     "identify": [["--seed", "3"], ["--method", "thesis", "--resolution", "0.5"]],
     "init": [
         ["--gear", "elbow=500"],
+        ["--lock", "elbow=0.5"],
         ["--as-it-is"],
         ["--mjcf", "arm.xml", "--model", "axis"],
         ["--mjcf", "arm.xml", "--rigs", "own.toml"],

@@ -81,6 +81,11 @@ def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else
         (["init", "--mjcf", CART, "--gear", "slidr=1"], "Did you mean 'slider'"),
         (["init", "--mjcf", CART, "--gear", "slider=-1"], "must be positive, got -1"),
         (["init", "--mjcf", CART, "--gear", "slider=100"], "has no armature"),
+        (["init", "--mjcf", CART, "--lock", "hinge"], "JOINT=POSITION"),
+        (["init", "--mjcf", CART, "--lock", "slidr=1"], "Did you mean 'slider'"),
+        (["init", "--mjcf", CART, "--lock", "slider=nan"], "must be finite"),
+        (["init", "--mjcf", CART, "--lock", "slider=0", "--lock", "hinge=0"], "nothing moves"),
+        (["init", "--lock", "slider=0"], "name the model with --mjcf"),
         (["init", CART, "--mjcf", CART], "a file is in the way"),
         (["init", "--gear", "slider=100"], "name the model with --mjcf"),
         (["init"], "Name the FOLDER"),
@@ -169,6 +174,7 @@ def test_bodies_are_left_to_mujoco_with_what_binds_them(tmp_path: Path, run: Run
     ("options", "message"),
     [
         (("--mjcf", CART, "--as-it-is", "--gear", "hinge=50"), "a gear splits a joint in two"),
+        (("--mjcf", CART, "--as-it-is", "--lock", "hinge=0"), "weld the joint in the file"),
         (("--as-it-is",), "--as-it-is applies only to the model of a robot"),
     ],
 )

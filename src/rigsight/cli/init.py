@@ -53,6 +53,16 @@ def init(
             "May be repeated.",
         ),
     ] = None,
+    lock: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--lock",
+            metavar="JOINT=POSITION",
+            show_default="all joints move",
+            help="A joint that a brake or its controller holds, and where, in rad (m): a constant, which a record may set to "
+            "another position. May be repeated.",
+        ),
+    ] = None,
     as_it_is: Annotated[
         bool,
         typer.Option(
@@ -82,12 +92,15 @@ def init(
             if others := [option for option, given in named.items() if given]:
                 raise InputError(f"--mjcf already defines the rig; leave out {' and '.join(others)}.")
             folder = folder or Path()
-            gears = dict(map(_gear, gear or []))
-            written = run_init_from_mjcf(folder, mjcf, gears=gears, as_it_is=as_it_is, listener=listener)
+            gears = dict(_of_joint("--gear", own, "STIFFNESS", "elbow=500") for own in gear or [])
+            locked = dict(_of_joint("--lock", own, "POSITION", "elbow=0.5") for own in lock or [])
+            written = run_init_from_mjcf(
+                folder, mjcf, gears=gears, locked=locked, as_it_is=as_it_is, listener=listener
+            )
             content, lines = _of_robot(written, folder, as_it_is)
         else:
-            if gear or as_it_is:
-                option = "--gear" if gear else "--as-it-is"
+            given = {"--gear": gear, "--lock": lock, "--as-it-is": as_it_is}
+            if option := next((name for name, value in given.items() if value), None):
                 raise InputError(
                     f"{option} applies only to the model of a robot; name the model with --mjcf."
                 )
@@ -179,11 +192,11 @@ def _of_robot(written: ModelDraft, folder: Path, as_it_is: bool) -> tuple[dict[s
     return content, lines
 
 
-def _gear(text: str) -> tuple[str, float]:
+def _of_joint(option: str, text: str, number: str, example: str) -> tuple[str, float]:
     from rigsight.errors import InputError
 
-    joint, _, stiffness = text.rpartition("=")
+    joint, _, value = text.rpartition("=")
     try:
-        return joint, float(stiffness)
+        return joint, float(value)
     except ValueError:
-        raise InputError(f"--gear: got '{text}'; write JOINT=STIFFNESS, for instance elbow=500.") from None
+        raise InputError(f"{option}: got '{text}'; write JOINT={number}, for instance {example}.") from None

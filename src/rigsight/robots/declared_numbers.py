@@ -47,8 +47,12 @@ class DeclaredNumbers:
 
     def constant(self, wished: str, value: float, unit: str, about: str, *fields: Field) -> sp.Expr:
         """Return the symbol of a constant; zero for one that is zero."""
-        if value == 0.0:
-            return sp.S.Zero
+        return sp.S.Zero if value == 0.0 else self.symbol_of_constant(wished, value, unit, about, *fields)
+
+    def symbol_of_constant(
+        self, wished: str, value: float, unit: str, about: str, *fields: Field
+    ) -> sp.Symbol:
+        """Return the symbol of a constant, also of one that is zero."""
         if wished not in self._constants:
             name = self._names.free(wished)
             self._constants[wished] = name, {"unit": unit, "default": value, "about": about}

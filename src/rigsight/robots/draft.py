@@ -15,6 +15,7 @@ from rigsight.errors import InputError
 from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.declared_numbers import DeclaredNumbers, Field, Names
 from rigsight.robots.energies import Energies, energies_of
+from rigsight.robots.locked_joints import LockedJoint, check_locked
 from rigsight.robots.parts import TreeSensor, actuators_of, left_out_of, sensors_of
 from rigsight.robots.tables import (
     armature,
@@ -57,6 +58,7 @@ class RigDraft:
     values: Mapping[str, float]  # parameters as the model has them
     left_out: tuple[str, ...]  # descriptions of the parts of the model that are not in the rig file
     notes: tuple[str, ...]  # descriptions of what was added
+    locked: Mapping[str, LockedJoint]  # constant of the rig -> the joint that is held there
 
     def index_with_gears(self, joint: int) -> int:
         """Return the number of a joint once each with a gear has its second joint behind it."""
@@ -67,6 +69,13 @@ class RigDraft:
         joints = {name: self.index_with_gears(index) for name, index in self.joints.items()}
         behind = {gear.coordinate: self.index_with_gears(gear.joint) + 1 for gear in self.gears.values()}
         return joints | behind
+
+    def held(self, values: Mapping[str, float]) -> dict[int, float]:
+        """Return the positions of locked joints by their numbers, once each joint with a gear has its second one behind it."""
+        return {
+            self.index_with_gears(own.joint): values.get(name, own.position)
+            for name, own in self.locked.items()
+        }
 
     @property
     def is_as_it_is(self) -> bool:
@@ -85,6 +94,7 @@ def draft_rig(
     *,
     with_drives: bool = False,
     gears: Mapping[str, float] | None = None,
+    locked: Mapping[str, float] | None = None,
     as_it_is: str | None = None,
 ) -> RigDraft:
     """Return the rig file of a MuJoCo model.
@@ -95,7 +105,11 @@ def draft_rig(
     names, notes = Names(), []
     numbers = DeclaredNumbers(names)
     rig_name = names.free(name, "rig")
-    gears = gears or {}
+    gears, locked = gears or {}, locked or {}
+    if locked and as_it_is is not None:
+        raise InputError(
+            "--lock does not apply to a model that is simulated as it is; weld the joint in the file"
+        )
     if gears and as_it_is is not None:
         raise InputError(
             "a gear splits a joint in two, which is impossible if the model is simulated as it is; omit one of the two options"
@@ -104,21 +118,41 @@ def draft_rig(
     actuators, drives_left_out = actuators_of(model)
     sensors, sensors_left_out = sensors_of(model, actuators)
     joints = sorted((joint for body in bodies for joint in body.joints), key=lambda joint: joint.index)
+    check_locked([joint for joint in joints if joint.index < model.njnt], locked, gears)
     coordinates = [names.free(joint.name or f"joint_{joint.index + 1}", "joint") for joint in joints]
+    held = {
+        joint.index: numbers.symbol_of_constant(
+            f"{q}_held", locked[joint.name], way_unit(joint), f"position in which {q} is locked"
+        )
+        for joint, q in zip(joints, coordinates, strict=True)
+        if joint.name in locked
+    }
+    notes += [
+        f"Joint {coordinates[index]} is locked; a record may hold it elsewhere: constants = {{ {symbol.name} = ... }}."
+        for index, symbol in held.items()
+    ]
+    drives_left_out += [
+        f"actuator '{a.name or a.index}': its joint is locked" for a in actuators if a.joint in held
+    ]
+    actuators = [actuator for actuator in actuators if actuator.joint not in held]
+    sensors = [sensor for sensor in sensors if sensor.joint not in held]
     drives = [drive_of(one, joints[one.joint], coordinates[one.joint], names, numbers) for one in actuators]
     if not drives and with_drives:
         notes.append("The model has no actuators: a force or torque drives every joint.")
         drives = [
             plain_drive(joint, q, names)
             for joint, q in zip(joints, coordinates, strict=True)
-            if joint.index < model.njnt
+            if joint.index < model.njnt and joint.index not in held
         ]
     if not sensors:
         notes.append("The model has no joint sensor: the rig reads the position of every joint.")
         sensors = [
-            TreeSensor(-1, joint.index, "", 1.0, False) for joint in joints if joint.index < model.njnt
+            TreeSensor(-1, joint.index, "", 1.0, False)
+            for joint in joints
+            if joint.index < model.njnt and joint.index not in held
         ]
-    own = [(joint, q) for joint, q in zip(joints, coordinates, strict=True) if joint.index < model.njnt]
+    moving = [(joint, q) for joint, q in zip(joints, coordinates, strict=True) if joint.index not in held]
+    own = [(joint, q) for joint, q in moving if joint.index < model.njnt]
     joint_tables = {q: joint_table(model, joint, q, numbers) for joint, q in own}
     for joint, q in own:
         if joint.index in plays:
@@ -130,8 +164,11 @@ def draft_rig(
         rotors = []
     if as_it_is is None:
         called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
-        symbols = [sp.Symbol(q, real=True) for q in coordinates]
-        energies = energies_of(bodies, called, symbols, gravity_of(model), numbers)
+        symbols = [
+            held.get(joint.index, sp.Symbol(q, real=True))
+            for joint, q in zip(joints, coordinates, strict=True)
+        ]
+        energies = energies_of(bodies, called, symbols, gravity_of(model), numbers, frozenset(held.values()))
     else:
         energies = Energies()
     shown = _sensor_tables(sensors, joints, coordinates, names, numbers)
@@ -141,7 +178,7 @@ def draft_rig(
         "inputs": {drive.reported: drive.control for drive in drives},
         "constants": {},
         "parameters": numbers.parameters,
-        "coordinates": {q: {"unit": way_unit(joint)} for joint, q in zip(joints, coordinates, strict=True)},
+        "coordinates": {q: {"unit": way_unit(joint)} for joint, q in moving},
         "energy": {"kinetic": _sum(*energies.kinetic, *rotors), "potential": _sum(*energies.potential)},
         "simulator": {} if as_it_is is None else simulator_table(model, as_it_is, own, numbers.fields),
         "signals": {signal: _sum(value) for signal, value in energies.signals.items()},
@@ -165,6 +202,7 @@ def draft_rig(
         numbers.values,
         (*left_out_of(model, as_it_is=as_it_is is not None), *drives_left_out, *sensors_left_out),
         tuple(notes),
+        {symbol.name: LockedJoint(index, locked[joints[index].name]) for index, symbol in held.items()},
     )
 
 
@@ -268,7 +306,13 @@ class RobotFile:
     draft: RigDraft  # its rig file
 
 
-def read_robot(path: Path, gears: Mapping[str, float] | None = None, *, as_it_is: bool = False) -> RobotFile:
+def read_robot(
+    path: Path,
+    gears: Mapping[str, float] | None = None,
+    locked: Mapping[str, float] | None = None,
+    *,
+    as_it_is: bool = False,
+) -> RobotFile:
     """Read an MJCF or URDF file; a URDF, which has no actuators, gets a force or torque at every joint."""
     spec = load_spec(path)
     model = spec.compile()
@@ -278,6 +322,7 @@ def read_robot(path: Path, gears: Mapping[str, float] | None = None, *, as_it_is
             path.stem,
             with_drives=path.suffix.lower() == ".urdf",
             gears=gears,
+            locked=locked,
             as_it_is=path.resolve().as_posix() if as_it_is else None,
         )
     except InputError as error:

@@ -62,8 +62,9 @@ def energies_of(
     coordinates: Sequence[sp.Symbol],
     gravity: Floats,
     numbers: DeclaredNumbers,
+    held: frozenset[sp.Symbol] = frozenset(),
 ) -> Energies:
-    """Return the energies of a tree."""
+    """Return the energies of a tree, in which coordinates that are `held` are constants."""
     found = Energies()
     up = [_gravity(gravity, axis, numbers) for axis in range(3)]
     frames = {0: _Frame(sp.zeros(3, 1), sp.zeros(3, 1), sp.Matrix(up), sp.S.Zero)}
@@ -79,7 +80,8 @@ def energies_of(
         together = _together(body.joints)
         for i, alike in enumerate(together):
             called = f"joint{i + 1 if len(together) > 1 else ''}"
-            frame = _moved(frame, alike, [coordinates[joint.index] for joint in alike], known, called)
+            own = [coordinates[joint.index] for joint in alike]
+            frame = _moved(frame, alike, own, held, known, called)
         if body.joints:
             frame = _named(frame, name, found.signals)
         frames[body.index] = frame
@@ -147,11 +149,16 @@ def _together(joints: Sequence[TreeJoint]) -> list[list[TreeJoint]]:
 
 
 def _moved(
-    frame: _Frame, joints: Sequence[TreeJoint], coordinates: Sequence[sp.Symbol], known: _Known, called: str
+    frame: _Frame,
+    joints: Sequence[TreeJoint],
+    coordinates: Sequence[sp.Symbol],
+    held: frozenset[sp.Symbol],
+    known: _Known,
+    called: str,
 ) -> _Frame:
     first = joints[0]
     axis = sp.Matrix([_number(value) for value in first.axis])
-    rate = sp.Add(*(sp.Symbol(f"d({coordinate.name})", real=True) for coordinate in coordinates))
+    rate = sp.Add(*(sp.Symbol(f"d({q.name})", real=True) for q in coordinates if q not in held))
     unit = "m" if first.slides else "rad"
     way = sp.Add(
         *(

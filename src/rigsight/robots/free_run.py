@@ -12,6 +12,7 @@ from rigsight.records import Record
 from rigsight.records.record import Floats
 from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.draft import RigDraft, with_known_constants
+from rigsight.robots.locked_joints import lock
 from rigsight.simulate import compose, simulate
 
 if TYPE_CHECKING:
@@ -83,6 +84,7 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     for index in (index for index in draft.controls.values() if index >= 0):
         low, high = own.actuator_ctrlrange[index] if own.actuator_ctrllimited[index] else _CONTROL
         data.ctrl[index] = rng.uniform(low, high)
+    lock(own, data, draft.held({}))
     start, reported = data.qpos.copy(), data.ctrl.copy()
     theirs = np.empty((SAMPLES, own.nq))
     for row in theirs:

@@ -70,8 +70,14 @@ def read_for(model: Model, source: Path) -> RobotFile:
         for place, index in robot.draft.joints.items()
         if f"{place}_gear" in places and f"{place}_gear_stiffness" in model.values
     }
-    if gears:
-        robot = read_robot(source, gears)
+    # The names of joints that are locked are no places of the rig, but constants of it.
+    locked = {
+        robot.model.joint(index).name: model.values[f"{q}_held"]
+        for q, index in robot.draft.joints.items()
+        if f"{q}_held" in model.values and q not in places
+    }
+    if gears or locked:
+        robot = read_robot(source, gears, locked)
     _check_is_of(model, robot.draft, source)
     return robot
 

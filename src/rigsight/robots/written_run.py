@@ -13,6 +13,7 @@ from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.record import Floats
 from rigsight.robots.free_run import driven_run
+from rigsight.robots.locked_joints import lock
 from rigsight.robots.writing_back import WrittenModel, write_back
 from rigsight.simulate import simulate
 from rigsight.simulate.model import Model
@@ -57,7 +58,7 @@ def gap_of_written(
         if key not in written:
             written[key] = write_back(own, source)
         start = dict(zip(model.structure.state_names, map(float, state), strict=True))
-        in_mujoco = _readings(written[key], record, start)
+        in_mujoco = _readings(written[key], record, start, own.values)
         in_model = simulate(model.structure, own.values, record, state)
         for name in (s.name for s in model.structure.rig.outputs if s.name in record and s.name in in_mujoco):
             measured.setdefault(name, []).append(record[name])
@@ -75,7 +76,9 @@ def gap_of_written(
     return tuple(found)
 
 
-def _readings(written: WrittenModel, record: Record, start: Mapping[str, float]) -> dict[str, Floats]:
+def _readings(
+    written: WrittenModel, record: Record, start: Mapping[str, float], values: Mapping[str, float]
+) -> dict[str, Floats]:
     """Return what the sensors of a MuJoCo model show along a record; positions of joints where it has none."""
     import mujoco
 
@@ -93,6 +96,7 @@ def _readings(written: WrittenModel, record: Record, start: Mapping[str, float])
     for name, joint in joints.items():
         data.qpos[model.jnt_qposadr[joint]] = start[name]
         data.qvel[model.jnt_dofadr[joint]] = start[f"d({name})"]
+    lock(model, data, draft.held(values))
     shown, positions = driven_run(model, data, controls, n_steps)
     places = {sensor.name: str(sensor.reads) for sensor in draft.rig.mechanism.sensors}
     return {

@@ -103,12 +103,13 @@ def run_init_from_mjcf(
     model_file: str | Path,
     *,
     gears: Mapping[str, float] | None = None,
+    locked: Mapping[str, float] | None = None,
     as_it_is: bool = False,
     listener: Listener = silent,
 ) -> ModelDraft:
     """Write the rig file of a MuJoCo model or URDF, and a campaign if its folder holds measured files."""
     folder, source = Path(folder), Path(model_file)
-    robot = read_robot(source, gears, as_it_is=as_it_is)
+    robot = read_robot(source, gears, locked, as_it_is=as_it_is)
     draft = robot.draft
     stage = Stage(f"Equations of {len(draft.tables['coordinates'])} coordinates", 2, listener)
     rig = draft.rig
