@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
-import shutil
 import tomllib
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rigsight.records.formats.channel import Channel, TimeAxis
+from rigsight.robots import draft_rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.init import run_init_from_mjcf
+from rigsight.workflow.campaign.signal_guesses import guess_file
+from rigsight.workflow.init import run_init, run_init_from_mjcf
 
 from ..records.robot_logs import START, bag, joint_state
 
-ARM = Path(__file__).parent.parent / "robots" / "models" / "two_link_arm.xml"
+ARM = """
+<mujoco model="arm">
+  <worldbody>
+    <body name="upper">
+      <joint name="shoulder" axis="0 1 0" damping="0.3"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02" mass="0.8" contype="0" conaffinity="0"/>
+      <body name="forearm" pos="0 0 -0.3">
+        <joint name="elbow" axis="0 1 0" damping="0.15"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -0.25" size="0.015" mass="0.4" contype="0" conaffinity="0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="first" joint="shoulder" kp="25" kv="0.5" ctrlrange="-2 2"/>
+    <{elbow} name="second" joint="elbow"/>
+  </actuator>
+  <sensor><jointpos name="angle_1" joint="shoulder"/><jointpos name="angle_2" joint="elbow"/></sensor>
+</mujoco>"""
 RATE, MOTION, PAUSE = 50, 4.0, 3.0
 NOISE = 2e-4
+JOINTS = ("shoulder", "elbow")
 
 
 def write_log(folder: Path, goals: NDArray[np.float64]) -> None:
@@ -47,7 +68,8 @@ def moving(n_motions: int) -> NDArray[np.float64]:
 
 
 def records_of(folder: Path) -> list[dict[str, Any]]:
-    model = Path(shutil.copy(ARM, folder.parent / "robot.xml"))
+    model = folder.parent / "robot.xml"
+    model.write_text(ARM.format(elbow="position"), encoding="utf-8")
     run_init_from_mjcf(folder, model)
     table = tomllib.loads((folder / "campaign.toml").read_text("utf-8"))
     found: list[dict[str, Any]] = table["records"]
@@ -70,8 +92,8 @@ def test_commands_without_names_are_those_of_the_drives_in_order(tmp_path: Path)
     write_log(tmp_path / "arm", moving(1))
     (record,) = records_of(tmp_path / "arm")
     assert record["columns"] == {
-        "shoulder_motor_ctrl": "position_controller/commands/data/0",
-        "elbow_drive_ctrl": "position_controller/commands/data/1",
+        "first_ctrl": "position_controller/commands/data/0",
+        "second_ctrl": "position_controller/commands/data/1",
         "angle_1": "joint_states/position/shoulder",
         "angle_2": "joint_states/position/elbow",
     }
@@ -85,3 +107,54 @@ def test_slow_motion_without_a_pause_is_one_record(tmp_path: Path) -> None:
     )
     (record,) = records_of(tmp_path / "arm")
     assert "start" not in record
+
+
+def test_a_group_of_a_laboratory_is_no_word_of_a_log(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    t = 0.01 * np.arange(600)
+    drive = np.sin(2 * np.pi * (1.0 + 2.0 * t) * t)
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        file.write_segment(
+            [
+                nptdms.ChannelObject("Measured", name, samples, properties={"wf_increment": 0.01})
+                for name, samples in (("Drive Force", drive), ("Position", 0.02 * drive), ("Room", t))
+            ]
+        )
+    draft = run_init(tmp_path, model="axis")
+    assert draft.n_blanks == 0
+
+
+STATES = [f"joint_states/{what}/{joint}" for what in ("position", "velocity", "effort") for joint in JOINTS]
+LISTS = [f"{kind}_controller/commands/data/{i}" for kind in ("position", "effort") for i in "01"]
+CONTROLLER = [
+    f"controller_state/{part}/{what}/{joint}"
+    for part in ("reference", "feedback", "error", "output")
+    for what in ("positions", "velocities")
+    for joint in JOINTS
+]
+
+
+@pytest.mark.parametrize(
+    ("elbow", "channels", "commands", "readings"),
+    [
+        (
+            "position",
+            [f"{part}/{joint}.pos" for part in ("action", "observation.state") for joint in JOINTS],
+            ["action/shoulder.pos", "action/elbow.pos"],
+            ["observation.state/shoulder.pos", "observation.state/elbow.pos"],
+        ),
+        ("position", CONTROLLER, CONTROLLER[0:2], CONTROLLER[4:6]),
+        ("position", [*STATES, *LISTS[:2]], LISTS[:2], STATES[:2]),
+        ("position", [*STATES, *LISTS], LISTS[:2], STATES[:2]),
+        # No effort is the goal of a position controller.
+        ("motor", STATES, [None, "joint_states/effort/elbow"], STATES[:2]),
+    ],
+    ids=["LeRobot", "controller", "list", "two lists", "states"],
+)
+def test_channels_are_found_by_joint_and_quantity(
+    elbow: str, channels: list[str], commands: list[str | None], readings: list[str]
+) -> None:
+    of_file = [Channel(name, 10, lambda: np.zeros(10), axis=TimeAxis(10, 0.01)) for name in channels]
+    rig = draft_rig(mujoco.MjModel.from_xml_string(ARM.format(elbow=elbow)), "robot").rig
+    found = [guess.channel for guess in guess_file(of_file, [rig], is_log=True).signals]
+    assert [None if channel is None else channel.name for channel in found] == [*commands, *readings]

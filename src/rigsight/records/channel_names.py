@@ -40,7 +40,20 @@ _COMMANDED = frozenset({
     "action", "cmd", "command", "commanded", "commands", "desired", "goal", "goals", "reference", "setpoint", "target", "targets",
 })  # fmt: skip
 _MEASURED = frozenset({"actual", "feedback", "measured", "observation", "state", "states"})
-_EFFORTS = frozenset({"current", "effort", "efforts", "tau", "torque"})
+_NO_READING = _COMMANDED | {"error", "output"}
+_SAID = {
+    "position": frozenset({"angle", "pos", "position", "positions"}),
+    "velocity": frozenset({"speed", "vel", "velocities", "velocity"}),
+    "effort": frozenset({"current", "effort", "efforts", "force", "tau", "torque"}),
+}
+_OF_UNIT = {
+    "rad": "position",
+    "m": "position",
+    "rad/s": "velocity",
+    "m/s": "velocity",
+    "N m": "effort",
+    "N": "effort",
+}
 _FILLERS = frozenset({"motor", "joint", "actuator"})
 # A last word without brackets is a unit only if it can hardly be anything else: x_a is no length of years.
 _UNITS_BEHIND = frozenset({
@@ -90,6 +103,8 @@ def closeness(name: str, signal: str) -> float:
         # A log of a robot has a group for each quantity, and in it the joints: position/elbow.
         own = own - _FILLERS or own
         inside |= set(_words(bare.split("/")[-2]).split())
+        if is_command(bare):
+            inside.add("command")
         shared = {word for word in own if inside & {word, *_QUANTITIES.get(word, ())}}
     by_words = 2.0 if own and shared == own else _IN_PART * len(shared) / max(1, len(own))
     return max(by_words, by_other_names)
@@ -100,10 +115,23 @@ def is_command(name: str) -> bool:
     return "/" in name and bool(_COMMANDED & set(_words(name).split()))
 
 
-def is_reading(name: str) -> bool:
-    """Return True for the channel of a log that is called like a reading, and is no effort, which drives as well."""
+def may_be_reading(name: str, unit: str) -> bool:
+    """Return False for the channel of a log that is called like anything but a reading, or one of another unit."""
     words = set(_words(name).split())
-    return "/" in name and bool(_MEASURED & words) and not (_EFFORTS | _COMMANDED) & words
+    return not ("/" in name and _NO_READING & words) and _may_have(words, unit)
+
+
+def may_be_command(name: str, unit: str) -> bool:
+    """Return False for the channel of a log that is called like a reading, or like a command of another unit."""
+    # A measured effort drives as well.
+    words = set(_words(name).split())
+    is_read = "/" in name and _MEASURED & words and not (_SAID["effort"] | _COMMANDED) & words
+    return not is_read and "error" not in words and _may_have(words, unit)
+
+
+def _may_have(words: set[str], unit: str) -> bool:
+    said = {quantity for quantity, names in _SAID.items() if names & words}
+    return not said or unit not in _OF_UNIT or _OF_UNIT[unit] in said
 
 
 def plain_words(name: str) -> str:

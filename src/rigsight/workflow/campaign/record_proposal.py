@@ -84,7 +84,8 @@ class Proposal:
 
 def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None = None) -> Proposal:
     """Return how an open file is written into a campaign."""
-    guess = guess_file(file.channels, rigs, _rising(file.channels))
+    is_log = file.format in LOGS
+    guess = guess_file(file.channels, rigs, _rising(file.channels), is_log=is_log)
     no_time = ""
     if guess.time.channel is not None and not _rises(guess.time.channel):
         no_time = f"{quoted(guess.time.channel.name)} does not increase"
@@ -108,7 +109,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     lines += timing
     if columns:
         lines += ["[records.columns]", *columns]
-    stretches = tuple(_stretches(guess)) if file.format in LOGS else ()
+    stretches = tuple(_stretches(guess)) if is_log else ()
     return Proposal(
         name or path.name, guess, kind, amplitude, tuple(lines), timing_blanks + column_blanks, stretches
     )

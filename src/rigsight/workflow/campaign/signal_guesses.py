@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from rigsight.records.channel_names import closeness, is_command, is_reading, split_unit
+from rigsight.records.channel_names import closeness, is_command, may_be_command, may_be_reading, split_unit
 from rigsight.records.channel_units import DRIVES, has_si, is_a
 from rigsight.records.clocks import own_clocks
 from rigsight.records.formats.channel import Channel
@@ -66,14 +66,19 @@ def distinguishing(rig: Rig) -> tuple[str, ...]:
     return (*(signal.name for signal in rig.inputs), *outputs)
 
 
-def guess_file(channels: Sequence[Channel], rigs: Iterable[Rig], rising: Channel | None = None) -> FileGuess:
-    """Return the rig that matches the channels best, with the channel of each signal."""
+def guess_file(
+    channels: Sequence[Channel], rigs: Iterable[Rig], rising: Channel | None = None, *, is_log: bool = False
+) -> FileGuess:
+    """Return the rig that matches the channels best, with the channel of each signal.
+
+    In the log of a robot commands and readings have groups that are called so.
+    """
     own = own_clocks([channel.name for channel in channels])
     times = [channels[number] for number in set(own.values())]
-    guesses = [_guess_rig(rig, channels, rising, times) for rig in rigs]
+    guesses = [_guess_rig(rig, channels, rising, times, is_log) for rig in rigs]
     found = min(guesses, key=_unlikely)
     other = rotational(found.rig)
-    in_units = [found] if other is None else [found, _guess_rig(other, channels, rising, times)]
+    in_units = [found] if other is None else [found, _guess_rig(other, channels, rising, times, is_log)]
     in_units = [replace(one, reference=_guess_reference(one, channels)) for one in in_units]
     in_units = [replace(one, signals=_completed_by_unit(one, channels, times)) for one in in_units]
     found = min(in_units, key=_units_that_do_not_fit)
@@ -187,7 +192,11 @@ def _unit_of(channel: Channel) -> str | None:
 
 
 def _guess_rig(
-    rig: Rig, channels: Sequence[Channel], rising: Channel | None, times: Sequence[Channel]
+    rig: Rig,
+    channels: Sequence[Channel],
+    rising: Channel | None,
+    times: Sequence[Channel],
+    is_log: bool,
 ) -> FileGuess:
     time, _ = _guess(TIME, "s", channels, ())
     if rising is not None and not time.is_clear and not time.candidates:
@@ -199,13 +208,17 @@ def _guess_rig(
     for signal in sorted(
         signals, key=lambda s: -max((_closeness(c, names[s.name]) for c in channels), default=0.0)
     ):
-        suited = [c for c in channels if _suits(c, signal.name, signal in rig.inputs)]
+        suits = may_be_command if signal in rig.inputs else may_be_reading
+        suited = [
+            c for c in channels if not is_log or c.short_name == signal.name or suits(c.name, signal.unit)
+        ]
         guess, closest = _guess(signal.name, signal.unit, suited, taken, names[signal.name])
         if guess.channel is not None:
             taken.append(guess.channel)
             score += closest
         found[signal.name] = guess
-    found |= _commands_in_order([found[signal.name] for signal in rig.inputs], channels)
+    if is_log:
+        found |= _commands_in_order([found[signal.name] for signal in rig.inputs], channels)
     return FileGuess(rig, time, tuple(found[signal.name] for signal in signals), score / len(signals))
 
 
@@ -216,9 +229,10 @@ def _names_of(rig: Rig) -> dict[str, tuple[str, ...]]:
     quantities |= {c.rate: f"{c.name} velocity" for c in mechanism.coordinates}
     called = {s.name: quantities[s.reads] for s in mechanism.sensors if s.reads in quantities}
     moved = {c.symbol: f"{c.name} ctrl" for c in mechanism.coordinates}
-    called |= {
-        d.signal.name: moved[d.along] for d in mechanism.drives if d.signal.is_Symbol and d.along in moved
-    }
+    for drive in mechanism.drives:
+        commands = {symbol.name for symbol in drive.signal.free_symbols} & set(mechanism.inputs)
+        if len(commands) == 1 and drive.along in moved:
+            called[commands.pop()] = moved[drive.along]
     own = (signal.name for signal in (*rig.inputs, *rig.outputs))
     return {name: (name, called[name]) if name in called else (name,) for name in own}
 
@@ -227,17 +241,13 @@ def _closeness(channel: Channel, names: Sequence[str]) -> float:
     return max(closeness(channel.name, name) for name in names)
 
 
-def _suits(channel: Channel, signal: str, drives: bool) -> bool:
-    """Return False for a command in the place of a reading, and the reverse, unless it has the name of the signal."""
-    wrong = is_reading if drives else is_command
-    return not wrong(channel.name) or channel.short_name == signal
-
-
 def _commands_in_order(inputs: Sequence[Guess], channels: Sequence[Channel]) -> dict[str, Guess]:
     """Return the inputs as the entries of the only list of commands without names that has as many; empty if there is none."""
     lists: dict[str, list[Channel]] = {}
+    units = {own.si for own in inputs}
     for channel in channels:
-        if channel.short_name.isdecimal() and is_command(channel.name):
+        suits = all(may_be_command(channel.name, unit) for unit in units)
+        if channel.short_name.isdecimal() and is_command(channel.name) and suits:
             lists.setdefault(channel.group, []).append(channel)
     fitting = [own for own in lists.values() if len(own) == len(inputs)]
     if len(fitting) != 1 or any(own.is_clear for own in inputs):
