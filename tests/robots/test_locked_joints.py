@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.records import Record
-from rigsight.robots import draft_rig, free_run, gap_of_written, load_model
+from rigsight.robots import draft_rig, free_run, gap_of_written, load_model, write_back
 from rigsight.robots.free_run import ALLOWED
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
@@ -51,6 +51,19 @@ def test_a_record_may_hold_it_elsewhere(tmp_path: Path) -> None:
         run = replace(measured, constants=constants)
         for gap in gap_of_written(Model(structure, values, "zoh"), arm, [run], [start]):
             assert low <= gap.in_mujoco < high
+
+
+def test_it_is_known_again_whatever_its_name(tmp_path: Path) -> None:
+    """Names of a rig are cut to 40 letters, so that a long one leaves no room for what is added to it."""
+    called = "the_second_joint_of_the_arm_which_lifts_the_hand"
+    arm = tmp_path / ARM.name
+    arm.write_text(ARM.read_text("utf-8").replace('"lift"', f'"{called}"'), encoding="utf-8")
+    draft = draft_rig(load_model(arm), ARM.stem, locked={called: 0.7})
+    structure = compose(draft.rig)
+    values = {p.name: float(p.default) for p in structure.parameters if p.default is not None}
+    written = write_back(Model(structure, values, "zoh"), arm)
+    assert list(written.draft.locked.values()) == list(draft.locked.values())
+    assert written.without_field == ()
 
 
 def test_what_belongs_to_it_is_named() -> None:

@@ -131,28 +131,22 @@ def draft_rig(
         f"Joint {coordinates[index]} is locked; a record may hold it elsewhere: constants = {{ {symbol.name} = ... }}."
         for index, symbol in held.items()
     ]
-    drives_left_out += [
-        f"actuator '{a.name or a.index}': its joint is locked" for a in actuators if a.joint in held
-    ]
+    for kind, parts, left_out in (
+        ("actuator", actuators, drives_left_out),
+        ("sensor", sensors, sensors_left_out),
+    ):
+        left_out += [f"{kind} '{p.name or p.index}': its joint is locked" for p in parts if p.joint in held]
     actuators = [actuator for actuator in actuators if actuator.joint not in held]
     sensors = [sensor for sensor in sensors if sensor.joint not in held]
+    moving = [(joint, q) for joint, q in zip(joints, coordinates, strict=True) if joint.index not in held]
+    own = [(joint, q) for joint, q in moving if joint.index < model.njnt]
     drives = [drive_of(one, joints[one.joint], coordinates[one.joint], names, numbers) for one in actuators]
     if not drives and with_drives:
         notes.append("The model has no actuators: a force or torque drives every joint.")
-        drives = [
-            plain_drive(joint, q, names)
-            for joint, q in zip(joints, coordinates, strict=True)
-            if joint.index < model.njnt and joint.index not in held
-        ]
+        drives = [plain_drive(joint, q, names) for joint, q in own]
     if not sensors:
-        notes.append("The model has no joint sensor: the rig reads the position of every joint.")
-        sensors = [
-            TreeSensor(-1, joint.index, "", 1.0, False)
-            for joint in joints
-            if joint.index < model.njnt and joint.index not in held
-        ]
-    moving = [(joint, q) for joint, q in zip(joints, coordinates, strict=True) if joint.index not in held]
-    own = [(joint, q) for joint, q in moving if joint.index < model.njnt]
+        notes.append("No sensor reads a joint that moves: the rig reads the position of every one.")
+        sensors = [TreeSensor(-1, joint.index, "", 1.0, False) for joint, _ in own]
     joint_tables = {q: joint_table(model, joint, q, numbers) for joint, q in own}
     for joint, q in own:
         if joint.index in plays:

@@ -70,12 +70,16 @@ def read_for(model: Model, source: Path) -> RobotFile:
         for place, index in robot.draft.joints.items()
         if f"{place}_gear" in places and f"{place}_gear_stiffness" in model.values
     }
-    # The names of joints that are locked are no places of the rig, but constants of it.
-    locked = {
-        robot.model.joint(index).name: model.values[f"{q}_held"]
-        for q, index in robot.draft.joints.items()
-        if f"{q}_held" in model.values and q not in places
-    }
+    # A joint that is no place of the rig may be a constant of it.
+    absent = {robot.model.joint(i).name: 0.0 for q, i in robot.draft.joints.items() if q not in places}
+    locked: dict[str, float] = {}
+    if 0 < len(absent) < len(robot.draft.joints):
+        locks = read_robot(source, gears, absent).draft.locked
+        locked = {
+            robot.model.joint(own.joint).name: model.values[name]
+            for name, own in locks.items()
+            if name in model.values
+        }
     if gears or locked:
         robot = read_robot(source, gears, locked)
     _check_is_of(model, robot.draft, source)

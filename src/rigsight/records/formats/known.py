@@ -85,8 +85,8 @@ FORMATS = (
 )  # fmt: skip
 BY_SUFFIX = {suffix: known for known in FORMATS for suffix in known.suffixes}
 
-LOGS = frozenset(known.name for known in FORMATS if known.extra == "logs" or known.key == "parquet")
-"""Names of the formats of robots' logs: groups of commands and readings, and rest between motions."""
+LOGS = frozenset(known.name for known in FORMATS if known.extra == "logs")
+"""Names of the formats that robots alone log in."""
 
 PACKAGES = {known.key: known.package for known in FORMATS if known.isolated and known.package}
 """Format -> package that is called in a process of its own."""

@@ -23,6 +23,7 @@ _HELD, _STILL = 1e-3, 1e-2
 _WIDTH = 7.0
 """Width of a band in standard deviations that noise of a pause stays within."""
 _MOST_STEPS = 3_000_000
+"""Length of a log that is divided: 17 hours."""
 
 
 def moving_stretches(commands: Sequence[Channel], readings: Sequence[Channel]) -> list[tuple[float, float]]:

@@ -36,6 +36,8 @@ _RATIO = 1.5
 BLANK = '"FILL IN"'
 """Written where nothing could be guessed; a diagnosis refuses it and names the key."""
 _LISTED = 200
+_EPISODE = "episode_index"
+"""Column that shows a Parquet file to be a LeRobot data set."""
 _COARSE = 0.5
 """Sample time [s] from which a comment asks about the unit of time."""
 
@@ -84,7 +86,7 @@ class Proposal:
 
 def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None = None) -> Proposal:
     """Return how an open file is written into a campaign."""
-    is_log = file.format in LOGS
+    is_log = file.format in LOGS or any(channel.name == _EPISODE for channel in file.channels)
     guess = guess_file(file.channels, rigs, _rising(file.channels), is_log=is_log)
     no_time = ""
     if guess.time.channel is not None and not _rises(guess.time.channel):
