@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rigsight.records.channel_table import read_columns
 from rigsight.records.formats.channel import Channel, TimeAxis
 from rigsight.robots import draft_rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
@@ -76,16 +78,25 @@ def records_of(folder: Path) -> list[dict[str, Any]]:
     return found
 
 
-def test_each_motion_between_pauses_is_a_record(tmp_path: Path) -> None:
+def test_each_motion_between_pauses_is_a_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Path] = []
+
+    def counted(path: Path, *asked: Any, **options: Any) -> Any:
+        opened.append(path)
+        return read_columns(path, *asked, **options)
+
+    # The package has a function of the name of this module.
+    monkeypatch.setattr(import_module("rigsight.records.read_record"), "read_columns", counted)
     write_log(tmp_path / "arm", moving(3))
     records = records_of(tmp_path / "arm")
     assert [record["role"] for record in records] == ["estimation", "estimation", "validation"]
     for i, record in enumerate(records):
         begin = PAUSE + i * (MOTION + PAUSE)
-        assert begin - 1.0 < record["start"] < begin
-        assert begin + MOTION < record["end"] < begin + MOTION + 1.0
+        assert begin - PAUSE / 2.0 <= record["start"] < begin - 0.5
+        assert begin + MOTION + 0.5 < record["end"] <= begin + MOTION + PAUSE / 2.0
     read = read_campaign(tmp_path / "arm").records
-    assert [record.duration for record in read] == pytest.approx([MOTION + 1.0] * 3, abs=0.3)
+    assert len(opened) == 1
+    assert [record.duration for record in read] == pytest.approx([MOTION + 2.0] * 3, abs=0.3)
 
 
 def test_commands_without_names_are_those_of_the_drives_in_order(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,9 @@ _STEP = 0.02
 """Time step at which channels are compared [s]."""
 _PAUSE, _SHORTEST = 1.0, 1.0
 """Shortest pause and shortest motion [s]."""
-_LEAD = 0.5
-"""Rest in front of and behind a motion that belongs to its record [s]: it shows the equilibrium."""
+_LEAD = 1.0
+"""Rest in front of and behind a motion that belongs to its record, up to half a pause [s]: it shows the equilibrium, and motions
+begin slowly."""
 _HELD, _STILL = 1e-3, 1e-2
 """Shares of their ranges that a command and a reading may change in a pause, beside their noise: a joint creeps to its rest."""
 _WIDTH = 7.0
@@ -43,10 +45,14 @@ def moving_stretches(commands: Sequence[Channel], readings: Sequence[Channel]) -
         resting &= _resting(np.interp(grid, stamps, samples), band)
     numbered, count = label(~resting)
     places = [np.flatnonzero(numbered == number + 1) for number in range(count)]
-    moved = [(grid[own[0]], grid[own[-1]]) for own in places if own.size * _STEP >= _SHORTEST]
+    moved = [(float(grid[own[0]]), float(grid[own[-1]])) for own in places if own.size * _STEP >= _SHORTEST]
     if len(moved) < 2:
         return []
-    return [(max(begin, float(first) - _LEAD), min(end, float(last) + _LEAD)) for first, last in moved]
+    halfway = [(last + first) / 2.0 for (_, last), (first, _) in pairwise(moved)]
+    return [
+        (max(first - _LEAD, before), min(last + _LEAD, behind))
+        for (first, last), before, behind in zip(moved, [begin, *halfway], [*halfway, end], strict=True)
+    ]
 
 
 def _series(channel: Channel) -> tuple[Floats, Floats] | None:
