@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -33,6 +35,17 @@ from rigsight.records.stretches import between, one_stretch, stretches
 
 _DIALECT = ("separator", "decimal", "header", "comment")
 """What may be said of a text."""
+_last_file: ContextVar[dict[Any, Columns] | None] = ContextVar("last file", default=None)
+
+
+@contextmanager
+def files_read_once() -> Iterator[None]:
+    """Keep what was read of the last file inside this context: its next record is often another stretch of it."""
+    token = _last_file.set({})
+    try:
+        yield
+    finally:
+        _last_file.reset(token)
 
 
 @dataclass(frozen=True)
@@ -217,9 +230,17 @@ def _table(
 ) -> Columns:
     """Return the numbers of a file of any format, as they stand there."""
     dialect = {key: getattr(options, key) for key in _DIALECT}
-    return read_columns(
+    last = _last_file.get()
+    asked = (path, *columns.items(), *spare, options.dt, *dialect.values(), time_is_mapped)
+    if last is not None and asked in last:
+        return last[asked]
+    found = read_columns(
         path, columns, time_is_mapped=time_is_mapped, optional=spare, dt=options.dt, dialect=dialect
     )
+    if last is not None:
+        last.clear()
+        last[asked] = found
+    return found
 
 
 def _refuse_time_as_signal(file: str, table: Columns) -> None:

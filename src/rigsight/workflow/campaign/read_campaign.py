@@ -10,7 +10,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, nearest, readable, shown
 from rigsight.records import ColumnMapping, ReadingOptions, Record
-from rigsight.records.read_record import TIME, read_stretches
+from rigsight.records.read_record import TIME, files_read_once, read_stretches
 from rigsight.records.signals import signals_beside
 from rigsight.rigs import Rig, read_rig_file, rotational
 from rigsight.units import INPUT_UNIT
@@ -71,7 +71,8 @@ def read_campaign(
     files = [file_inside(path, number, record, where) for number, record in enumerate(table.records, 1)]
     # A rig file says itself in which units its signals are.
     other = rotational(rig) if table.rig.model is not None else None
-    rig, read = _read_all(path, rig, other, table.records, files, where, table.rig.constants)
+    with files_read_once():
+        rig, read = _read_all(path, rig, other, table.records, files, where, table.rig.constants)
     if table.offsets == "per_record":
         outputs = [signal.name for signal in rig.outputs]
         read = [(asked, record.with_free_offsets(outputs)) for asked, record in read]
