@@ -9,8 +9,8 @@ from effect_text import EffectText, effect_text
 
 from rigsight.effects import CATALOGUE, Effect, GainTrend, Place
 from rigsight.parameters import Parameter
+from rigsight.report.labels import effect_label, listed, sentence_case
 from rigsight.report.render import equations_of
-from rigsight.report.wording import effect_label, listed, sentence_case
 from rigsight.rigs import RIGS
 from rigsight.workflow.own.effect_benches import ELEMENT_BENCH, bench_of
 

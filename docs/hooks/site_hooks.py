@@ -19,7 +19,7 @@ from reference_pages import BENCH, PACKAGES, bench_page, reference_index, refere
 from repository_links import MOVED, with_site_links
 
 from rigsight.effects import CATALOGUE
-from rigsight.report.wording import effect_label, sentence_case
+from rigsight.report.labels import effect_label, sentence_case
 
 ROOT = Path(__file__).parents[2]
 NUMBERS = "verdict_numbers.md"

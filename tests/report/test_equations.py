@@ -13,8 +13,8 @@ import sympy as sp
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect, effect_named, placed
 from rigsight.effects.symbols import load, v, x
+from rigsight.report.labels import effect_label, sentence_case
 from rigsight.report.render import equation_groups, equations_of, known_effects
-from rigsight.report.wording import effect_label, sentence_case
 from rigsight.rigs import RIGS
 
 

@@ -6,7 +6,7 @@ import itertools
 
 from rigsight import plot
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report.wording import effects_label
+from rigsight.report.labels import effects_label
 
 THREE = (
     "load_dependent_friction@motor_bearing",

@@ -9,10 +9,10 @@ from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
 from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.effects import Family
+from rigsight.report.labels import percent
 from rigsight.report.quantities import Written, estimate_text, gap_percent, written
 from rigsight.report.wording import (
     advice_sentences,
-    percent,
     remainder_sentence,
     verdict_name,
     verdict_sentence,

@@ -78,7 +78,7 @@ def _table(found: Power) -> Table:
     from rich.markup import escape
     from rich.table import Table
 
-    from rigsight.report.wording import effect_label, unit_text
+    from rigsight.report.labels import effect_label, unit_text
 
     table = Table("Effect", "Where", "Named from", box=box.SIMPLE)
     for size in found.sizes:

@@ -12,19 +12,18 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import kind_of
 from rigsight.records.stamps import written_span
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.quantities import gap_percent, rig_of
-from rigsight.report.sections import output_label
-from rigsight.report.wording import (
+from rigsight.report.labels import (
     TIMES,
     effect_label,
     family_label,
     listed,
     percent,
     sentence_case,
-    stage_names,
-    stages_reported,
     unit_text,
 )
+from rigsight.report.quantities import gap_percent, rig_of
+from rigsight.report.sections import output_label
+from rigsight.report.wording import stage_names, stages_reported
 
 _JOINTS_SHOWN = 3
 _LAWS_SHOWN = 6

@@ -17,20 +17,13 @@ from markupsafe import Markup, escape
 
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.report import location, sections, wording
+from rigsight.report import labels, location, sections, wording
 from rigsight.report.figures import loop_figures, rig_figure
+from rigsight.report.labels import TIMES, effect_label, effects_label, percent, sentence_case
 from rigsight.report.quantities import Written, effect_of, gap_percent, rig_of
 from rigsight.report.record_views import record_views
 from rigsight.report.responses import amplitude_figures, record_responses
-from rigsight.report.wording import (
-    TIMES,
-    advice_sentences,
-    effect_label,
-    effects_label,
-    percent,
-    sentence_case,
-    stage_names,
-)
+from rigsight.report.wording import advice_sentences, stage_names
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.printing.notation import mathml_equation
@@ -57,6 +50,7 @@ def render_report(
         seed,
         diagnosis=diagnosis,
         quality=diagnosis.data_quality,
+        labels=labels,
         wording=wording,
         stages=stage_names(diagnosis),
         outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],

@@ -18,6 +18,7 @@ from rigsight.effects import Effect
 from rigsight.errors import InputError
 from rigsight.parameters import Parameter
 from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.labels import effect_label, effects_label, percent, sentence_case
 from rigsight.report.quantities import (
     ParameterRow,
     effect_of,
@@ -26,16 +27,7 @@ from rigsight.report.quantities import (
     rig_of,
     written,
 )
-from rigsight.report.wording import (
-    effect_label,
-    effects_label,
-    given_text,
-    is_given,
-    named_candidate,
-    percent,
-    sentence_case,
-    stages_reported,
-)
+from rigsight.report.wording import given_text, is_given, named_candidate, stages_reported
 
 if TYPE_CHECKING:
     from rigsight.plot import Figure

@@ -14,7 +14,7 @@ from rich.text import Text
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate
 from rigsight.discover import Discovery, JointForce
 from rigsight.discover.result import Term
-from rigsight.report import wording
+from rigsight.report import labels, wording
 from rigsight.report.quantities import estimate_text, gap_percent
 from rigsight.report.sections import trust_line
 
@@ -45,7 +45,7 @@ class Summary:
 def plain_text(words: str, encoding: str, style: str = "") -> Text:
     """Return words as a terminal with this encoding can show them, each control character as a question mark."""
     # An escape sequence in somebody's title must not reach the terminal.
-    plain = "".join(c if c.isprintable() else "?" for c in words.replace(wording.TIMES, "x"))
+    plain = "".join(c if c.isprintable() else "?" for c in words.replace(labels.TIMES, "x"))
     return Text(plain.encode(encoding, "replace").decode(encoding), style)
 
 
@@ -99,17 +99,17 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
             f"{wording.stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
         )
     for cause in diagnosis.families[:_RANKED]:
-        of_gap = f", {wording.share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
+        of_gap = f", {labels.share_label(cause)} of the squared gap" if cause.share > 0.0 else ""
         yield (
-            wording.family_label(cause),
-            f"probability {wording.percent(cause.probability)}{of_gap}: {wording.forms_label(cause)}",
+            labels.family_label(cause),
+            f"probability {labels.percent(cause.probability)}{of_gap}: {labels.forms_label(cause)}",
         )
     if diagnosis.candidates:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
         if not diagnosis.effects:
             yield (
                 "probability",
-                f"{wording.percent(diagnosis.probability)} for {wording.what_is_probable(diagnosis)}",
+                f"{labels.percent(diagnosis.probability)} for {wording.what_is_probable(diagnosis)}",
             )
     named = wording.named_candidate(diagnosis)
     if named is not None and named.parameters:
@@ -136,7 +136,7 @@ def _candidate(candidate: Candidate) -> str:
         else "not scored"
     )
     unfinished = "" if candidate.success else ", not converged"
-    return f"{wording.effects_label(candidate.effects)} {wording.percent(candidate.probability)} ({error}{unfinished})"
+    return f"{labels.effects_label(candidate.effects)} {labels.percent(candidate.probability)} ({error}{unfinished})"
 
 
 def discovery_summary(discovery: Discovery) -> Summary:

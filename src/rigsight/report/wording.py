@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,35 +11,23 @@ from rigsight.diagnose.location.gap_parts import GapPart
 from rigsight.diagnose.location.trace import Stage
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap
-from rigsight.diagnose.verdict.families import FamilyAtPlace
 from rigsight.effects import AT, kind_of
-from rigsight.inverse import ProposedCause
+from rigsight.report.labels import (
+    TIMES,
+    effect_label,
+    effects_label,
+    family_label,
+    listed,
+    percent,
+    place_label,
+    unit_text,
+)
 from rigsight.report.quantities import gap_percent
 
-TIMES = "\u00d7"
-_WITHOUT_EFFECT = "no effect, refitted parameters"
-_PROPER_NAMES = {
-    "bouc wen": "Bouc-Wen",
-    "coulomb": "Coulomb",
-    "stribeck": "Stribeck",
-    "iwan": "Iwan",
-    "maxwell": "Maxwell",
-    "lugre": "LuGre",
-    "pid ": "PID ",
-}
 _SEPARATES = 1.0
 """RMS difference in standard deviations of the noise below which an experiment does not help."""
 _DECIDES = 100.0
 """RMS difference in standard deviations of the noise above which a larger one decides no more: models err by more than noise."""
-_PLACES = {
-    "actuator": "at the actuator",
-    "controller": "at the controller",
-    "sensor": "at the sensor",
-    "disturbance": "as a disturbance from outside",
-    "lateral_dynamics": "in the lateral dynamics",
-    "yaw_dynamics": "in the yaw dynamics",
-    "dynamics": "in the dynamics",
-}
 _VERDICT_NAMES = {
     "effect": "Missing effect",
     "parameters": "Wrong parameters",
@@ -55,39 +42,7 @@ _STATED = {
     "unknown": "a cause that is none of the families",
 }
 
-_FORMS = 4
-"""Number of forms of a family that are shown."""
 _LAWS_NAMED = 3
-
-
-def listed(items: Iterable[str], last: str = "and") -> str:
-    """Return ``"a, b and c"``."""
-    texts = list(items)
-    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} {last} {texts[-1]}" if texts else ""
-
-
-def effect_label(name: str) -> str:
-    """Return an effect's name for people: ``"Bouc-Wen hysteresis"``, ``"Coulomb friction at load_bearing"``."""
-    kind, _, place = name.partition(AT)
-    label = kind.replace("_", " ")
-    for written, proper in _PROPER_NAMES.items():
-        label = label.replace(written, proper)
-    return f"{label} at {place}" if place else label
-
-
-def effects_label(effects: Sequence[str]) -> str:
-    """Return the names of a set of effects for people."""
-    return listed(map(effect_label, effects)) or _WITHOUT_EFFECT
-
-
-def sentence_case(text: str) -> str:
-    """Return the text with a capital first letter, the rest untouched."""
-    return text[:1].upper() + text[1:]
-
-
-def place_label(where: str) -> str:
-    """Return a place with its preposition: ``"in the yaw dynamics"``."""
-    return _PLACES.get(where, f"at {where}")
 
 
 def verdict_name(diagnosis: Diagnosis) -> str:
@@ -141,17 +96,6 @@ def stages_reported(diagnosis: Diagnosis, gap: OutputGap | GapPart) -> str:
     return ", ".join(
         f"{name} {gap_percent(getattr(gap, stage))}" for stage, name in stage_names(diagnosis).items()
     )
-
-
-def percent(share: float) -> str:
-    """Return a share as percent; what is nearly but not quite all is not rounded up to all."""
-    if not math.isfinite(share):
-        return "an unknown share"
-    if share >= 1.0:
-        return "100 %"
-    if share > 0.999:
-        return "over 99.9 %"
-    return f"{100.0 * share:.1f} %" if share > 0.99 else f"{100.0 * share:.0f} %"
 
 
 def times_floor(error_over_noise: float) -> str:
@@ -317,11 +261,6 @@ def ambiguity_sentence(diagnosis: Diagnosis) -> str:
     return " ".join(sentences)
 
 
-def unit_text(unit: str) -> str:
-    """Return a unit as it follows a number; an axis calls the unit of its input just that."""
-    return "" if unit in ("input", "1") else unit
-
-
 def advice_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return, for each rival, the experiment that would tell it from the named effects."""
     several = len({name for trace in diagnosis.traces for name in trace.inputs}) > 1
@@ -367,24 +306,6 @@ def what_is_probable(diagnosis: Diagnosis) -> str:
         if diagnosis.effects
         else _STATED[diagnosis.verdict]
     )
-
-
-def family_label(own: FamilyAtPlace | ProposedCause) -> str:
-    """Return a family with its place: ``"dry friction at gearbox"``."""
-    return f"{own.family.replace('_', ' ')} {place_label(own.where)}"
-
-
-def forms_label(own: FamilyAtPlace) -> str:
-    """Return the forms of a family with their probabilities within it: ``"Stribeck friction 60 %, Coulomb friction 40 %"``."""
-    return ", ".join(
-        f"{effects_label(form.effects)} {percent(form.probability)}" for form in own.forms[:_FORMS]
-    )
-
-
-def share_label(own: FamilyAtPlace) -> str:
-    """Return the share of the gap of a family with its interval: ``"81 % (74 % to 86 %)"``."""
-    low, high = map(percent, own.interval)
-    return f"{percent(own.share)} ({low} to {high})"
 
 
 def basis_sentence(diagnosis: Diagnosis) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rigsight.report.wording import sentence_case
+from rigsight.report.labels import sentence_case
 from rigsight_bench.report.views import NUMBERS, SHARES, number
 
 _LABORATORY_SHARES = {

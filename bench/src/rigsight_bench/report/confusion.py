@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rigsight.report.wording import effect_label
+from rigsight.report.labels import effect_label
 
 OUTSIDE = "outside: "
 """What stands before an effect from outside the catalogue."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigsight.plot.drawing import FLOOR, GIVEN, WITH_EFFECT, in_style, new_figure
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.wording import percent
+from rigsight.report.labels import percent
 from rigsight_bench.report.views import number
 
 if TYPE_CHECKING:

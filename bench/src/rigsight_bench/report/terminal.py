@@ -10,7 +10,7 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table
 from rich.text import Text
 
-from rigsight.report.wording import percent
+from rigsight.report.labels import percent
 from rigsight_bench.report.conditions import (
     CONDITION_HEADS,
     condition_rows,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rigsight.report.wording import TIMES, effect_label, listed, percent, sentence_case
+from rigsight.report.labels import TIMES, effect_label, listed, percent, sentence_case
 from rigsight_bench.report.confusion import OUTSIDE
 
 NOTHING = "-"
