@@ -243,7 +243,7 @@ def test_who_is_interrupted_when_all_is_written_is_told_so(
     monkeypatch.setattr("rigsight.workflow.diagnose.diagnose_campaign", diagnosed)
     code, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
     assert code == 130
-    assert stderr == f"rigsight: interrupted; the results in {tmp_path / 'out'} are complete.\n"
+    assert stderr == f"rigsight: interrupted; the files written in {tmp_path / 'out'} are complete.\n"
 
 
 def test_a_bench_that_is_interrupted_goes_on_and_its_settings_are_no_results(
@@ -299,5 +299,6 @@ def test_many_folders_with_results_are_told_by_the_one_that_holds_them(
     monkeypatch.setattr("rigsight.workflow.diagnose.diagnose_campaign", diagnosed)
     _, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
     assert (
-        stderr == f"rigsight: interrupted; the results in 5 folders in {tmp_path / 'bench'} are complete.\n"
+        stderr
+        == f"rigsight: interrupted; the files written in 5 folders in {tmp_path / 'bench'} are complete.\n"
     )

@@ -138,7 +138,7 @@ def test_quiet_says_nothing(tmp_path: Path, run: Run) -> None:
 def test_init_tells_what_is_left_to_do(tmp_path: Path, run: Run) -> None:
     write_text(tmp_path / "run.csv", {"t": T, "u": ROWS["u"], "psi": ROWS["x"]}, {})
     code, stdout, stderr = run("init", tmp_path)
-    assert (code, stderr) == (0, "")
+    assert (code, stderr) == (0, "Reading files ...\n")
     assert "running_gear, 1 record)" in stdout
     assert '"FILL IN" (4 times)' in stdout
     code, _, stderr = run("init", tmp_path)

@@ -50,7 +50,7 @@ def report_errors(debug: bool, outcome: str = _NOTHING) -> Iterator[None]:
             leave(str(error), BAD_INPUT, isinstance(error, MachineError))
         except KeyboardInterrupt as error:
             if written and outcome.startswith(_NOTHING):
-                outcome = f"the results in {_named(written)} are complete"
+                outcome = f"the files written in {_named(written)} are complete"
             leave(f"interrupted; {outcome}.", exit_code(error))
         except BrokenPipeError:
             raise

@@ -109,7 +109,8 @@ def init(
                     "Name the FOLDER of the measured files, or the model of a robot with --mjcf."
                 )
             own_simulators(simulator or [])
-            content, lines = _of_campaign(run_init(folder, model=model, rig_files=rigs or []), folder)
+            drafted = run_init(folder, model=model, rig_files=rigs or [], listener=listener)
+            content, lines = _of_campaign(drafted, folder)
     if json:
         show_as_json(content)
     elif not quiet:

@@ -61,6 +61,7 @@ def run_init(
     model: str | None = None,
     rig_files: Iterable[Path] = (),
     values: Mapping[str, float] | None = None,
+    listener: Listener = silent,
 ) -> Draft:
     """Write a `campaign.toml` for the measured files of a folder, and a copy of a rig file from elsewhere beside it."""
     folder = Path(folder)
@@ -80,7 +81,7 @@ def run_init(
         raise InputError(
             f"{folder} contains {len(files)} measured files; a campaign can have at most {MOST_RECORDS}."
         )
-    proposals, left_out = proposed_records(files, rigs)
+    proposals, left_out = proposed_records(files, rigs, listener)
     if not proposals:
         reasons = "".join(f"\n{name}: {reason}" for name, reason in left_out[:5])
         raise InputError(
@@ -129,7 +130,7 @@ def run_init_from_mjcf(
     write_together(folder, {path.name: text}, "Free disk space there, or get write permission.")
     campaign = None
     if measured_files(folder):
-        campaign = run_init(folder, model=rig.name, rig_files=[path], values=draft.values)
+        campaign = run_init(folder, model=rig.name, rig_files=[path], values=draft.values, listener=listener)
     return ModelDraft(path, draft, run, campaign)
 
 
@@ -155,11 +156,12 @@ def measured_files(folder: Path) -> list[Path]:
 
 
 def proposed_records(
-    files: Sequence[Path], rigs: Sequence[Rig]
+    files: Sequence[Path], rigs: Sequence[Rig], listener: Listener = silent
 ) -> tuple[list[Proposal], list[tuple[str, str]]]:
     """Return every file as a record of one rig, and the files that cannot be records with the reason."""
     found: dict[Path, Proposal] = {}
     left_out = []
+    stage = Stage("Reading files", len(files), listener)
     for file in files:
         try:
             with open_measurement(file) as opened:
@@ -168,6 +170,7 @@ def proposed_records(
                 found[file] = propose(file, opened, rigs)
         except InputError as error:
             left_out.append((file.name, str(error).removeprefix(file.name).lstrip(":, ")))
+        stage.finished(file.name)
     if len(rigs) > 1 and found:
         fitting = Counter(
             one.guess.rig.name for one in found.values() if one.guess.open_questions == 0
