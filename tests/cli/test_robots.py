@@ -19,7 +19,7 @@ CART = Path(__file__).parents[1] / "robots" / "models" / "cart_pole.xml"
 def test_a_model_becomes_a_rig_file_and_a_campaign_once_records_are_there(tmp_path: Path, run: Run) -> None:
     folder = tmp_path / "stage"
     code, stdout, stderr = run("init", folder, "--mjcf", CART)
-    assert (code, stderr) == (0, "Equations of 2 coordinates ...\nReading files ...\n")
+    assert (code, stderr) == (0, "Equations of 2 coordinates ...\n")
     assert f"Written: {folder / 'cart_pole.toml'} (2 joints)" in stdout
     assert "agrees with MuJoCo, without dry friction" in stdout
     assert "columns t, push_ctrl, slider_position, hinge_angle" in stdout
