@@ -131,6 +131,18 @@ def test_what_mujoco_has_in_motors_alone_is_an_idle_motor(
         assert np.std(ours[name] - theirs[:, i]) < 3e-3 * changed
 
 
+def test_a_filter_that_mujoco_advances_late_is_shorter_by_as_much() -> None:
+    model = model_of({}, {"actuator_lag@shoulder_motor": {"T_a": 0.012}})
+    controls = sweeping()
+    names = [signal.name for signal in model.structure.rig.inputs]
+    record = Record("sweep", STEP, dict(zip(names, controls.T, strict=True)), {}, hold="zoh")
+    start = np.zeros(len(model.structure.states))
+    shown = simulate(model.structure, model.values, record, start)
+    measured = record.with_signals(**{s.name: shown[s.name] for s in model.structure.rig.outputs})
+    for one in gap_of_written(model, ARM, [measured], [start]):
+        assert one.in_mujoco < 1e-3
+
+
 @pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
 def test_a_delay_that_is_no_whole_number_of_steps_is_kept_on_average(tmp_path: Path, integrator: str) -> None:
     arm = tmp_path / ARM.name

@@ -39,23 +39,22 @@ def _added(attribute: str, own: str, entry: int | None = None) -> Write:
 
 
 def _late(own: str) -> Write:
-    def write(element: Any, values: Mapping[str, float], spec: Any) -> str | None:
-        import mujoco
-
+    def write(element: Any, values: Mapping[str, float], spec: Any) -> None:
         late, options = values[own], spec.option
-        if (
-            own == "T_d"
-            and options.integrator == int(mujoco.mjtIntegrator.mjINT_RK4)
-            and element.delay <= 0.0
-        ):
+        if own == "T_d" and _is_runge_kutta(spec) and element.delay <= 0.0:
             # The Runge-Kutta method reads on within a step, where a controller holds its command: half a step early on average.
             late += 0.5 * options.timestep
         element.delay = max(float(element.delay), 0.0) + late
         element.nsample = max(element.nsample, int(element.delay / options.timestep) + _SLACK)
         element.interp = _LINEAR
-        return None
 
     return write
+
+
+def _is_runge_kutta(spec: Any) -> bool:
+    import mujoco
+
+    return bool(spec.option.integrator == int(mujoco.mjtIntegrator.mjINT_RK4))
 
 
 def _cogging(element: Any, values: Mapping[str, float], spec: Any) -> None:
@@ -96,13 +95,15 @@ def _limited(element: Any, values: Mapping[str, float], _: Any) -> str | None:
     return None
 
 
-def _filtered(element: Any, values: Mapping[str, float], _: Any) -> str | None:
+def _filtered(element: Any, values: Mapping[str, float], spec: Any) -> str | None:
     import mujoco
 
     if element.dyntype != mujoco.mjtDyn.mjDYN_NONE:
         return "the actuator has a filter already"
     element.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
-    element.dynprm[0] = values["T_a"]
+    # MuJoCo advances a filter from step to step: under the Runge-Kutta method it comes half a step later than its equation.
+    late = 0.5 * spec.option.timestep if _is_runge_kutta(spec) else 0.0
+    element.dynprm[0] = max(values["T_a"] - late, 0.0)
     return None
 
 
