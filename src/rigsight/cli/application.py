@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from rigsight.cli.check import check
 from rigsight.cli.compare import compare
 from rigsight.cli.demo import demo
 from rigsight.cli.diagnose import diagnose
@@ -55,6 +56,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "demo": demo,
     "inspect": inspect,
     "init": init,
+    "check": check,
     "diagnose": diagnose,
     "power": power,
     "identify": identify,

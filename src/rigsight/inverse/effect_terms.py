@@ -21,11 +21,12 @@ from rigsight.effects.symbols import derivative
 from rigsight.errors import RigsightError
 from rigsight.inverse.controller_terms import ControlledMotion, controlled_motion, of_controller
 from rigsight.inverse.drive_terms import late_drive, lost, of_given, of_required
-from rigsight.inverse.equation_fit import EquationFit, generalized
+from rigsight.inverse.equation_fit import EquationFit, generalized, record_motions
 from rigsight.inverse.joint_force import JointMotion, joint_motion
 from rigsight.inverse.parameter_grid import LEAST_SHARE, POINTS, beside, grid_of, usual
 from rigsight.inverse.sensor_terms import influence, late_reading, of_sensor
 from rigsight.inverse.term import Term, compiled
+from rigsight.records import Record
 from rigsight.rigs import evaluated
 from rigsight.rigs.rig import joint_of
 
@@ -64,6 +65,19 @@ class EffectTerms:
         self._moved: dict[str, list[JointMotion]] = {}
         self._controllers: dict[str, list[ControlledMotion]] = {}
         self._of_lateness: dict[tuple[str, float], tuple[Floats, ...] | None] = {}
+
+    def with_records(self, records: Sequence[Record]) -> EffectTerms:
+        """Return the terms along the motions of further records, too, with the same numbers and grids.
+
+        Raises
+        ------
+        SimulationError
+            If the sensors of a record do not show the motion.
+        """
+        fit = self.fit
+        motions = [*fit.motions, *record_motions(fit.rig, records, self.values)]
+        wider = EquationFit(fit.rig, motions, fit.modelled, fit.free, self.values)
+        return EffectTerms(wider, self.values, self.scales)
 
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term.

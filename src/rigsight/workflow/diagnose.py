@@ -26,6 +26,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate import cache_folder
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.check import CHECK_FILE, CHECK_PAGE, check_files, check_of
 from rigsight.workflow.own.effect_names import candidates_of
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
 from rigsight.workflow.run.progress import Listener, Stage, Step, report_notes, silent
@@ -61,16 +62,19 @@ def run_diagnose(
     """
     jobs = checked_jobs(n_jobs)
     if out is not None:
-        check_writable(Path(out), DIAGNOSIS_FILE, MODEL_FILE, REPORT_FILE)
+        check_writable(Path(out), DIAGNOSIS_FILE, MODEL_FILE, REPORT_FILE, CHECK_FILE, CHECK_PAGE)
+
+    called = command or f"rigsight diagnose {shlex.quote(str(campaign))}"
 
     def keep(diagnosis: Diagnosis) -> None:
         if out is not None:
-            called = command or f"rigsight diagnose {shlex.quote(str(campaign))}"
             write_diagnosis(diagnosis, Path(out), called, seed, (*effects, *own_effects))
 
-    return diagnose_campaign(
-        read_campaign(campaign, own_effects, own_rigs), effects, seed, jobs, listener, keep
-    )
+    read = read_campaign(campaign, own_effects, own_rigs)
+    if out is not None:
+        # Long before the verdict: whoever reads that a record is faulty need not wait for it.
+        write_together(Path(out), check_files(check_of(read, effects, listener), called))
+    return diagnose_campaign(read, effects, seed, jobs, listener, keep)
 
 
 def diagnose_campaign(

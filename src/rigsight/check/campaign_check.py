@@ -1,0 +1,144 @@
+"""A campaign before any fit: its records, what is wrong with them, its parameters, and the matrix of effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rigsight.campaign import Campaign
+from rigsight.check.channels import CheckedRecord, checked_record
+from rigsight.check.coarser_records import coarser_records
+from rigsight.check.effect_matrix import EffectMatrix, effect_matrix
+from rigsight.check.parameters import CheckedParameter, checked_parameters
+from rigsight.check.remarks import Remark, remarks
+from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
+from rigsight.diagnose.data_quality.finding import AmplitudeDependence
+from rigsight.diagnose.fitting.preparation import start_values_of
+from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.effects import Effect
+from rigsight.errors import SimulationError
+from rigsight.identify.fit.windows import liveliest
+from rigsight.identify.linear_view import near_rest
+from rigsight.inverse import numbers_along_motion
+from rigsight.json_data import json_data
+from rigsight.records import Record
+from rigsight.simulate import compose
+from rigsight.simulate.linearization import Linearization
+
+SCHEMA_VERSION = 1
+_OF_EFFECTS, _OF_PARAMETERS = 3000, 40000
+"""Samples of the most excited stretches of all records together along which effects and parameters are compared: a second each."""
+PARTS = ("channels", "noise floors", "remarks", "parameters", "effects")
+"""Steps of a check, as they are reported."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """What the records of a campaign can show."""
+
+    title: str
+    rig: str
+    records: tuple[CheckedRecord, ...]
+    floors: tuple[NoiseFloor, ...]
+    remarks: tuple[Remark, ...]  # the gravest first
+    amplitudes: tuple[AmplitudeDependence, ...]
+    parameters: tuple[CheckedParameter, ...]
+    identifiability: str  # the statement on the parameters
+    matrix: EffectMatrix
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of ``check.json``."""
+        m = self.matrix
+        content = {
+            "schema_version": SCHEMA_VERSION,
+            "title": self.title,
+            "rig": self.rig,
+            "records": [
+                {**vars(r), "channels": [{**vars(c), "usable": c.usable} for c in r.channels]}
+                for r in self.records
+            ],
+            "noise": [
+                {
+                    "output": f.output,
+                    "unit": f.unit,
+                    "std": f.std,
+                    "method": f.method,
+                    "lower_bound": f.lower_bound,
+                }
+                for f in self.floors
+            ],
+            "findings": [vars(remark) for remark in self.remarks],
+            "amplitudes": [answer.to_json() for answer in self.amplitudes],
+            "parameters": [vars(parameter) for parameter in self.parameters],
+            "identifiability": self.identifiability,
+            "effects": {
+                "judged": [
+                    {"effect": e, "family": str(f), "where": w, "visible": v}
+                    for e, f, w, v in zip(m.effects, m.families, m.where, m.visible, strict=True)
+                ],
+                "told_apart": m.told,
+                "other_motions": [
+                    {"effects": [m.effects[j], m.effects[i]], "motion": motion}
+                    for (i, j), motion in m.motions.items()
+                ],
+                "not_judged": m.not_judged,
+                "reason": m.reason or None,
+            },
+        }
+        return dict(json_data(content))
+
+
+def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[[str], None]) -> Check:
+    """Return what the records of a campaign can show.
+
+    Parameters
+    ----------
+    campaign
+        Read and checked.
+    effects
+        Candidates at their places.
+    say
+        Called with each of `PARTS` that is done.
+    """
+    rig = campaign.rig
+    records = tuple(checked_record(rig, record) for record in campaign.records)
+    say(PARTS[0])
+    coarser = coarser_records(rig, campaign.estimation)
+    short = liveliest(coarser, rig, _OF_EFFECTS)
+    floors = noise_floors(rig, campaign.records, campaign.drifts)
+    say(PARTS[1])
+    values = _values(replace(campaign, records=short))
+    linear = _near_rest(campaign, short, values)
+    found = remarks(campaign, short, records, floors, linear)
+    faulty = {(one.record or "", one.signal or "") for one in found if one.severity == "fault"}
+    answers = amplitude_dependences(rig, coarser, faulty)
+    say(PARTS[2])
+    parameters, statement = checked_parameters(
+        campaign, liveliest(coarser, rig, _OF_PARAMETERS), values, {f.output: f.std for f in floors}, linear
+    )
+    say(PARTS[3])
+    matrix = effect_matrix(campaign, short, values, effects)
+    say(PARTS[4])
+    return Check(campaign.title, rig.name, records, floors, found, answers, parameters, statement, matrix)
+
+
+def _values(campaign: Campaign) -> dict[str, float]:
+    """Return the given numbers; what is not given follows from a regression along the motion, or as for a fit."""
+    given = {**campaign.constants, **campaign.given}
+    if all(p.name in given for p in campaign.rig.parameters):
+        return given
+    along = numbers_along_motion(campaign, given)
+    return {**(start_values_of(campaign) if along is None else along), **given}
+
+
+def _near_rest(
+    campaign: Campaign, records: Sequence[Record], values: Mapping[str, float]
+) -> Linearization | None:
+    """Return the equations linearized near rest in the first record; None where they have no rest."""
+    try:
+        structure = compose(campaign.rig, campaign.modelled)
+        return near_rest(structure, {**values, **records[0].constants}, records[:1])
+    except SimulationError:
+        return None

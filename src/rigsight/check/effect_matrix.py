@@ -1,0 +1,146 @@
+"""Which effects can the records tell apart, which only another motion, and which no record of these sensors?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from rigsight.campaign import Campaign
+from rigsight.effects import Effect, Family
+from rigsight.errors import SimulationError
+from rigsight.inverse.propose import along_motion
+from rigsight.inverse.separability import Pushes
+from rigsight.records import Record
+from rigsight.simulate import compose, record_values, simulate
+
+Told = Literal["apart", "by size", "other motion", "never"]
+"""Whether two effects can be told apart: here, depending on their size, by another motion, or not with these sensors."""
+_OTHER = 3.0
+"""Factor of the amplitude and of the speed of other motions."""
+_LONGEST = 600
+"""Samples of each other motion."""
+
+
+@dataclass(frozen=True)
+class EffectMatrix:
+    """Pairs of effects, in the order of the catalogue.
+
+    Attributes
+    ----------
+    effects, families, where
+        Name, family and place of each effect.
+    visible
+        Whether each effect shows beside the parameters in these records.
+    told
+        Whether the effects of a row and a column can be told apart.
+    motions
+        Of pairs that another motion tells apart, the first motion that does.
+    not_judged
+        Names of the effects that only fits of the simulation find.
+    reason
+        Why there is no matrix; empty where there is one.
+    """
+
+    effects: tuple[str, ...] = ()
+    families: tuple[Family, ...] = ()
+    where: tuple[str, ...] = ()
+    visible: tuple[bool, ...] = ()
+    told: tuple[tuple[Told, ...], ...] = ()
+    motions: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    not_judged: tuple[str, ...] = ()
+    reason: str = ""
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Pairs of effects, each once."""
+        return [(i, j) for i in range(len(self.effects)) for j in range(i)]
+
+    def share(self, told: Told) -> float:
+        """Return the share of the pairs with an answer."""
+        found = [self.told[i][j] == told for i, j in self.pairs]
+        return float(np.mean(found)) if found else 0.0
+
+
+def effect_matrix(
+    campaign: Campaign, records: Sequence[Record], values: Mapping[str, float], effects: Sequence[Effect]
+) -> EffectMatrix:
+    """Return which effects can be told apart.
+
+    Parameters
+    ----------
+    campaign
+        With the rig and the modelled effects.
+    records
+        Short estimation records.
+    values
+        Constants and parameters of the rig and of modelled effects.
+    effects
+        Candidates at their places.
+    """
+    terms_of = along_motion(replace(campaign, records=tuple(records)), values)
+    if terms_of is None:
+        return EffectMatrix(
+            reason="The sensors do not show the whole motion, or a modelled effect acts at a drive or a sensor. Effects cannot "
+            "be compared along the motion."
+        )
+    rig, n = campaign.rig, len(terms_of.fit.motions)
+    others = _other_motions(campaign, records, terms_of.values)
+    pushes = Pushes(terms_of.with_records([record for _, record in others]), effects)
+    here = pushes.along(range(n))
+    along = {what: pushes.along([n + i]) for i, (what, _) in enumerate(others)}
+    if along:
+        along["all of these"] = pushes.along(range(n + len(others)))
+    told: list[list[Told]] = [["apart"] * len(pushes.effects) for _ in pushes.effects]
+    motions: dict[tuple[int, int], str] = {}
+    for i in range(len(pushes.effects)):
+        for j in range(i):
+            answer: Told = "apart"
+            if not here.are_apart(i, j):
+                by = next((what for what, own in along.items() if own.are_apart(i, j)), None)
+                known = here.are_apart(i, j)
+                answer = "other motion" if by else "by size" if known is None else "never"
+                if by:
+                    motions[i, j] = by
+            told[i][j] = told[j][i] = answer
+    named = {effect.name for effect in pushes.effects}
+    return EffectMatrix(
+        tuple(effect.name for effect in pushes.effects),
+        tuple(effect.family for effect in pushes.effects),
+        tuple(rig.where(effect) for effect in pushes.effects),
+        tuple(here.is_visible(i) for i in range(len(pushes.effects))),
+        tuple(map(tuple, told)),
+        motions,
+        tuple(effect.name for effect in effects if effect.name not in named),
+    )
+
+
+def _other_motions(
+    campaign: Campaign, records: Sequence[Record], values: Mapping[str, float]
+) -> list[tuple[str, Record]]:
+    """Return the liveliest record simulated with other amplitudes, at other speeds, and about rest."""
+    rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
+    sensor = rig.outputs[0].name
+    liveliest = max(records, key=lambda r: float(np.var(r[sensor])) if sensor in r else 0.0)
+    record = liveliest.slice(0, _LONGEST)
+    inputs = [signal.name for signal in rig.inputs]
+    mean = {name: float(np.mean(record[name])) for name in inputs}
+
+    def scaled(factor: float, around: float = 1.0) -> dict[str, np.ndarray]:
+        return {name: around * mean[name] + factor * (record[name] - mean[name]) for name in inputs}
+
+    asked = {
+        "a larger amplitude": record.with_signals(**scaled(_OTHER)),
+        "a smaller amplitude": record.with_signals(**scaled(1.0 / _OTHER)),
+        "a faster motion": replace(record, dt=record.dt / _OTHER),
+        "a motion in both directions": record.with_signals(**scaled(_OTHER, around=0.0)),
+    }
+    found = []
+    for what, moved in asked.items():
+        try:
+            found.append((what, simulate(structure, record_values(structure, values, moved), moved)))
+        except SimulationError:
+            continue
+    return found

@@ -1,0 +1,56 @@
+"""The work of `rigsight check`: a campaign -> what its records can show, before anything is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from rigsight.campaign import Campaign
+from rigsight.check import Check, check_campaign
+from rigsight.check.campaign_check import PARTS
+from rigsight.effects import CATALOGUE, Effect
+from rigsight.report.check_page import render_check
+from rigsight.rigs import Rig
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
+
+CHECK_FILE, CHECK_PAGE = "check.json", "check.html"
+
+
+def run_check(
+    campaign: str | Path,
+    out: str | Path | None = None,
+    *,
+    effects: Sequence[Effect] = CATALOGUE,
+    own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
+    listener: Listener = silent,
+    command: str = "",
+) -> Check:
+    """Return what the records of a campaign can show, and write it into a folder as check.json and check.html.
+
+    Raises
+    ------
+    InputError
+        If the campaign or one of its records cannot be read.
+    """
+    if out is not None:
+        check_writable(Path(out), CHECK_FILE, CHECK_PAGE)
+    found = check_of(read_campaign(campaign, own_effects, own_rigs), effects, listener)
+    if out is not None:
+        write_together(Path(out), check_files(found, command))
+    return found
+
+
+def check_of(campaign: Campaign, effects: Sequence[Effect] = CATALOGUE, listener: Listener = silent) -> Check:
+    """Return what the records of a campaign can show."""
+    stage = Stage("Checking", len(PARTS), listener)
+    return check_campaign(campaign, candidates_of(campaign, effects), stage.finished)
+
+
+def check_files(found: Check, command: str) -> dict[str, str]:
+    """Return the files of a check by name."""
+    page = render_check(found, command, versions())
+    return {CHECK_FILE: json_text(found.to_json()), CHECK_PAGE: page}
