@@ -17,7 +17,13 @@ def test_diagnose_leaves_three_results_and_tells_the_verdict(
     out = tmp_path / "out"
     code, stdout, stderr = run("diagnose", axis_campaign, "-o", out, "--effect", "cubic_stiffness", "-j", "1")
     assert code == 0, stderr
-    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.json", "model.json", "report.html"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "check.html",
+        "check.json",
+        "diagnosis.json",
+        "model.json",
+        "report.html",
+    ]
     assert "cubic stiffness" in stdout
     assert str(out / "report.html") in stdout.replace("\n", "")
     assert json.loads((out / "diagnosis.json").read_text())["effects"] == ["cubic_stiffness"]

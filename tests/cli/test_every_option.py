@@ -28,6 +28,7 @@ WORK = {
     "demo": "rigsight.workflow.demo.run_demo",
     "inspect": "rigsight.workflow.inspect.run_inspect",
     "init": "rigsight.workflow.init.run_init",
+    "check": "rigsight.workflow.check.run_check",
     "diagnose": "rigsight.workflow.diagnose.run_diagnose",
     "power": "rigsight.workflow.power.run_power",
     "identify": "rigsight.workflow.identify.run_identify",
@@ -48,6 +49,7 @@ ELSEWHERE = {
 ARGUMENTS: dict[str, list[str]] = {
     "inspect": ["a.csv"],
     "init": ["."],
+    "check": ["."],
     "diagnose": ["."],
     "power": ["."],
     "identify": ["."],

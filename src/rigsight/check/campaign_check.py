@@ -24,12 +24,13 @@ from rigsight.identify.linear_view import near_rest
 from rigsight.inverse import numbers_along_motion
 from rigsight.json_data import json_data
 from rigsight.records import Record
+from rigsight.records.signals import is_constant
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
 
 SCHEMA_VERSION = 1
 _OF_EFFECTS, _OF_PARAMETERS = 3000, 40000
-"""Samples of the most excited stretches of all records together along which effects and parameters are compared: a second each."""
+"""Samples of the most excited stretches of all records together for effects and for parameters: a second each."""
 PARTS = ("channels", "noise floors", "remarks", "parameters", "effects")
 """Steps of a check, as they are reported."""
 
@@ -109,7 +110,7 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     short = liveliest(coarser, rig, _OF_EFFECTS)
     floors = noise_floors(rig, campaign.records, campaign.drifts)
     say(PARTS[1])
-    values = _values(replace(campaign, records=short))
+    values = _values(replace(campaign, records=coarser))
     linear = _near_rest(campaign, short, values)
     found = remarks(campaign, short, records, floors, linear)
     faulty = {(one.record or "", one.signal or "") for one in found if one.severity == "fault"}
@@ -125,12 +126,21 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
 
 
 def _values(campaign: Campaign) -> dict[str, float]:
-    """Return the given numbers; what is not given follows from a regression along the motion, or as for a fit."""
+    """Return the given numbers; others follow from regressions of the records, without a fit where possible."""
     given = {**campaign.constants, **campaign.given}
     if all(p.name in given for p in campaign.rig.parameters):
         return given
-    along = numbers_along_motion(campaign, given)
+    along = None if _responds_in_spectra(campaign, given) else numbers_along_motion(campaign, given)
     return {**(start_values_of(campaign) if along is None else along), **given}
+
+
+def _responds_in_spectra(campaign: Campaign, known: Mapping[str, float]) -> bool:
+    """Return whether a rig of one driven mass has a known gain: its numbers follow from the spectra, noisy or not."""
+    rig = campaign.rig
+    if not (rig.has_one_motion and rig.is_driven):
+        return False
+    moves = any(not is_constant(record[rig.inputs[0].name]) for record in campaign.estimation)
+    return moves and {symbol.name for symbol in rig.motion.drive_gain.free_symbols} <= known.keys()
 
 
 def _near_rest(

@@ -26,8 +26,8 @@ _LONGEST = 2**16
 _TOP = 0.85
 """Share of the spectral lines above which no rig responds (an assumption)."""
 _FEWEST_LINES = 8
-_SCATTER = 0.8
-"""Standard deviation of the logarithm of the power of noise from line to line: 1.28 for many lines."""
+_SCATTER = 1.2
+"""Standard deviation of the step of the logarithm of the power from line to line: that of noise is 1.81."""
 _CLEAR = 3.0
 """Signal over noise [dB] from which an octave counts as usable: twice the noise power."""
 
@@ -123,7 +123,7 @@ def _white_noise(samples: Floats) -> float:
     lines = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2 / np.sum(window**2)
     # Lines next to each other share what the window lets through.
     power = lines[int(_TOP * lines.size) :: 2]
-    if power.size < _FEWEST_LINES or np.min(power) <= 0.0 or np.std(np.log(power)) < _SCATTER:
+    if power.size < _FEWEST_LINES or np.min(power) <= 0.0 or np.std(np.diff(np.log(power))) < _SCATTER:
         return 0.0
     # The power of a line of noise is exponentially distributed: its median is log 2 times its mean.
     return float(np.sqrt(np.median(power) / np.log(2.0)))

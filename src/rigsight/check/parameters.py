@@ -21,7 +21,7 @@ from rigsight.simulate.linearization import Linearization
 Status = Literal["determined", "weak", "only with others", "not determined"]
 _WEAK = 0.1
 """Relative standard error from which a parameter is known badly (a convention)."""
-_EVALUATIONS = 12
+_EVALUATIONS = 60
 """Of a rough fit: near enough for what the records determine, not for the numbers."""
 
 

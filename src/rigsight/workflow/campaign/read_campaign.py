@@ -101,11 +101,14 @@ def _read_all(
     given: Collection[str],
 ) -> tuple[Rig, list[tuple[RecordTable, Record]]]:
     """Return the rig in the units that the columns of its records state, and all stretches of these records in them."""
-    listed = [*zip(tables, files, strict=True)]
-    found = [
-        read_listed_record(path, rig, number, table, file, where, given, other)
-        for number, (table, file) in enumerate(listed, 1)
-    ]
+    listed, found, errors = [*zip(tables, files, strict=True)], [], list[str]()
+    for number, (table, file) in enumerate(listed, 1):
+        try:
+            found.append(read_listed_record(path, rig, number, table, file, where, given, other))
+        except InputError as error:
+            errors.append(str(error))
+    if errors:
+        raise InputError("\n".join(errors))
     in_other = [parts[0] for parts in found if other is not None and is_in_units_of(other, parts[0])]
     if other is not None and in_other:
         rig = other

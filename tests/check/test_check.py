@@ -1,0 +1,114 @@
+"""What a check says of an axis whose parameters, faults and pairs of effects are known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigsight.campaign import Campaign
+from rigsight.check import Check, check_campaign
+from rigsight.effects import CATALOGUE, effect_named
+from rigsight.records import Record
+from rigsight.workflow.own.effect_names import candidates_of
+
+from .axis_records import DT, campaign, swept
+
+SOME = ("coulomb_friction", "quadratic_damping", "cubic_stiffness", "input_delay", "actuator_lag")
+
+
+def check(own: Campaign, names: tuple[str, ...] = SOME) -> Check:
+    return check_campaign(own, candidates_of(own, [effect_named(name) for name in names]), lambda _: None)
+
+
+def told(found: Check, first: str, second: str) -> str:
+    names = found.matrix.effects
+    return found.matrix.told[names.index(first)][names.index(second)]
+
+
+@pytest.fixture(scope="module")
+def both_ways() -> Check:
+    return check(campaign(swept(), swept(30.0)))
+
+
+def test_parameters_that_the_records_determine_and_those_that_act_together(both_ways: Check) -> None:
+    status = {p.name: p.status for p in both_ways.parameters}
+    assert [status[name] for name in ("m", "d", "k")] == ["determined"] * 3
+    assert status["x_off"] == status["force_off"] == "only with others"
+
+
+def test_laws_that_push_differently_are_told_apart_and_a_short_delay_is_a_lag(both_ways: Check) -> None:
+    assert told(both_ways, "coulomb_friction", "quadratic_damping") == "apart"
+    assert told(both_ways, "coulomb_friction", "cubic_stiffness") == "apart"
+    assert told(both_ways, "input_delay", "actuator_lag") == "never"
+
+
+def test_friction_shows_only_in_a_motion_in_both_directions() -> None:
+    # The mass rises all the time: dry friction is a constant force.
+    t = DT * np.arange(3000)
+    found = check(
+        campaign(40.0 * t + 5.0 * np.sin(2.0 * np.pi * 0.5 * t)), ("coulomb_friction", "cubic_stiffness")
+    )
+    names = found.matrix.effects
+    assert not found.matrix.visible[names.index("coulomb_friction")]
+    assert told(found, "coulomb_friction", "cubic_stiffness") == "other motion"
+
+
+def test_the_whole_catalogue_gives_json_without_numbers_that_json_lacks(both_ways: Check) -> None:
+    found = check(campaign(), tuple(effect.name for effect in CATALOGUE))
+    content = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    judged = [entry["effect"] for entry in content["effects"]["judged"]]
+    assert "flexible_mode" in content["effects"]["not_judged"]
+    assert [len(row) for row in content["effects"]["told_apart"]] == [len(judged)] * len(judged)
+
+
+def severities(found: Check, signal: str | None) -> list[str]:
+    return [remark.severity for remark in found.remarks if remark.signal == signal]
+
+
+def test_a_noisy_input_is_a_warning_and_a_clean_one_is_not(both_ways: Check) -> None:
+    own = campaign()
+    rng = np.random.default_rng(3)
+    noisy = [r.with_signals(u=r["u"] + rng.standard_normal(r.n_samples)) for r in own.records]
+    assert "warning" in severities(check(replace(own, records=tuple(noisy))), "u")
+    assert "warning" not in severities(both_ways, "u")
+
+
+def free(damping: float) -> Campaign:
+    t = DT * np.arange(2000)
+    x = 0.01 * np.exp(-damping * t) * np.cos(20.0 * t)
+    record = Record(
+        "free",
+        DT,
+        {"u": np.zeros(t.size), "x": x + 1e-6 * np.random.default_rng(0).standard_normal(t.size)},
+        {},
+    )
+    return replace(campaign(), records=(record,))
+
+
+def test_a_free_motion_that_does_not_decay_is_a_warning() -> None:
+    assert "warning" in severities(check(free(-0.01)), "x")
+    assert "warning" not in severities(check(free(0.05)), "x")
+
+
+def test_an_unstable_rig_is_a_warning_and_its_parameters_are_known_all_the_same() -> None:
+    own = campaign()
+    unstable = replace(own, parameters={**own.parameters, "k": -30.0, "d": 5.0})
+    found = check(replace(unstable, records=(held_by_a_loop(),)))
+    assert any(remark.severity == "warning" and "pole" in remark.sentence for remark in found.remarks)
+    assert {p.name: p.status for p in found.parameters}["m"] == "determined"
+
+
+def held_by_a_loop() -> Record:
+    """Return an unstable mass under a controller."""
+    n, x, v = 3000, 0.0, 0.0
+    goal = 0.01 * np.sin(np.cumsum(np.linspace(0.01, 0.1, n)))
+    u, reading = np.zeros(n), np.zeros(n)
+    for i in range(n):
+        reading[i], u[i] = x, 2000.0 * (goal[i] - x) - 60.0 * v
+        for _ in range(10):
+            v += 0.1 * DT * (u[i] - 5.0 * v + 30.0 * x) / 2.0
+            x += 0.1 * DT * v
+    return Record("held", DT, {"u": u, "x": reading, "reference": goal}, {}, hold="zoh")
