@@ -28,6 +28,7 @@ PACKAGES = (
     "discover",
     "compare",
     "diagnose",
+    "check",
     "workflow",
     "plot",
     "report",
@@ -38,6 +39,7 @@ PACKAGES = (
 COMMANDS = (
     "campaign.read_campaign",
     "diagnose",
+    "check",
     "power",
     "identify",
     "discover",

@@ -33,6 +33,7 @@ MOVED = {
     "experiments/places/README.md": "experiments/places.md",
     "experiments/adequacy/README.md": "experiments/adequacy.md",
     "experiments/calibration/README.md": "experiments/calibration.md",
+    "experiments/matrix/README.md": "experiments/matrix.md",
     "experiments/missing_force/README.md": "experiments/missing_force.md",
     "experiments/evidence/README.md": "experiments/evidence.md",
     "experiments/coverage/README.md": "experiments/coverage.md",

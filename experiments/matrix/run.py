@@ -39,7 +39,7 @@ def rivals(found: Check, hidden: str, rng: np.random.Generator) -> Iterator[tupl
 
 
 def judged(trial: Trial, seed: int, number: int) -> Iterator[dict[str, object]]:
-    """Yield each pair of a trial with the answer of the matrix and the effect that the diagnosis puts first."""
+    """Yield each pair of a trial with the answer of the matrix and which of the two the diagnosis puts first."""
     hidden = list(trial.key["effects"])
     if len(hidden) != 1 or trial.modelled:
         return
@@ -52,7 +52,8 @@ def judged(trial: Trial, seed: int, number: int) -> Iterator[dict[str, object]]:
     visible = found.matrix.visible[found.matrix.effects.index(hidden[0])]
     for rival, answer in rivals(found, hidden[0], np.random.default_rng([seed, number])):
         diagnosis = diagnose_campaign(campaign, [candidates[hidden[0]], candidates[rival]], seed=0)
-        first = diagnosis.candidates[0].effects if diagnosis.candidates else ()
+        alone = [candidate.effects for candidate in diagnosis.candidates if len(candidate.effects) == 1]
+        first = alone[0] if alone else ()
         yield {
             "trial": number,
             "rig": campaign.rig.name,

@@ -49,6 +49,11 @@ class Check:
     identifiability: str  # the statement on the parameters
     matrix: EffectMatrix
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Faults and warnings, each with what to do."""
+        return tuple(f"{r.sentence} {r.remedy}".strip() for r in self.remarks if r.severity != "note")
+
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``check.json``."""
         m = self.matrix

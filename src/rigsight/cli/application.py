@@ -22,6 +22,7 @@ from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
 from rigsight.cli.power import power
+from rigsight.cli.reproduce import reproduce
 from rigsight.cli.rigs import list_rigs
 from rigsight.cli.simulate import simulate
 from rigsight.cli.vary import vary
@@ -59,6 +60,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "check": check,
     "diagnose": diagnose,
     "power": power,
+    "reproduce": reproduce,
     "identify": identify,
     "discover": discover,
     "compare": compare,

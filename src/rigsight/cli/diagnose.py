@@ -40,6 +40,10 @@ def diagnose(
     effects: OwnEffects = None,
     rigs: OwnRigs = None,
     simulator: Simulators = None,
+    by: Annotated[
+        str,
+        typer.Option(metavar="NAME", show_default="nobody", help="Who made it, for the foot of the report."),
+    ] = "",
     seed: Seed = 0,
     jobs: Jobs = None,
     json: Json = False,
@@ -48,7 +52,8 @@ def diagnose(
 ) -> None:
     """Find which effect is missing in a simulation, where it acts, and how far it closes the gap.
 
-    Writes diagnosis.json, model.json and report.html into DIR; all files or none.
+    Begins with the check of the records. Writes diagnosis.json, model.json, report.html, check.json and check.html into DIR; all
+    files or none.
     """
     with report_errors(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.diagnose import run_diagnose
@@ -67,6 +72,7 @@ def diagnose(
             n_jobs=jobs,
             listener=listener,
             command=command_line(),
+            by=by,
         )
     if json:
         show_json(out / "diagnosis.json")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,8 +39,9 @@ def render_report(
     versions: Mapping[str, str],
     seed: int | None = None,
     own_effects: Iterable[Effect] = (),
+    origin: Mapping[str, Any] | None = None,
 ) -> str:
-    """Return the report as one HTML page."""
+    """Return the report as one HTML page; `origin` is what repeats it, see `workflow.run.origin`."""
     known = known_effects(own_effects)
     responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
     script = _script()
@@ -49,6 +51,8 @@ def render_report(
         versions,
         seed,
         diagnosis=diagnosis,
+        origin=origin,
+        origin_text=json.dumps(origin),
         quality=diagnosis.data_quality,
         labels=labels,
         wording=wording,

@@ -29,6 +29,7 @@ from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.check import CHECK_FILE, CHECK_PAGE, check_files, check_of
 from rigsight.workflow.own.effect_names import candidates_of
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
+from rigsight.workflow.run.origin import origin
 from rigsight.workflow.run.progress import Listener, Stage, Step, report_notes, silent
 from rigsight.workflow.run.results import (
     DIAGNOSIS_FILE,
@@ -55,8 +56,9 @@ def run_diagnose(
     n_jobs: int | None = None,
     listener: Listener = silent,
     command: str | None = None,
+    by: str = "",
 ) -> Diagnosis:
-    """Diagnose the gap between the simulation that a campaign gives and its records.
+    """Diagnose the gap between the simulation that a campaign gives and its records; `by` signs the report.
 
     Fits of an interrupted diagnosis of the same campaign are reused; the listener gets a step that says so.
     """
@@ -65,15 +67,18 @@ def run_diagnose(
         check_writable(Path(out), DIAGNOSIS_FILE, MODEL_FILE, REPORT_FILE, CHECK_FILE, CHECK_PAGE)
 
     called = command or f"rigsight diagnose {shlex.quote(str(campaign))}"
+    read = read_campaign(campaign, own_effects, own_rigs)
+    if out is None:
+        return diagnose_campaign(read, effects, seed, jobs, listener)
+    folder, check = Path(out), check_of(read, effects, listener)
+    # Whoever reads that a record is faulty need not wait for the verdict.
+    report_notes(check.warnings, listener)
 
     def keep(diagnosis: Diagnosis) -> None:
-        if out is not None:
-            write_diagnosis(diagnosis, Path(out), called, seed, (*effects, *own_effects))
+        made_from = origin(read, diagnosis, called, folder, by)
+        results = result_files(diagnosis, called, seed, (*effects, *own_effects), made_from)
+        write_together(folder, {**check_files(check, called), **results})
 
-    read = read_campaign(campaign, own_effects, own_rigs)
-    if out is not None:
-        # Long before the verdict: whoever reads that a record is faulty need not wait for it.
-        write_together(Path(out), check_files(check_of(read, effects, listener), called))
     return diagnose_campaign(read, effects, seed, jobs, listener, keep)
 
 
@@ -127,14 +132,18 @@ def write_diagnosis(
 
 
 def result_files(
-    diagnosis: Diagnosis, command: str, seed: int | None, effects: Iterable[Effect] = CATALOGUE
+    diagnosis: Diagnosis,
+    command: str,
+    seed: int | None,
+    effects: Iterable[Effect] = CATALOGUE,
+    made_from: Mapping[str, Any] | None = None,
 ) -> dict[str, str]:
     """Return the three results of a diagnosis by file name."""
     return {
         DIAGNOSIS_FILE: json_text(diagnosis.to_json()),
         MODEL_FILE: json_text(diagnosis.model),
         REPORT_FILE: render_report(
-            diagnosis, command=command, versions=versions(), seed=seed, own_effects=effects
+            diagnosis, command, versions(), seed=seed, own_effects=effects, origin=made_from
         ),
     }
 

@@ -1,0 +1,162 @@
+"""The work of `rigsight reproduce`: a report -> the same diagnosis run again, and whether it says the same."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+from rigsight.errors import InputError
+from rigsight.json_data import json_data
+from rigsight.workflow.run.origin import digests
+from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, versions, write_together
+
+SCHEMA_VERSION = 1
+REPRODUCTION_FILE = "reproduction.json"
+_NAME = "rigsight-origin"
+_KEYS = {"command", "ran_in", "campaign", "versions", "inputs", "results"}
+_EXECUTES = ("--effects", "--simulator")
+"""Options that name a Python file, which a report that somebody sent must not run."""
+_SAME = 1e-6
+"""Relative difference of numbers that count as the same: another machine rounds differently."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A result that is not what the report says."""
+
+    key: str  # its place in ``diagnosis.json``, as in ``families.0.probability``
+    reported: Any
+    found: Any
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A diagnosis that was run again."""
+
+    command: tuple[str, ...]  # the arguments behind ``rigsight``
+    changed_inputs: tuple[
+        str, ...
+    ]  # files that are not those of the report, or are missing; nothing was run then
+    versions: Mapping[str, tuple[str, str]]  # package -> version of the report and here, where they differ
+    differences: tuple[Difference, ...]
+
+    @property
+    def is_same(self) -> bool:
+        """Whether the report can be trusted to say what its inputs say."""
+        return not self.changed_inputs and not self.differences
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of ``reproduction.json``."""
+        return dict(json_data({"schema_version": SCHEMA_VERSION, "same": self.is_same, **vars(self)}))
+
+
+def run_reproduce(report: Path, out: Path, run: Callable[[Sequence[str], Path], None]) -> Reproduction:
+    """Run the diagnosis of a report again and compare.
+
+    Parameters
+    ----------
+    report
+        A report.html of a diagnosis of files.
+    out
+        Folder for the new results and for ``reproduction.json``.
+    run
+        Runs rigsight with arguments in a folder; raises InputError where it fails.
+
+    Raises
+    ------
+    InputError
+        If the file is no such report, its command runs Python files, or the diagnosis fails.
+    """
+    check_writable(out, REPRODUCTION_FILE)
+    made = read_origin(report)
+    command, folder = _command(report, made["command"]), report.resolve().parent
+    campaign = (folder / made["campaign"]).resolve()
+    now = digests(campaign.parent, made["inputs"])
+    changed = tuple(name for name, digest in made["inputs"].items() if now[name] != digest)
+    here = versions()
+    apart = {name: (own, here.get(name, "not installed")) for name, own in made["versions"].items()}
+    apart = {name: pair for name, pair in apart.items() if pair[0] != pair[1]}
+    differences: tuple[Difference, ...] = ()
+    if not changed:
+        run([*command, "--out", str(out.resolve())], (folder / made["ran_in"]).resolve())
+        found = json.loads((out / DIAGNOSIS_FILE).read_text("utf-8"))
+        differences = tuple(_differences("", made["results"], {key: found[key] for key in made["results"]}))
+    result = Reproduction(tuple(command), changed, apart, differences)
+    write_together(out, {REPRODUCTION_FILE: json_text(result.to_json())})
+    return result
+
+
+def read_origin(report: Path) -> dict[str, Any]:
+    """Return what a report carries about itself."""
+    try:
+        text = report.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{report} cannot be read: {error}. Name the report.html of a diagnosis.") from None
+    parser = _Origin()
+    parser.feed(text)
+    try:
+        made = json.loads(parser.content)
+    except ValueError:
+        made = None
+    if not isinstance(made, dict) or not made.keys() >= _KEYS:
+        raise InputError(
+            f"{report} does not say what it was made of: it is no report of 'rigsight diagnose', or one of a version before it "
+            "could be repeated. Run the diagnosis again."
+        )
+    return made
+
+
+class _Origin(HTMLParser):
+    """Finds the entry of a page's head that says what it was made of."""
+
+    content = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        own = dict(attrs)
+        if tag == "meta" and own.get("name") == _NAME:
+            self.content = own.get("content") or ""
+
+
+def _command(report: Path, command: str) -> list[str]:
+    """Return the arguments of a diagnosis without the folder of its results."""
+    words = shlex.split(command)
+    if words[:2] != ["rigsight", "diagnose"]:
+        raise InputError(f"{report} was made by '{command}'; only 'rigsight diagnose' can be repeated.")
+    for word in words:
+        if word.split("=")[0] in _EXECUTES:
+            raise InputError(
+                f"{report} was made with {word}, which runs a Python file. Look at that file, then run the command yourself: "
+                f"{command}"
+            )
+    kept, skips = list[str](), False
+    for word in words[1:]:
+        if skips:
+            skips = False
+        elif word in ("-o", "--out"):
+            skips = True
+        elif not word.startswith("--out=") and word not in ("--json", "--quiet", "-q"):
+            kept.append(word)
+    return kept
+
+
+def _differences(key: str, reported: Any, found: Any) -> Iterator[Difference]:
+    """Yield where two results differ by more than rounding."""
+    if isinstance(reported, dict) and isinstance(found, dict):
+        for name in dict.fromkeys((*reported, *found)):
+            yield from _differences(f"{key}.{name}".lstrip("."), reported.get(name), found.get(name))
+    elif isinstance(reported, list) and isinstance(found, list) and len(reported) == len(found):
+        for number, (one, other) in enumerate(zip(reported, found, strict=True)):
+            yield from _differences(f"{key}.{number}", one, other)
+    elif not _is_same(reported, found):
+        yield Difference(key, reported, found)
+
+
+def _is_same(reported: Any, found: Any) -> bool:
+    numbers = isinstance(reported, float | int) and isinstance(found, float | int)
+    return math.isclose(reported, found, rel_tol=_SAME, abs_tol=_SAME**2) if numbers else reported == found
