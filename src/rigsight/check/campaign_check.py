@@ -21,7 +21,7 @@ from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.windows import liveliest
 from rigsight.identify.linear_view import near_rest
-from rigsight.inverse import numbers_along_motion
+from rigsight.inverse import numbers_along_motion, with_all_inputs
 from rigsight.json_data import json_data
 from rigsight.records import Record
 from rigsight.records.signals import is_constant
@@ -111,7 +111,7 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     rig = campaign.rig
     records = tuple(checked_record(rig, record) for record in campaign.records)
     say(PARTS[0])
-    coarser = coarser_records(rig, campaign.estimation)
+    coarser = coarser_records(rig, [with_all_inputs(rig, record) for record in campaign.estimation])
     short = liveliest(coarser, rig, _OF_EFFECTS)
     floors = noise_floors(rig, campaign.records, campaign.drifts)
     say(PARTS[1])
