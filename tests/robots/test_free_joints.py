@@ -16,8 +16,6 @@ from rigsight.robots import RobotFile, free_run, gap_of_written, read_robot, wri
 from rigsight.simulate import compose, parameter_vector, simulate
 from rigsight.simulate.model import Model
 
-from ..tiers import slow_but
-
 FLOATING = Path(__file__).parent / "models" / "floating_leg.xml"
 DT, N = 0.002, 200
 
@@ -26,8 +24,7 @@ MIMIC = f"""
 <mujoco><worldbody>
   <body><joint name="lead" axis="0 0 1" damping="0.02"/>{BODY.format(to="0.1 0 0")}</body>
   <body><joint name="follow" axis="0 0 1" damping="0.02"/>{BODY.format(to="0.1 0 0")}</body>
-</worldbody><equality><joint joint1="follow" joint2="lead" polycoef="0 -1 0 0 0"/></equality>
-<actuator><motor name="close" joint="lead" ctrlrange="-0.1 0.1"/></actuator></mujoco>"""
+</worldbody><equality><joint joint1="follow" joint2="lead" polycoef="0 -1 0 0 0"/></equality></mujoco>"""
 FOUR_BAR = f"""
 <mujoco><worldbody>
   <body><joint name="crank" axis="0 1 0" damping="0.05"/>{BODY.format(to="0 0 0.2")}
@@ -111,7 +108,10 @@ def test_numbers_go_back_into_the_model(robot: RobotFile) -> None:
         assert gap.in_mujoco < 1e-5
 
 
-@pytest.mark.parametrize("text", slow_but(MIMIC, of=[MIMIC, FOUR_BAR]))
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "text", [MIMIC, FOUR_BAR], ids=["equality of joints, no actuator", "four-bar linkage"]
+)
 def test_what_binds_joints_stays_in_mujoco(text: str, tmp_path: Path) -> None:
     path = tmp_path / "bound.xml"
     path.write_text(text, encoding="utf-8")
