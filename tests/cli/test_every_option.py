@@ -84,6 +84,7 @@ GIVEN: dict[str, list[str]] = {
     "--step": ["0.01"],
     "--source-only": [],
     "--mjcf": ["arm.xml"],
+    "--usd": ["arm.usda", "--to", "usd"],
     "--parameter": ["d"],
     "--from": ["1.0"],
     "--lowest": ["1.0", "--highest", "9.0"],
@@ -127,6 +128,7 @@ REFUSED = {
     "export": [
         ["--source-only"],
         ["--mjcf", "arm.xml"],
+        ["--usd", "arm.usda"],
         ["--to", "latex", "--hold", "zoh"],
         ["--to", "c", "--step", "1e-3"],
     ],

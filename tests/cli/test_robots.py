@@ -93,6 +93,8 @@ def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else
         (["export", "MODEL", "--to", "mjcf", "--mjcf", CART], "has a joint"),
         (["export", "MODEL", "--to", "mjcf", "--mjcf", CART, "--hold", "zoh"], "do not apply to mjcf"),
         (["export", "MODEL", "--to", "c", "--mjcf", CART], "leave it out for c"),
+        (["export", "MODEL", "--to", "mjcf", "--usd", "cart.usda"], "leave it out for mjcf"),
+        (["export", "MODEL", "--to", "usd", "--usd", "cart.usda"], "name the MJCF or URDF file"),
     ],
 )
 def test_what_cannot_be_is_one_message(
@@ -138,6 +140,23 @@ def test_a_model_of_the_robot_is_written_back(tmp_path: Path, run: Run) -> None:
     code, stdout, _ = run("export", model, "--to", "isaac", "--mjcf", CART, "--out", tmp_path / "cart.yaml")
     assert code == 0
     assert "friction: 0.2" in (tmp_path / "cart.yaml").read_text("utf-8")
+    layer = tmp_path / "cart.usda"
+    code, stdout, stderr = run(
+        "export", model, "--to", "usd", "--mjcf", CART, "--out", layer, "--step", "0.005", "--json"
+    )
+    assert (code, stderr) == (0, "")
+    assert "input_delay at push (T_d = 0.01)" in json.loads(stdout)["written"]
+    assert "int newton:delaySteps = 2" in layer.read_text("utf-8")
+    for usd, said in (
+        (tmp_path / "missing.usda", "does not exist"),
+        (layer, "is the model of the robot itself"),
+    ):
+        code, _, stderr = run("export", model, "--to", "usd", "--mjcf", CART, "--usd", usd, "--out", layer)
+        assert code == 2
+        assert said in stderr
+    code, _, stderr = run("export", model, "--to", "isaac", "--mjcf", CART, "--step", "0")
+    assert code == 2
+    assert "--step must lie in" in stderr
 
 
 @pytest.mark.slow

@@ -102,7 +102,11 @@ USED: dict[str, Any] = {
 }
 CHECKED = ("unit", "prescribed_by", "kind")
 """Keys that a check of the whole rig reads: one such key that does not fit the others is refused."""
-REFUSED: dict[str, Any] = {"alternatives.a.default": 1.0, "simulator.without_armature": True}
+REFUSED: dict[str, Any] = {
+    "alternatives.a.default": 1.0,
+    "simulator.without_armature": True,
+    "simulator.states": {"w": "base 0"},
+}
 
 
 def _keys(table: type[BaseModel], prefix: str = "") -> list[str]:

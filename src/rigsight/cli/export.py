@@ -22,7 +22,7 @@ def export(
         typer.Option(
             "--to",
             metavar="TARGET",
-            help="python, control, c, fmu (FMI 2.0), fmu3 (FMI 3.0), matlab, latex, modelica, mjcf or isaac.",
+            help="python, control, c, fmu (FMI 2.0), fmu3 (FMI 3.0), matlab, latex, modelica, mjcf, isaac or usd.",
         ),
     ],
     out: Annotated[
@@ -50,7 +50,7 @@ def export(
             "--step",
             metavar="SECONDS",
             show_default="from the time constants of the model",
-            help="Largest internal time step (python, matlab); physics time step (isaac).",
+            help="Largest internal time step (python, matlab); physics time step (isaac, usd).",
         ),
     ] = None,
     source_only: Annotated[
@@ -63,7 +63,16 @@ def export(
             "--mjcf",
             metavar="FILE",
             show_default="(none)",
-            help="For mjcf and isaac: the MuJoCo model or URDF from which rigsight init made the rig.",
+            help="For mjcf, isaac and usd: the MuJoCo model or URDF from which rigsight init made the rig.",
+        ),
+    ] = None,
+    usd: Annotated[
+        Path | None,
+        typer.Option(
+            "--usd",
+            metavar="FILE",
+            show_default="(none)",
+            help="For usd: the robot, whose joints are found by their names. Without it they are written at /Robot/joints.",
         ),
     ] = None,
     campaign: Annotated[
@@ -83,8 +92,8 @@ def export(
 ) -> None:
     """Write a model for other tools, such as C, MATLAB, an FMU or MuJoCo.
 
-    Writes one file with the equations, the parameter values and their units; it runs without rigsight. mjcf and isaac write
-    parameter values and effects into the fields of MuJoCo and Isaac Lab, and list what these have no field for.
+    Writes one file with the equations, the parameter values and their units; it runs without rigsight. mjcf, isaac and usd
+    write parameter values and effects into the fields of MuJoCo, Isaac Lab and USD, and list what these have no field for.
     """
     with report_errors(debug):
         from rigsight.workflow.export import run_export
@@ -99,6 +108,7 @@ def export(
             step=step,
             source_only=source_only,
             robot=mjcf,
+            usd=usd,
             campaign=campaign,
             own_effects=own_effects(effects or [], check=False),
             own_rigs=own_rigs(rigs or []).values(),

@@ -155,9 +155,14 @@ def _of_robot(written: ModelDraft, folder: Path, as_it_is: bool) -> tuple[dict[s
             f"A free run of {run.duration:.1f} s agrees with MuJoCo{beside}; largest relative difference {run.worst:.1g}."
         )
     else:
+        why = (
+            "Where bodies collide, MuJoCo's own step makes a difference."
+            if as_it_is
+            else f"The head of {written.path} lists what was not taken over."
+        )
         typer.echo(
             f"rigsight: the free run of the rig differs from MuJoCo: the largest relative difference is {run.worst:.1g}, allowed "
-            f"is {run.allowed:g}. The head of {written.path} lists what was not taken over.",
+            f"is {run.allowed:g}. {why}",
             err=True,
         )
     if as_it_is:

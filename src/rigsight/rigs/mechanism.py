@@ -52,7 +52,9 @@ class Mechanism:
     order: tuple[str, ...] = ()  # names of drives and sensors in an order in which none reads one behind it
     # What another program simulates; its mass matrix and forces are added to those of the energies.
     bodies: Bodies | None = None
-    asked: tuple[sp.Symbol, ...] = ()  # parameters and constants that the bodies read, in the order of theirs
+    asked: tuple[
+        sp.Symbol, ...
+    ] = ()  # parameters, constants and states that the bodies read, in the order of theirs
 
     @property
     def free(self) -> tuple[Coordinate, ...]:
@@ -135,7 +137,7 @@ class Mechanism:
 
     @cached_property
     def bodies_are_nonlinear(self) -> bool:
-        """True where bodies that another program simulates read parameters of the rig, or the forces on them."""
+        """True where bodies that another program simulates read parameters or states of the rig, or the forces on them."""
         # Its equations are no sums of terms then, each of one parameter.
         return self.bodies is not None and (bool(self.asked) or self.bodies.program.reads_forces)
 
@@ -176,8 +178,9 @@ class Mechanism:
         return derivative(expression.xreplace(moved), ahead).xreplace({ahead: sp.Integer(0)})
 
     def rate(self, expression: sp.Expr) -> sp.Expr:
-        """Return the time derivative of an expression of the coordinates."""
-        return sum((derivative(expression, c.symbol) * c.rate for c in self.coordinates), start=sp.Integer(0))
+        """Return the time derivative of an expression of the coordinates and states."""
+        rates = [(c.symbol, c.rate) for c in self.coordinates] + [(s.symbol, s.rate) for s in self.states]
+        return sum((derivative(expression, symbol) * rate for symbol, rate in rates), start=sp.Integer(0))
 
     def prescribed_rate(self, expression: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression of prescribed coordinates and their rates."""

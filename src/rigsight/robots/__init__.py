@@ -11,6 +11,7 @@ from rigsight.robots.free_run import sensor_readings as sensor_readings
 from rigsight.robots.isaac import isaac_settings as isaac_settings
 from rigsight.robots.tree import load_model as load_model
 from rigsight.robots.tree import load_spec as load_spec
+from rigsight.robots.usd import usd_layer as usd_layer
 from rigsight.robots.writing_back import WrittenBack as WrittenBack
 from rigsight.robots.writing_back import with_gears as with_gears
 from rigsight.robots.writing_back import write_back as write_back

@@ -15,6 +15,14 @@ from rigsight.errors import InputError
 from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.declared_numbers import DeclaredNumbers, Field, Names
 from rigsight.robots.energies import Energies, energies_of
+from rigsight.robots.free_joints import (
+    FreeJoint,
+    free_joints_of,
+    names_in_simulator,
+    sensor_tables,
+    sensors_of_free_joints,
+    start_of,
+)
 from rigsight.robots.locked_joints import LockedJoint, check_locked
 from rigsight.robots.parts import TreeSensor, actuators_of, left_out_of, sensors_of
 from rigsight.robots.tables import (
@@ -59,6 +67,7 @@ class RigDraft:
     left_out: tuple[str, ...]  # descriptions of the parts of the model that are not in the rig file
     notes: tuple[str, ...]  # descriptions of what was added
     locked: Mapping[str, LockedJoint]  # constant of the rig -> the joint that is held there
+    free_joints: tuple[FreeJoint, ...] = ()  # of a model that is simulated as it is
 
     def index_with_gears(self, joint: int) -> int:
         """Return the number of a joint once each with a gear has its second joint behind it."""
@@ -69,6 +78,18 @@ class RigDraft:
         joints = {name: self.index_with_gears(index) for name, index in self.joints.items()}
         behind = {gear.coordinate: self.index_with_gears(gear.joint) + 1 for gear in self.gears.values()}
         return joints | behind
+
+    def positions(self, model: mujoco.MjModel) -> dict[str, int]:
+        """Return the place in ``qpos`` of each coordinate and of each state that is part of an attitude."""
+        joints = self.joint_of_coordinates()
+        own = {name: int(model.jnt_qposadr[joint]) for name, joint in joints.items()}
+        return own | {name: place for joint in self.free_joints for name, place in joint.positions.items()}
+
+    def rates(self, model: mujoco.MjModel) -> dict[str, int]:
+        """Return the place of the rate of each coordinate in ``qvel``."""
+        joints = self.joint_of_coordinates()
+        own = {name: int(model.jnt_dofadr[joint]) for name, joint in joints.items()}
+        return own | {name: place for joint in self.free_joints for name, place in joint.rates.items()}
 
     def held(self, values: Mapping[str, float]) -> dict[int, float]:
         """Return the positions of locked joints by their numbers, once each joint with a gear has its second one behind it."""
@@ -114,17 +135,25 @@ def draft_rig(
         raise InputError(
             "a gear splits a joint in two, which is impossible if the model is simulated as it is; omit one of the two options"
         )
-    bodies, plays = split_joints(model, bodies_of(model), gears)
+    bodies, plays = split_joints(model, bodies_of(model, only_scalar=as_it_is is None), gears)
     actuators, drives_left_out = actuators_of(model)
-    sensors, sensors_left_out = sensors_of(model, actuators)
-    joints = sorted((joint for body in bodies for joint in body.joints), key=lambda joint: joint.index)
-    check_locked([joint for joint in joints if joint.index < model.njnt], locked, gears)
-    coordinates = [names.free(joint.name or f"joint_{joint.index + 1}", "joint") for joint in joints]
+    free_joints = free_joints_of(model, names)
+    of_free_joints = sensors_of_free_joints(model, free_joints)
+    sensors, sensors_left_out = sensors_of(model, actuators, of_free_joints)
+    joints = {joint.index: joint for body in bodies for joint in body.joints}
+    joints = dict(sorted(joints.items()))
+    check_locked([joint for index, joint in joints.items() if index < model.njnt], locked, gears)
+    coordinates = {
+        index: names.free(joint.name or f"joint_{index + 1}", "joint") for index, joint in joints.items()
+    }
     held = {
-        joint.index: numbers.symbol_of_constant(
-            f"{q}_held", locked[joint.name], way_unit(joint), f"position in which {q} is locked"
+        index: numbers.symbol_of_constant(
+            f"{coordinates[index]}_held",
+            locked[joint.name],
+            way_unit(joint),
+            f"position in which {coordinates[index]} is locked",
         )
-        for joint, q in zip(joints, coordinates, strict=True)
+        for index, joint in joints.items()
         if joint.name in locked
     }
     notes += [
@@ -138,15 +167,16 @@ def draft_rig(
         left_out += [f"{kind} '{p.name or p.index}': its joint is locked" for p in parts if p.joint in held]
     actuators = [actuator for actuator in actuators if actuator.joint not in held]
     sensors = [sensor for sensor in sensors if sensor.joint not in held]
-    moving = [(joint, q) for joint, q in zip(joints, coordinates, strict=True) if joint.index not in held]
+    moving = [(joint, coordinates[index]) for index, joint in joints.items() if index not in held]
     own = [(joint, q) for joint, q in moving if joint.index < model.njnt]
     drives = [drive_of(one, joints[one.joint], coordinates[one.joint], names, numbers) for one in actuators]
     if not drives and with_drives:
         notes.append("The model has no actuators: a force or torque drives every joint.")
         drives = [plain_drive(joint, q, names) for joint, q in own]
-    if not sensors:
+    if not sensors and not of_free_joints:
         notes.append("No sensor reads a joint that moves: the rig reads the position of every one.")
         sensors = [TreeSensor(-1, joint.index, "", 1.0, False) for joint, _ in own]
+        of_free_joints = {-1 - i: {name: name for name in own.positions} for i, own in enumerate(free_joints)}
     joint_tables = {q: joint_table(model, joint, q, numbers) for joint, q in own}
     for joint, q in own:
         if joint.index in plays:
@@ -158,28 +188,31 @@ def draft_rig(
         rotors = []
     if as_it_is is None:
         called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
-        symbols = [
-            held.get(joint.index, sp.Symbol(q, real=True))
-            for joint, q in zip(joints, coordinates, strict=True)
-        ]
+        symbols = [held.get(index, sp.Symbol(q, real=True)) for index, q in coordinates.items()]
         energies = energies_of(bodies, called, symbols, gravity_of(model), numbers, frozenset(held.values()))
     else:
         energies = Energies()
     shown = _sensor_tables(sensors, joints, coordinates, names, numbers)
+    beside = sensor_tables(of_free_joints, free_joints, names)
     tables: dict[str, Any] = {
         "name": rig_name,
         "summary": "From a MuJoCo model.",
         "inputs": {drive.reported: drive.control for drive in drives},
         "constants": {},
         "parameters": numbers.parameters,
-        "coordinates": {q: {"unit": way_unit(joint)} for joint, q in moving},
+        "coordinates": {q: {"unit": way_unit(joint)} for joint, q in moving}
+        | {name: table for joint in free_joints for name, table in joint.coordinates.items()},
         "energy": {"kinetic": _sum(*energies.kinetic, *rotors), "potential": _sum(*energies.potential)},
-        "simulator": {} if as_it_is is None else simulator_table(model, as_it_is, own, numbers.fields),
+        "simulator": {}
+        if as_it_is is None
+        else simulator_table(model, as_it_is, own, free_joints, numbers.fields),
         "signals": {signal: _sum(value) for signal, value in energies.signals.items()},
-        "states": {name: state for drive in drives for name, state in drive.states.items()},
+        "states": {name: state for drive in drives for name, state in drive.states.items()}
+        | {name: state for joint in free_joints for name, state in joint.states.items()},
+        "initial": start_of(model, {q: joint for joint, q in own}, free_joints, numbers),
         "joints": joint_tables,
         "drives": {drive.name: drive.table for drive in drives},
-        "sensors": {name: table for name, _, table in shown},
+        "sensors": {name: table for name, _, table in shown} | beside,
     }
     return RigDraft(
         with_known_constants(tables, numbers.constants),
@@ -191,12 +224,13 @@ def draft_rig(
         },
         {drive.name: drive.index for drive in drives},
         {drive.reported: drive.control_index for drive in drives},
-        {name: sensor.index for name, sensor, _ in shown},
+        {name: sensor.index for name, sensor, _ in shown} | dict.fromkeys(beside, -1),
         numbers.fields,
         numbers.values,
         (*left_out_of(model, as_it_is=as_it_is is not None), *drives_left_out, *sensors_left_out),
         tuple(notes),
         {symbol.name: LockedJoint(index, locked[joints[index].name]) for index, symbol in held.items()},
+        free_joints,
     )
 
 
@@ -217,8 +251,8 @@ def _words(values: Iterable[Any]) -> Iterable[str]:
 
 def _sensor_tables(
     sensors: Sequence[TreeSensor],
-    joints: Sequence[TreeJoint],
-    coordinates: Sequence[str],
+    joints: Mapping[int, TreeJoint],
+    coordinates: Mapping[int, str],
     names: Names,
     numbers: DeclaredNumbers,
 ) -> list[tuple[str, TreeSensor, dict[str, Any]]]:
@@ -266,13 +300,15 @@ def simulator_table(
     model: mujoco.MjModel,
     file: str,
     joints: Sequence[tuple[TreeJoint, str]],
+    free_joints: Sequence[FreeJoint],
     fields: Mapping[str, tuple[Field, ...]],
 ) -> dict[str, Any]:
     """Return the table."""
-    for joint, _ in joints:
-        if not joint.name:
+    called = {joint.index: joint.name for joint, _ in joints} | {own.index: own.name for own in free_joints}
+    for index, name in called.items():
+        if not name:
             raise InputError(
-                f"joint number {joint.index} has no name, which is needed to access it in MuJoCo; give it one"
+                f"joint number {index} has no name, which is needed to access it in MuJoCo; give it one"
             )
     names = {joint.index: joint.name for joint, _ in joints}
     parameters = {
@@ -281,12 +317,14 @@ def simulator_table(
         if own[0].attribute == "armature" and has_constraints(model)
     }
     rotors = any(own[0].attribute == "armature" for own in fields.values())
-    coordinates = {q: joint.name for joint, q in joints if joint.name != q}
+    moving, turned = names_in_simulator(free_joints)
+    coordinates = {q: joint.name for joint, q in joints if joint.name != q} | moving
     return {
         "kind": "mujoco",
         "file": file,
         **({"without_armature": True} if rotors and not parameters else {}),
         **({"coordinates": coordinates} if coordinates else {}),
+        **({"states": turned} if turned else {}),
         **({"parameters": parameters} if parameters else {}),
     }
 

@@ -76,21 +76,24 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     own.actuator_dyntype[exact] = int(mujoco.mjtDyn.mjDYN_FILTER)
     data = mujoco.MjData(own)
     rng = np.random.default_rng(0)
-    joints = draft.joint_of_coordinates()
-    coordinates = {name: int(own.jnt_qposadr[index]) for name, index in joints.items()}
+    joints, coordinates = draft.joint_of_coordinates(), draft.positions(own)
     for name in draft.joints:
         slides = int(own.jnt_type[joints[name]]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
         data.qpos[coordinates[name]] += _WAY[slides] * rng.uniform(-1.0, 1.0)
+    # No part of an attitude stays where it is, so that each has a motion to compare with.
+    turning = {name: place for joint in draft.free_joints for name, place in joint.rates.items()}
+    data.qvel[list(turning.values())] = rng.uniform(-1.0, 1.0, len(turning))
     for index in (index for index in draft.controls.values() if index >= 0):
         low, high = own.actuator_ctrlrange[index] if own.actuator_ctrllimited[index] else _CONTROL
         data.ctrl[index] = rng.uniform(low, high)
     lock(own, data, draft.held({}))
+    rates = {f"d({name})": float(data.qvel[place]) for name, place in turning.items()}
     start, reported = data.qpos.copy(), data.ctrl.copy()
     theirs = np.empty((SAMPLES, own.nq))
     for row in theirs:
         row[:] = data.qpos
         mujoco.mj_step(own, data, STEPS_PER_SAMPLE)
-    ours = _ours(draft, {name: start[place] for name, place in coordinates.items()}, reported)
+    ours = _ours(draft, {name: start[place] for name, place in coordinates.items()}, rates, reported)
     differences = {}
     for name, place in coordinates.items():
         moved = np.ptp(theirs[:, place])
@@ -99,7 +102,9 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     return FreeRun(STEP * STEPS_PER_SAMPLE * (SAMPLES - 1), differences, friction)
 
 
-def _ours(draft: RigDraft, start: dict[str, float], reported: Floats) -> dict[str, Floats]:
+def _ours(
+    draft: RigDraft, start: dict[str, float], rates: dict[str, float], reported: Floats
+) -> dict[str, Floats]:
     """Return the coordinates of the rig along the run, shape (SAMPLES,) each."""
     rig = watched(draft)
     structure = compose(rig, [])
@@ -108,20 +113,21 @@ def _ours(draft: RigDraft, start: dict[str, float], reported: Floats) -> dict[st
     }
     values = {name: 0.0 if name in dry else value for name, value in draft.values.items()}
     held = {control: reported[index] for control, index in draft.controls.items() if index >= 0}
-    inputs = {signal.name: np.full(SAMPLES, held.get(signal.name, 0.0)) for signal in rig.inputs}
-    units = {signal.name: signal.unit for signal in rig.inputs}
-    record = Record("free run", STEP * STEPS_PER_SAMPLE, inputs, units, hold="zoh")
-    state = np.array([start.get(state.name, 0.0) for state in structure.states])
+    # A record has a signal, also of a model without actuators.
+    shown = [signal.name for signal in (*rig.inputs, *rig.outputs)]
+    signals = {name: np.full(SAMPLES, held.get(name, 0.0)) for name in shown}
+    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
+    record = Record("free run", STEP * STEPS_PER_SAMPLE, signals, units, hold="zoh")
+    state = np.array([{**start, **rates}.get(state.name, 0.0) for state in structure.states])
     out = simulate(structure, values, record, state, _ACCURACY)
     return {name: out[f"{_WATCHED}{name}"] for name in start}
 
 
 def watched(draft: RigDraft) -> Rig:
-    """Return a rig with a sensor at every coordinate instead of its own sensors."""
-    sensors = {
-        f"{_WATCHED}{name}": {"reads": name, "unit": table["unit"]}
-        for name, table in draft.tables["coordinates"].items()
-    }
+    """Return a rig with a sensor at every coordinate and attitude instead of its own sensors."""
+    turned = {name for joint in draft.free_joints for name in joint.quaternion}
+    shown = draft.tables["coordinates"] | {name: draft.tables["states"][name] for name in turned}
+    sensors = {f"{_WATCHED}{name}": {"reads": name, "unit": own["unit"]} for name, own in shown.items()}
     tables = with_known_constants({**draft.tables, "sensors": sensors}, draft.tables.get("constants", {}))
     return rig_of_tables(tables, "the rig from the model")
 

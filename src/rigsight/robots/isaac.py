@@ -7,35 +7,13 @@ Sim 5.0; 2.x calls ``actuator_effort_limit`` ``effort_limit``.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rigsight.effects import kind_of
 from rigsight.errors import InputError
-from rigsight.robots.draft import RigDraft
-from rigsight.robots.writing_back import WrittenBack, read_for
+from rigsight.robots.joint_settings import joint_settings
+from rigsight.robots.writing_back import WrittenBack
 from rigsight.simulate.model import Model
-
-_FIELDS: Mapping[tuple[str, str], tuple[str, ...]] = {
-    ("joint", "damping"): ("viscous_friction",),
-    ("joint", "frictionloss"): ("friction", "dynamic_friction"),
-    ("joint", "armature"): ("armature",),
-}
-"""Element and attribute of MuJoCo -> the settings that say the same."""
-
-
-@dataclass
-class _Settings:
-    """Settings of each joint's group as they are found."""
-
-    by_joint: dict[int, dict[str, Any]]
-    written: list[str]
-    without_field: list[str]
-
-    def add(self, joint: int, setting: str, value: float) -> None:
-        group = self.by_joint[joint]
-        group[setting] = group.get(setting, 0.0) + value
 
 
 def isaac_settings(model: Model, source: Path, step: float | None = None) -> WrittenBack:
@@ -46,101 +24,25 @@ def isaac_settings(model: Model, source: Path, step: float | None = None) -> Wri
         raise InputError(
             "Writing for Isaac Lab needs PyYAML, which is not installed: pip install 'rigsight[mujoco]'."
         ) from None
-    robot = read_for(model, source)
-    compiled, draft = robot.model, robot.draft
-    step = float(compiled.opt.timestep) if step is None else step
-    names = {index: compiled.joint(index).name or place for place, index in draft.joints.items()}
-    settings = _Settings({index: {"joint_names_expr": [name]} for index, name in names.items()}, [], [])
-    joints_of_drives = {
-        drive: int(compiled.actuator_trnid[index, 0]) for drive, index in draft.drives.items() if index >= 0
+    settings = joint_settings(model, source, step)
+    groups = {
+        joint.name: {"joint_names_expr": [joint.name], **_group(joint.values, settings.step)}
+        for joint in settings.joints
     }
-    for drive, joint in joints_of_drives.items():
-        _gains(model, drive, joint, float(compiled.actuator_gear[draft.drives[drive], 0]), settings)
-    _numbers(model, draft, settings)
-    _force_limits(model, draft, compiled, settings)
-    _effects(model, draft, joints_of_drives, settings, step)
-    content = {"actuators": {names[index]: group for index, group in settings.by_joint.items()}}
     head = [
         f"Written by rigsight export from {source.name}, for Isaac Lab 3.0.",
-        f"Delays are steps of the physics of {step:g} s each.",
+        f"Delays are steps of the physics of {settings.step:g} s each.",
         *(f"Isaac Lab has no setting for {what}" for what in settings.without_field),
     ]
-    text = "".join(f"# {line}\n" for line in head) + yaml.safe_dump(content, sort_keys=False)
-    return WrittenBack(text, tuple(settings.written), tuple(settings.without_field))
+    text = "".join(f"# {line}\n" for line in head) + yaml.safe_dump({"actuators": groups}, sort_keys=False)
+    return WrittenBack(text, settings.written, settings.without_field)
 
 
-def _gains(model: Model, drive: str, joint: int, gear: float, settings: _Settings) -> None:
-    """Add the gains of a position controller, at the joint: behind a gear they count by its square."""
-    for name, setting in ((f"{drive}_kp", "stiffness"), (f"{drive}_kv", "damping")):
-        if name in model.values:
-            settings.by_joint[joint][setting] = gear**2 * model.values[name]
-            settings.written.append(f"{setting} of {drive}")
-
-
-def _force_limits(model: Model, draft: RigDraft, compiled: Any, settings: _Settings) -> None:
-    """Add the upper end of each drive's range of forces; Isaac Lab has the same limit in both directions."""
-    for drive, index in draft.drives.items():
-        if index < 0 or not compiled.actuator_forcelimited[index]:
-            continue
-        # An end at zero is no constant of the rig.
-        ends = dict(enumerate(map(float, compiled.actuator_forcerange[index])))
-        names = {0: f"lower limit of {drive}", 1: f"upper limit of {drive}"}
-        for name, value in model.values.items():
-            field = draft.fields.get(name, (None,))[0]
-            if field is not None and (field.element, field.attribute, field.index) == (
-                "actuator",
-                "forcerange",
-                index,
-            ):
-                ends[field.entry], names[field.entry] = value, name
-        weakest, strongest = (f"{names[end]} = {ends[end]:.4g}" for end in (0, 1))
-        if ends[1] > 0.0:
-            gear = abs(float(compiled.actuator_gear[index, 0]))
-            joint = int(compiled.actuator_trnid[index, 0])
-            settings.by_joint[joint]["actuator_effort_limit"] = gear * ends[1]
-            settings.written.append(strongest)
+def _group(values: Mapping[str, float], step: float) -> dict[str, Any]:
+    group: dict[str, Any] = {}
+    for name, value in values.items():
+        if name == "delay":
+            group |= dict.fromkeys(("min_delay", "max_delay"), round(value / step))
         else:
-            settings.without_field.append(strongest)
-        if ends[0] != -ends[1]:
-            settings.without_field.append(f"{weakest}, unlike the upper end")
-
-
-def _numbers(model: Model, draft: RigDraft, settings: _Settings) -> None:
-    known = draft.tables.get("constants", {})
-    for name, value in model.values.items():
-        field = draft.fields.get(name, (None,))[0]
-        setting = None if field is None or field.entry else _FIELDS.get((field.element, field.attribute))
-        if field is not None and (field.element, field.attribute) == ("actuator", "forcerange"):
-            continue
-        if setting is not None and field is not None:
-            for one in setting:
-                settings.add(field.index, one, value)
-            settings.written.append(f"{name} = {value:.4g}")
-        elif name in draft.values or (name in known and value != known[name]["default"]):
-            settings.without_field.append(f"{name} = {value:.4g}")
-
-
-def _effects(
-    model: Model, draft: RigDraft, joints_of_drives: Mapping[str, int], settings: _Settings, step: float
-) -> None:
-    structure = model.structure
-    for effect in model.effects:
-        place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
-        values = structure.values_of(effect, model.values)
-        reported = f"{kind} at {place} ({', '.join(f'{own} = {value:.4g}' for own, value in values.items())})"
-        joint = draft.joints.get(place, joints_of_drives.get(place, -1))
-        match kind:
-            case "coulomb_friction" if joint >= 0:
-                settings.add(joint, "friction", values["T_c"])
-                settings.add(joint, "dynamic_friction", values["T_c"])
-            case "stribeck_friction" if joint >= 0:
-                settings.add(joint, "friction", values["T_s"])
-                settings.add(joint, "dynamic_friction", values["T_c"])
-                settings.without_field.append(f"w_s = {values['w_s']:.4g} of {kind} at {place}")
-            case "input_delay" if joint >= 0:
-                steps = round(values["T_d"] / step)
-                settings.by_joint[joint] |= {"min_delay": steps, "max_delay": steps}
-            case _:
-                settings.without_field.append(reported)
-                continue
-        settings.written.append(reported)
+            group["actuator_effort_limit" if name == "effort_limit" else name] = value
+    return group

@@ -41,7 +41,7 @@ def check_locked(
             raise InputError(
                 f"--lock: joint '{name}' has a gear, which turns; leave out --gear or --lock of it."
             )
-    if len(locked) == len(joints):
+    if locked and len(locked) == len(joints):
         raise InputError("--lock: all joints are locked, so nothing moves; leave one free.")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -53,6 +54,7 @@ def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
     affine = int(mujoco.mjtBias.mjBIAS_AFFINE)
     filters = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
     still = int(mujoco.mjtDyn.mjDYN_NONE)
+    rotating = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL))
     unclamped = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
     for index in range(model.nactuator):
         name = model.actuator(index).name
@@ -60,6 +62,9 @@ def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
         dynamics, bias_kind = int(model.actuator_dyntype[index]), int(model.actuator_biastype[index])
         if int(model.actuator_trntype[index]) not in joints:
             left_out.append(f"{called}: it does not drive a joint but a tendon, site or body")
+            continue
+        if int(model.jnt_type[model.actuator_trnid[index, 0]]) in rotating:
+            left_out.append(f"{called}: it drives a free or ball joint")
             continue
         if int(model.actuator_gaintype[index]) != fixed or bias_kind not in (none, affine):
             left_out.append(f"{called}: a muscle, motor model, plugin or gain that changes with the motion")
@@ -128,8 +133,10 @@ class TreeSensor:
     is_rate: bool  # true if it reads the rate
 
 
-def sensors_of(model: mujoco.MjModel, actuators: list[TreeActuator]) -> tuple[list[TreeSensor], list[str]]:
-    """Return the sensors that a rig file can represent, and descriptions of the others."""
+def sensors_of(
+    model: mujoco.MjModel, actuators: list[TreeActuator], of_free_joints: Collection[int] = ()
+) -> tuple[list[TreeSensor], list[str]]:
+    """Return the sensors that a rig file can represent, and descriptions of the others but those of free joints."""
     import mujoco
 
     sort = mujoco.mjtSensor
@@ -137,7 +144,7 @@ def sensors_of(model: mujoco.MjModel, actuators: list[TreeActuator]) -> tuple[li
     at_actuators = {int(sort.mjSENS_ACTUATORPOS): False, int(sort.mjSENS_ACTUATORVEL): True}
     by_index = {actuator.index: actuator for actuator in actuators}
     found, left_out = [], []
-    for index in range(model.nsensor):
+    for index in (index for index in range(model.nsensor) if index not in of_free_joints):
         name, kind = model.sensor(index).name, int(model.sensor_type[index])
         called = f"sensor '{name}'" if name else f"sensor number {index}"
         target = int(model.sensor_objid[index])

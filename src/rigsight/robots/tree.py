@@ -62,22 +62,26 @@ class TreeBody:
     joints: tuple[TreeJoint, ...]  # in the order in which they move it
 
 
-def bodies_of(model: mujoco.MjModel) -> tuple[TreeBody, ...]:
-    """Return the bodies of a model behind their parents, without the world; each joint must be a hinge or slide."""
+def bodies_of(model: mujoco.MjModel, *, only_scalar: bool = True) -> tuple[TreeBody, ...]:
+    """Return the bodies of a model behind their parents, without the world, with their hinges and slides.
+
+    `only_scalar` refuses other joints.
+    """
     import mujoco
 
     kinds = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
     for j in range(model.njnt):
         kind = kinds.get(int(model.jnt_type[j]))
-        if kind is not None:
+        if kind is not None and only_scalar:
             body = model.body(int(model.jnt_bodyid[j])).name or f"number {int(model.jnt_bodyid[j])}"
             raise InputError(
-                f"Body '{body}' has a {kind} joint. A rig file takes hinge and slide joints; fix the body to the world, or write "
-                "its motion as hinges and slides."
+                f"Body '{body}' has a {kind} joint. Equations are derived for hinge and slide joints: leave the bodies to MuJoCo "
+                "with --as-it-is, fix the body to the world, or write its motion as hinges and slides."
             )
     if model.njnt == 0:
         raise InputError("The model has no joint, so nothing in it moves.")
-    return tuple(_body(model, index) for index in range(1, model.nbody))
+    scalar = [j for j in range(model.njnt) if int(model.jnt_type[j]) not in kinds]
+    return tuple(_body(model, index, scalar) for index in range(1, model.nbody))
 
 
 def gravity_of(model: mujoco.MjModel) -> Floats:
@@ -89,7 +93,7 @@ def gravity_of(model: mujoco.MjModel) -> Floats:
     return cleaned(model.opt.gravity)
 
 
-def _body(model: mujoco.MjModel, index: int) -> TreeBody:
+def _body(model: mujoco.MjModel, index: int, scalar: Sequence[int]) -> TreeBody:
     axes = _matrix(model.body_iquat[index])
     mass = float(model.body_mass[index])
     return TreeBody(
@@ -102,7 +106,7 @@ def _body(model: mujoco.MjModel, index: int) -> TreeBody:
         mass * (1.0 - float(model.body_gravcomp[index])),
         cleaned(model.body_ipos[index]),
         cleaned(axes @ np.diag(model.body_inertia[index]) @ axes.T),
-        tuple(_joint(model, int(model.body_jntadr[index]) + i) for i in range(int(model.body_jntnum[index]))),
+        tuple(_joint(model, j) for j in scalar if int(model.jnt_bodyid[j]) == index),
     )
 
 

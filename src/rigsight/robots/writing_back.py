@@ -63,6 +63,8 @@ def write_back(model: Model, source: Path) -> WrittenModel:
 
 def read_for(model: Model, source: Path) -> RobotFile:
     """Return the robot of a file with the gears that a rig which was made from it has."""
+    if model.structure.rig.mechanism.bodies is not None:
+        return _checked(model, read_robot(source, as_it_is=True), source)
     robot = read_robot(source)
     places = {joint.name for joint in model.structure.rig.mechanism.joints}
     gears = {
@@ -82,12 +84,12 @@ def read_for(model: Model, source: Path) -> RobotFile:
         }
     if gears or locked:
         robot = read_robot(source, gears, locked)
-    _check_is_of(model, robot.draft, source)
-    return robot
+    return _checked(model, robot, source)
 
 
-def _check_is_of(model: Model, draft: RigDraft, source: Path) -> None:
-    mechanism = model.structure.rig.mechanism
+def _checked(model: Model, robot: RobotFile, source: Path) -> RobotFile:
+    """Return the robot if it has all that the rig of a model has."""
+    mechanism, draft = model.structure.rig.mechanism, robot.draft
     for what, parts, known in (
         ("joint", mechanism.joints, {**draft.joints, **draft.gears}),
         ("drive", mechanism.drives, draft.drives),
@@ -99,6 +101,7 @@ def _check_is_of(model: Model, draft: RigDraft, source: Path) -> None:
                 f"The model's rig has a {what} '{missing[0]}', but {source} has none of that name "
                 f"({', '.join(known) or 'none at all'}). Give the file from which rigsight init --mjcf made the rig."
             )
+    return robot
 
 
 class _Writer:

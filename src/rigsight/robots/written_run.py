@@ -92,17 +92,16 @@ def _readings(
         controls[:, model.actuator_ctrladr[index]] = record[name]
     n_steps = max(1, round(record.dt / float(model.opt.timestep)))
     model.opt.timestep = record.dt / n_steps
-    data, joints = mujoco.MjData(model), draft.joint_of_coordinates()
-    for name, joint in joints.items():
-        data.qpos[model.jnt_qposadr[joint]] = start[name]
-        data.qvel[model.jnt_dofadr[joint]] = start[f"d({name})"]
+    data, coordinates = mujoco.MjData(model), draft.positions(model)
+    for name, place in coordinates.items():
+        data.qpos[place] = start[name]
+    for name, place in draft.rates(model).items():
+        data.qvel[place] = start[f"d({name})"]
     lock(model, data, draft.held(values))
     shown, positions = driven_run(model, data, controls, n_steps)
     places = {sensor.name: str(sensor.reads) for sensor in draft.rig.mechanism.sensors}
     return {
-        name: shown[:, model.sensor_adr[index]]
-        if index >= 0
-        else positions[:, model.jnt_qposadr[joints[places[name]]]]
+        name: shown[:, model.sensor_adr[index]] if index >= 0 else positions[:, coordinates[places[name]]]
         for name, index in draft.sensors.items()
-        if index >= 0 or places[name] in joints
+        if index >= 0 or places[name] in coordinates
     }

@@ -65,6 +65,8 @@ class Bodies:
     coordinates: tuple[str, ...]  # names of the rig's degrees of freedom in the program, in their order
     # Names of parameters and constants of the rig in the program, in the order of the rig.
     parameters: tuple[str, ...] = ()
+    # Of MuJoCo, the names of the rig's states that are parts of a quaternion; to the program they go behind the parameters.
+    states: tuple[str, ...] = ()
     # Of an FMU, the names of the states that are rates of the coordinates, and of the inputs that are forces
     # along them.
     rates: tuple[str, ...] = ()
@@ -89,7 +91,7 @@ class Bodies:
         fragments = {
             "KEY": self.key,
             "N": self.n,
-            "P": len(self.parameters),
+            "P": len(self.parameters) + len(self.states),
             "GIVEN": self.n_given,
             "STEP": repr(STEP),
             "PROGRAM": self.program.c_text,

@@ -25,6 +25,9 @@ _FUNCTIONS = (
     "mj_comVel", "mj_passive", "mj_rne",
 )  # fmt: skip
 """What the C text calls, in the order of its table."""
+_PARTS = {0: (3, 6), 1: (0, 3), 2: (1, 1), 3: (1, 1)}
+"""Places and rates of a free, ball, slide and hinge joint, by MuJoCo's numbers for these."""
+_QUATERNION = 4
 _OBJECTS = ("body", "jnt", "dof", "geom", "tendon", "eq", "pair")
 """Beginnings of the fields of a model whose rows have names."""
 
@@ -45,33 +48,59 @@ class MujocoProgram(Program):
                 f"{bodies.file} has {self._model.nv} coordinates, but the rig names only {len(self._places)} of them. "
                 f"Joints: {', '.join(others)}."
             )
+        self._quaternions = [self._state(name) for name in bodies.states]
+        if len(self._quaternions) != self._model.nq - sum(place >= 0 for place, _ in self._places):
+            raise InputError(
+                f"{bodies.file}: name the four states of the quaternion of each free and ball joint, 'JOINT 0' to 'JOINT 3', in "
+                "[simulator.states]."
+            )
         self._fields = [self._field(name) for name in bodies.parameters]
         self.reads_forces = has_constraints(self._model)
         self._kept: list[Any] = []
         model = self._model
         is_plain = not (self.reads_forces or model.ntendon or model.nflex or model.nplugin)
-        flags = {"CONSTRAINED": int(self.reads_forces), "PLAIN": int(is_plain)}
+        flags = {"STATES": len(bodies.states), "CONSTRAINED": int(self.reads_forces), "PLAIN": int(is_plain)}
         text = template("simulators", "mujoco.c.txt")
         self.c_text = filled(text, {"VERSION": mujoco.__version__, **flags})
         self.include_folders = ((Path(mujoco.__file__).parent / "include").as_posix(),)
 
     def _coordinate(self, name: str) -> tuple[int, int]:
+        """Return the place of a coordinate in ``qpos``, -1 for an angle about an axis of a body, and that of its rate."""
+        index, part = self._part(name)
+        n_places, n_rates = _PARTS[int(self._model.jnt_type[index])]
+        if not 0 <= part < n_rates:
+            raise InputError(
+                f"{self._bodies.file}: '{name}' is no motion of a joint. Write the name of a hinge or slide; 'JOINT 0' to "
+                "'JOINT 5' of a free joint (three places, three turns); 'JOINT 0' to 'JOINT 2' of a ball joint."
+            )
+        position = int(self._model.jnt_qposadr[index]) + part if part < n_places else -1
+        return position, int(self._model.jnt_dofadr[index]) + part
+
+    def _state(self, name: str) -> int:
+        """Return the place of a number of a quaternion in ``qpos``."""
+        index, part = self._part(name)
+        n_places, n_rates = _PARTS[int(self._model.jnt_type[index])]
+        if n_rates == 1 or not 0 <= part < _QUATERNION:
+            raise InputError(
+                f"{self._bodies.file}: '{name}' is no number of a quaternion: write 'JOINT 0' to 'JOINT 3' of a free or ball one."
+            )
+        return int(self._model.jnt_qposadr[index]) + n_places + part
+
+    def _part(self, name: str) -> tuple[int, int]:
+        """Return the number of a joint and that of its part: 0 for the only one of a hinge or slide, -1 if none is named."""
         import mujoco
 
-        index = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_JOINT, name)
         known = [self._model.joint(i).name for i in range(self._model.njnt)]
+        joint, _, part = name.rpartition(" ")
+        if name in known or joint not in known or not part.isdecimal():
+            joint, part = name, ""
+        index = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_JOINT, joint)
         if index < 0:
             raise InputError(
                 f"{self._bodies.file} has no joint '{name}'.{nearest(name, known)} Joints: {', '.join(known)}."
             )
-        if int(self._model.jnt_type[index]) not in (
-            int(mujoco.mjtJoint.mjJNT_HINGE),
-            int(mujoco.mjtJoint.mjJNT_SLIDE),
-        ):
-            raise InputError(
-                f"{self._bodies.file}: joint '{name}' is neither a hinge nor a slide; a coordinate must be one of these."
-            )
-        return int(self._model.jnt_qposadr[index]), int(self._model.jnt_dofadr[index])
+        is_scalar = _PARTS[int(self._model.jnt_type[index])][1] == 1
+        return index, int(part) if part else (0 if is_scalar else -1)
 
     def _field(self, name: str) -> tuple[Floats, tuple[int, ...]]:
         """Return the array of a field, and the place in it: of ``body_ipos hand 2`` the row of the body, and 2."""
@@ -128,7 +157,8 @@ class MujocoProgram(Program):
         origin = self._model.qpos0.ctypes.data
         offsets = [_address(field, place) - origin for field, place in self._fields]
         table = (ctypes.c_void_p * len(_FUNCTIONS))(*functions)
-        places = (ctypes.c_int * (2 * len(self._places)))(*(i for place in self._places for i in place))
+        numbers = [*(i for place in self._places for i in place), *self._quaternions]
+        places = (ctypes.c_int * len(numbers))(*numbers)
         moved = (ctypes.c_longlong * max(1, len(offsets)))(*offsets)
         library.connect.restype = None
         library.connect(table, ctypes.c_void_p(self._model._address), places, moved)
@@ -162,16 +192,23 @@ def bodies_alone(model: mujoco.MjModel, *, without_armature: bool) -> mujoco.MjM
     """Return a model without what the rig declares itself: dampers, springs and dry friction of joints, and actuators."""
     import mujoco
 
-    model.dof_damping[:] = 0.0
+    joints, dofs = of_the_rig(model)
+    model.dof_damping[dofs] = 0.0
     if without_armature:
-        model.dof_armature[:] = 0.0
-    model.dof_frictionloss[:] = 0.0
-    model.jnt_stiffness[:] = 0.0
-    for name in ("dof_dampingpoly", "jnt_stiffnesspoly"):
+        model.dof_armature[dofs] = 0.0
+    model.dof_frictionloss[dofs] = 0.0
+    model.jnt_stiffness[joints] = 0.0
+    for name, own in (("dof_dampingpoly", dofs), ("jnt_stiffnesspoly", joints)):
         if hasattr(model, name):
-            getattr(model, name)[:] = 0.0
+            getattr(model, name)[own] = 0.0
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     return model
+
+
+def of_the_rig(model: mujoco.MjModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which joints, and which degrees of freedom, are hinges and slides: what resists at others stays in MuJoCo."""
+    joints = np.array([_PARTS[int(kind)][1] == 1 for kind in model.jnt_type])
+    return joints, joints[model.dof_jntid]
 
 
 def has_constraints(model: mujoco.MjModel) -> bool:
@@ -188,6 +225,7 @@ def has_constraints(model: mujoco.MjModel) -> bool:
         or (np.any(model.jnt_limited) and not flags & int(off.mjDSBL_LIMIT))
         or (np.any(model.tendon_limited) and not flags & int(off.mjDSBL_LIMIT))
         or np.any(model.tendon_frictionloss)
+        or np.any(model.dof_frictionloss[~of_the_rig(model)[1]])
         or (model.neq > 0 and not flags & int(off.mjDSBL_EQUALITY))
     )
 

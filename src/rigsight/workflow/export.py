@@ -32,7 +32,7 @@ class WrittenFile:
     gap: tuple[WrittenGap, ...] = ()  # of each sensor, where records were given
 
 
-ROBOT_TARGETS = {"mjcf": ".xml", "isaac": ".yaml"}
+ROBOT_TARGETS = {"mjcf": ".xml", "isaac": ".yaml", "usd": ".usda"}
 """Formats of robot models into which parameter values and effects are written back, with their file suffixes."""
 
 
@@ -45,6 +45,7 @@ def run_export(
     step: float | None = None,
     source_only: bool = False,
     robot: Path | None = None,
+    usd: Path | None = None,
     campaign: Path | None = None,
     own_effects: Sequence[Effect] = (),
     own_rigs: Iterable[Rig] = (),
@@ -52,13 +53,15 @@ def run_export(
     """Write a model for another tool."""
     check_option("Target", target, (*TARGETS, *ROBOT_TARGETS))
     read = named_model(model, own_effects, own_rigs)
+    if usd is not None and target != "usd":
+        raise InputError(f"--usd applies only to usd; leave it out for {target}.")
     if target in ROBOT_TARGETS:
-        if hold is not None or source_only or (step is not None and target != "isaac"):
+        if hold is not None or source_only or (step is not None and target == "mjcf"):
             raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")
         records = () if campaign is None else _validation(campaign, target, own_effects, own_rigs)
-        return _robot(read, target, robot, out, step, records)
+        return _robot(read, target, robot, usd, out, step, records)
     if robot is not None:
-        raise InputError(f"--mjcf applies only to {' and '.join(ROBOT_TARGETS)}; leave it out for {target}.")
+        raise InputError(f"--mjcf applies only to {', '.join(ROBOT_TARGETS)}; leave it out for {target}.")
     if campaign is not None:
         raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
     chosen = TARGETS[target]
@@ -102,11 +105,12 @@ def _robot(
     model: Model,
     target: str,
     robot: Path | None,
+    usd: Path | None,
     out: str | Path | None,
     step: float | None,
     records: Sequence[Record],
 ) -> WrittenFile:
-    from rigsight.robots import isaac_settings, write_back
+    from rigsight.robots import isaac_settings, usd_layer, write_back
 
     if robot is None:
         raise InputError(
@@ -114,7 +118,7 @@ def _robot(
             "with --mjcf."
         )
     file = _target_file(model, out, target, ROBOT_TARGETS[target])
-    if file.resolve() == robot.resolve():
+    if file.resolve() in (robot.resolve(), usd and usd.resolve()):
         raise InputError(
             f"{file} is the model of the robot itself and is not overwritten; name another file with --out."
         )
@@ -123,7 +127,9 @@ def _robot(
         gap = _gap(model, robot, records) if records else ()
         write_together(file.parent, {file.name: back.text})
         return WrittenFile(file, back.written, back.without_field, gap)
-    written = isaac_settings(model, robot, step)
+    written = (
+        isaac_settings(model, robot, step) if target == "isaac" else usd_layer(model, robot, file, usd, step)
+    )
     write_together(file.parent, {file.name: written.text})
     return WrittenFile(file, written.written, written.without_field)
 

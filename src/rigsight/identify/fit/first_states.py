@@ -196,11 +196,13 @@ def _declared(equations: RigEquations, p: Floats) -> Floats:
 
 
 def _equilibrium(equations: RigEquations, declared: Floats, u: Floats, p: Floats) -> Floats:
-    """Return the equilibrium under an input closest to the declared start; states without a restoring force stay at the start."""
+    """Return the equilibrium under an input closest to the declared start; what is declared or without a force stays there."""
     n, state = equations.n_coordinates, declared.copy()
     held = np.ones(state.size, dtype=bool)
     held[n : 2 * n] = False
-    resting = np.where(held, state, 0.0)
+    held[[equations.state_names.index(symbol.name) for symbol in equations.rig.mechanism.initial]] = False
+    resting = state.copy()
+    resting[n : 2 * n] = 0.0
 
     def unbalanced(place: Floats) -> Floats:
         z = resting.copy()

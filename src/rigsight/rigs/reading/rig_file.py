@@ -230,7 +230,9 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
         },
         order=tuple(str(path[1]) for path in order if path[0] != "signals"),
         bodies=bodies,
-        asked=tuple(symbols[name] for name in table.simulator.parameters) if table.simulator else (),
+        asked=tuple(symbols[name] for name in (*table.simulator.parameters, *table.simulator.states))
+        if table.simulator
+        else (),
     )
 
 

@@ -96,6 +96,7 @@ class SimulatorTable(_Table):
     without_armature: bool = False
     coordinates: dict[str, Text] = {}
     parameters: dict[str, Text] = {}
+    states: dict[str, Text] = {}
     rates: dict[str, Text] = {}
     forces: dict[str, Text] = {}
 

@@ -28,8 +28,14 @@ def check_simulator(declaration: Declaration) -> None:
         declaration.refuse(
             (_KEY,), "every coordinate of a simulated rig must be a degree of freedom; remove prescribed_by"
         )
-    others = {"rates": own.rates, "forces": own.forces, "without_armature": own.without_armature}
-    for key, wanted in {"rates": "fmu", "forces": "fmu", "without_armature": "mujoco"}.items():
+    others = {
+        "states": own.states,
+        "rates": own.rates,
+        "forces": own.forces,
+        "without_armature": own.without_armature,
+    }
+    belonging = {"states": "mujoco", "rates": "fmu", "forces": "fmu", "without_armature": "mujoco"}
+    for key, wanted in belonging.items():
         if others[key] and own.kind != wanted:
             declaration.refuse((_KEY, key), f"it belongs to {wanted}, but this is {own.kind}; remove it")
     if own.digest and own.kind == "python":
@@ -50,6 +56,12 @@ def check_simulator(declaration: Declaration) -> None:
     for name, there in own.parameters.items():
         if list(own.parameters.values()).count(there) > 1:
             declaration.refuse((_KEY, "parameters", name), f"'{there}' is given by two numbers; remove one")
+    for name in own.states:
+        if name not in table.states:
+            declaration.refuse(
+                (_KEY, "states", name),
+                f"there is no state '{name}'.{nearest(name, table.states)} Declared: {', '.join(table.states) or 'none'}",
+            )
     numbers = declaration.names("constants", "parameters")
     for name in own.parameters:
         if name not in numbers:
@@ -73,6 +85,7 @@ def simulated_bodies(declaration: Declaration) -> Bodies | None:
             (own.digest or model_digest(own.kind, Path(own.file))) if is_file else "",
             tuple(own.coordinates.get(name, name) for name in free),
             tuple(own.parameters.values()),
+            states=tuple(own.states.values()),
             rates=tuple(own.rates.get(name, "") for name in free),
             forces=tuple(own.forces.get(name, "") for name in free),
             without_armature=own.without_armature,

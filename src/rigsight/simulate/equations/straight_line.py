@@ -24,8 +24,11 @@ class StraightLine:
         plain = {s: sp.Symbol(f"v{i}", real=True) for i, s in enumerate((*arguments, *self.parts))}
         parts = [(plain[s], part.xreplace(plain)) for s, part in self.parts.items()]
         results = [result.xreplace(plain) for result in self.results]
+        # sympy looks for functions that are given as such, of other programs, in the results alone.
+        called = {f for _, part in parts for f in part.atoms(sp.Function) if hasattr(f, "_imp_")}
+        given = {type(f).__name__: f._imp_ for f in called}
         function: Callable[..., Any] = sp.lambdify(
-            [plain[s] for s in arguments], results, modules, cse=lambda written: (parts, written)
+            [plain[s] for s in arguments], results, [given, *modules], cse=lambda written: (parts, written)
         )
         return function
 
