@@ -17,6 +17,7 @@ from rigsight.cli.discover import discover
 from rigsight.cli.effects import list_effects
 from rigsight.cli.exit_codes import ended_by_signals, report_errors, report_output_errors
 from rigsight.cli.export import export
+from rigsight.cli.gate import gate
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
@@ -61,6 +62,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "discover": discover,
     "compare": compare,
     "simulate": simulate,
+    "gate": gate,
     "export": export,
     "vary": vary,
     "blind": blind_command(),
