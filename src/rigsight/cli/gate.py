@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,7 +16,9 @@ from rigsight.workflow.run.progress import listening
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from rigsight.compare import NumberCheck
     from rigsight.workflow.gate import Gate
+    from rigsight.workflow.gating.limits import Check
 
 CLOSED = 1
 """Exit code of a closed gate."""
@@ -121,10 +124,18 @@ def _summary(found: Gate) -> RenderableType:
             "closed" if own.closed else "",
         )
     lines = [
-        f"The gate is {'closed' if found.closed else 'open'}: {sum(own.closed for own in found.checks)} of "
-        f"{len(found.checks)} gaps exceed their limits.",
+        f"The gate is {'closed' if found.closed else 'open'}: {_share(found.checks)} gaps exceed their limits"
+        + (
+            f", {_share(found.numbers)} numbers, asked one at a time, lie outside their usual range."
+            if found.numbers
+            else "."
+        ),
         *(f"'{name}' cannot be simulated: {reason}" for name, reason in found.failures.items()),
         suspect_text(found),
         *(f"Note: {note}" for note in found.notes),
     ]
     return Group(table, *(escape(line) for line in lines if line))
+
+
+def _share(checks: Sequence[Check | NumberCheck]) -> str:
+    return f"{sum(own.closed for own in checks)} of {len(checks)}"

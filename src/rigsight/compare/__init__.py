@@ -11,6 +11,10 @@ from rigsight.compare.comparison import Score as Score
 from rigsight.compare.on_one_record import Yardstick as Yardstick
 from rigsight.compare.on_one_record import compare_on_record as compare_on_record
 from rigsight.compare.on_one_record import free_run as free_run
+from rigsight.compare.own_numbers import NumberCheck as NumberCheck
+from rigsight.compare.own_numbers import OwnNumber as OwnNumber
+from rigsight.compare.own_numbers import check_numbers as check_numbers
+from rigsight.compare.own_numbers import own_numbers as own_numbers
 from rigsight.compare.response_error import ResponseError as ResponseError
 from rigsight.compare.response_error import SignalPath as SignalPath
 from rigsight.compare.response_error import StepWindow as StepWindow

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rigsight.compare import Suspect, free_run, suspects
+from rigsight.compare import NumberCheck, Suspect, free_run, own_numbers, suspects
 from rigsight.compare.on_one_record import FreeRun
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
@@ -37,6 +37,7 @@ class Gate:
 
     rig: str
     checks: tuple[Check, ...]  # of each sensor of each record
+    numbers: tuple[NumberCheck, ...]  # of each number of each record, where their scatter is known
     examined: (
         str  # the record with the largest excess, of which the rest is known; empty where the gate is open
     )
@@ -46,8 +47,12 @@ class Gate:
 
     @property
     def closed(self) -> bool:
-        """True if a gap exceeds its limit, or a record cannot be simulated."""
-        return bool(self.failures) or any(check.closed for check in self.checks)
+        """True if a gap or a changed number exceeds its limit, or a record cannot be simulated."""
+        return (
+            bool(self.failures)
+            or any(own.closed for own in self.checks)
+            or any(own.closed for own in self.numbers)
+        )
 
     @property
     def first_suspect(self) -> Suspect | None:
@@ -88,6 +93,20 @@ class Gate:
                 }
                 for check in self.checks
             ],
+            "numbers": [
+                {
+                    "record": check.record,
+                    "name": check.number.name,
+                    "unit": check.number.unit,
+                    "value": check.number.value,
+                    "change": check.number.change,
+                    "usual": check.usual,
+                    "allowed": check.allowed,
+                    "p_value": check.p_value,
+                    "closed": check.closed,
+                }
+                for check in self.numbers
+            ],
             "not_simulated": dict(self.failures),
             "examined": self.examined or None,
             "suspects": self.suspects,
@@ -98,6 +117,10 @@ class Gate:
     def to_junit(self) -> str:
         """Return the checks as JUnit XML."""
         cases = [Case(f"{own.record}: {own.output}", check_text(own), own.closed) for own in self.checks]
+        for name in dict.fromkeys(own.record for own in self.numbers):
+            changed = [own for own in self.numbers if own.record == name and own.closed]
+            text = "; ".join(map(number_text, changed)) or "no number has changed"
+            cases.append(Case(f"{name}: numbers", text, bool(changed)))
         cases += [Case(name, reason, failed=True) for name, reason in self.failures.items()]
         return junit_xml(f"rigsight gate {self.rig}", cases, suspect_text(self))
 
@@ -144,7 +167,7 @@ def gate_of(
     """Hold the gaps of a model on records against their limits."""
     rig = model.structure.rig
     outputs = [signal.name for record in records for signal in rig.outputs if signal.name in record]
-    against = judge(rig, limits, reference, outputs)
+    against = judge(rig, limits, reference, outputs, len(records))
     if not any(_is_limited(against, output) for output in outputs):
         raise InputError(
             "Nothing is known of the gaps of this model: there is no diagnosis beside it. Name a campaign for which it "
@@ -152,7 +175,7 @@ def gate_of(
         )
     stage = Stage(SIMULATING, len(records) + 1, listener)
     runs: dict[str, FreeRun] = {}
-    checks, failures, notes = list[Check](), dict[str, str](), list[str]()
+    checks, numbers, failures, notes = list[Check](), list[NumberCheck](), dict[str, str](), list[str]()
     for record in records:
         try:
             run = free_run(model, record, reference.windows(record), reference.floors)
@@ -162,13 +185,17 @@ def gate_of(
             runs[record.name] = run
             found = [against.check(gap) for gap in known_gaps(record, run)]
             checks += [check for check in found if check is not None]
+            if against.asks_numbers:
+                own = own_numbers(model, reference.windows(record), reference.floors)
+                numbers += against.check_numbers(record.name, own)
             notes += _notes(record, run, found)
         stage.finished(record.name)
-    worst = max(checks, key=lambda check: check.excess, default=None)
-    gate = Gate(rig.name, tuple(checks), "", (), failures, tuple(notes))
-    if worst is None or not worst.closed:
+    gate = Gate(rig.name, tuple(checks), tuple(numbers), "", (), failures, tuple(notes))
+    excess = [(own.excess, own.record) for own in checks] + [(own.excess, own.record) for own in numbers]
+    largest, worst = max(excess, default=(0.0, ""))
+    if not largest > 1.0:
         return gate
-    record = next(record for record in records if record.name == worst.record)
+    record = next(record for record in records if record.name == worst)
     changed = suspects(model, reference.windows(record), runs[record.name], reference.floors)
     stage.finished("suspects")
     return replace(gate, examined=record.name, suspects=tuple(changed))
@@ -180,6 +207,15 @@ def check_text(check: Check) -> str:
     return (
         f"gap {check.gap:.3g} {check.unit} ({check.gap / check.floor:.3g} x noise floor), "
         f"limit {check.limit:.3g} {check.unit}{usual}"
+    )
+
+
+def number_text(check: NumberCheck) -> str:
+    """Return a changed number in words."""
+    own, unit = check.number, "" if check.number.unit == "1" else f" {check.number.unit}"
+    return (
+        f"{own.name} = {own.value:.4g}{unit}: this record asks for {own.change:+.2g}, usually {check.usual:+.2g} +/- "
+        f"{check.allowed:.2g}"
     )
 
 

@@ -7,14 +7,16 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rigsight.compare import KnownGap, UsualGap
+from rigsight.compare import KnownGap, NumberCheck, OwnNumber, UsualGap, check_numbers
 from rigsight.errors import InputError, nearest
 from rigsight.records.channel_units import UnknownUnitError, conversion
 from rigsight.rigs import Rig
 from rigsight.workflow.gating.reference import Reference
 
 FALSE_ALARMS = 0.05
-"""Probability that true records close the gate: of all records and sensors of a run together (Bonferroni)."""
+"""Probability that true records close the gate: of all records, sensors and numbers of a run together (Bonferroni)."""
+_OF_GAPS = 0.5
+"""Share of it for gaps; the rest is for changed numbers."""
 _FARTHER = 0.1
 """Share by which noise and another draw of the same input may move a sensor farther."""
 _LIMIT = re.compile(r"(?P<output>[^=]+)=\s*(?P<value>[^\s]+)\s*(?P<unit>.*)")
@@ -76,6 +78,7 @@ class Judge:
     limits: Limits
     reference: Reference
     n_tested: int  # number of gaps without a limit that was asked for
+    n_records: int
 
     def check(self, gap: KnownGap) -> Check | None:
         """Return the check of a gap; None where nothing limits it."""
@@ -85,7 +88,7 @@ class Judge:
         if limit is None:
             if usual is None:
                 return None
-            limit = usual.limit(gap.duration, FALSE_ALARMS / self.n_tested)
+            limit = usual.limit(gap.duration, _OF_GAPS * FALSE_ALARMS / self.n_tested)
             p_value = usual.p_value(gap.rms, gap.duration)
         return Check(
             gap.record,
@@ -99,15 +102,25 @@ class Judge:
             usual is not None and gap.moved > usual.farthest * (1.0 + _FARTHER),
         )
 
+    @property
+    def asks_numbers(self) -> bool:
+        """True if changed numbers close the gate: where their scatter is known, and no other limit was asked for."""
+        return bool(self.reference.numbers) and self.limits.floors is None and not self.limits.of_outputs
 
-def judge(rig: Rig, limits: Limits, reference: Reference, outputs: Sequence[str]) -> Judge:
+    def check_numbers(self, record: str, own: Sequence[OwnNumber]) -> list[NumberCheck]:
+        """Return the checks of the numbers of a record."""
+        each = (1.0 - _OF_GAPS) * FALSE_ALARMS / max(1, len(own) * self.n_records)
+        return check_numbers(record, own, self.reference.numbers, each)
+
+
+def judge(rig: Rig, limits: Limits, reference: Reference, outputs: Sequence[str], n_records: int) -> Judge:
     """Return what gaps are held against; each sensor counts as often as a record holds it."""
     tested = [
         output
         for output in outputs
         if limits.asked(output, 1.0) is None and UsualGap.of(reference.known, output)
     ]
-    return Judge(rig, limits, reference, max(1, len(tested)))
+    return Judge(rig, limits, reference, max(1, len(tested)), n_records)
 
 
 def _limit(text: str, rig: Rig) -> tuple[str, float]:

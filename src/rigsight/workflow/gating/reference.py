@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from rigsight.compare import KnownGap, free_run
+from rigsight.compare import KnownGap, OwnNumber, free_run, own_numbers
 from rigsight.compare.on_one_record import FreeRun
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.errors import InputError
@@ -24,6 +24,7 @@ from rigsight.workflow.campaign.model_file import MODEL_FILE, json_object
 from rigsight.workflow.run.results import DIAGNOSIS_FILE
 
 _MEND = "Run 'rigsight diagnose' again, or name the campaign of the model with --campaign."
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
@@ -32,10 +33,11 @@ class Reference:
     """What is known of a model's gap."""
 
     floors: Mapping[str, float]  # noise floor of each output, in its unit
-    known: tuple[KnownGap, ...]  # of the records that the model is known to hold for; empty without such
-    window: (
-        float | None
-    )  # length [s] of the windows that are simulated from states of their own, None for whole records
+    known: tuple[KnownGap, ...]  # of the records for which the model is known to hold; empty without such
+    # Change of each number that each of these records asks for; empty where that is not known.
+    numbers: tuple[tuple[OwnNumber, ...], ...]
+    # Length [s] of the windows that are simulated from states of their own, None for whole records.
+    window: float | None
 
     def windows(self, record: Record) -> tuple[Record, ...]:
         """Return a record as it is simulated."""
@@ -55,6 +57,16 @@ class _RecordGap(BaseModel):
     measured_rms: _Positive
 
 
+class _Number(BaseModel):
+    record: str
+    name: str
+    value: _Finite
+    unit: str
+    change: _Finite
+    information: _Positive
+    noise: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+
 class _Diagnosis(BaseModel):
     """What a gate reads of ``diagnosis.json``."""
 
@@ -63,6 +75,7 @@ class _Diagnosis(BaseModel):
     rig: str
     noise_floor: dict[str, _Floor]
     gap_by_record: Annotated[list[_RecordGap], Field(min_length=1)]
+    numbers_by_record: list[_Number]
     window: _Positive | None = None
     observer_bandwidth: float | None = None
 
@@ -98,7 +111,12 @@ def of_diagnosis(file: Path, model: Model) -> Reference:
         KnownGap(own.record, own.output, own.rms, own.freedom, own.duration, own.measured_rms)
         for own in found.gap_by_record
     )
-    return Reference({name: floor.std for name, floor in found.noise_floor.items()}, known, found.window)
+    numbers: dict[str, list[OwnNumber]] = {}
+    for one in found.numbers_by_record:
+        own = OwnNumber(one.name, one.value, one.unit, one.change, one.information, one.noise)
+        numbers.setdefault(one.record, []).append(own)
+    floors = {name: floor.std for name, floor in found.noise_floor.items()}
+    return Reference(floors, known, tuple(map(tuple, numbers.values())), found.window)
 
 
 def of_records(model: Model, records: Sequence[Record], are_known: bool) -> Reference:
@@ -106,7 +124,7 @@ def of_records(model: Model, records: Sequence[Record], are_known: bool) -> Refe
     rig = model.structure.rig
     drifts = can_drift(rig, model.values)
     floors = {floor.output: floor.std for floor in noise_floors(rig, records, drifts)}
-    reference = Reference(floors, (), window_length(rig, records) if drifts else None)
+    reference = Reference(floors, (), (), window_length(rig, records) if drifts else None)
     if not are_known:
         return reference
     known = [
@@ -114,7 +132,8 @@ def of_records(model: Model, records: Sequence[Record], are_known: bool) -> Refe
         for record in records
         for gap in known_gaps(record, free_run(model, record, reference.windows(record), floors))
     ]
-    return Reference(floors, tuple(known), reference.window)
+    numbers = [own_numbers(model, reference.windows(record), floors) for record in records]
+    return Reference(floors, tuple(known), tuple(map(tuple, numbers)), reference.window)
 
 
 def known_gaps(record: Record, run: FreeRun) -> list[KnownGap]:
