@@ -33,11 +33,14 @@ class Reader:
     def read(self, paths: Sequence[str | Path]) -> list[Record]:
         """Return the records of campaigns and files, with names of their own."""
         found = [record for path in paths for record in self._of(Path(path))]
-        names: list[str] = []
+        named: dict[str, Record] = {}
         for record in found:
-            count = sum(record.name == name.rpartition("_")[0] or record.name == name for name in names)
-            names.append(f"{record.name}_{count + 1}" if count else record.name)
-        return [replace(record, name=name) for record, name in zip(found, names, strict=True)]
+            name, count = record.name, 1
+            while name in named:
+                count += 1
+                name = f"{record.name}_{count}"
+            named[name] = replace(record, name=name)
+        return list(named.values())
 
     def of_campaign(self, path: Path) -> tuple[Record, ...]:
         """Return all records of a campaign."""
