@@ -13,6 +13,7 @@ import typer
 from rigsight.cli.compare import compare
 from rigsight.cli.demo import demo
 from rigsight.cli.diagnose import diagnose
+from rigsight.cli.difference import difference
 from rigsight.cli.discover import discover
 from rigsight.cli.effects import list_effects
 from rigsight.cli.exit_codes import ended_by_signals, report_errors, report_output_errors
@@ -61,6 +62,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "identify": identify,
     "discover": discover,
     "compare": compare,
+    "difference": difference,
     "simulate": simulate,
     "gate": gate,
     "export": export,
