@@ -32,6 +32,7 @@ MOVED = {
     "experiments/sensitivities/README.md": "experiments/sensitivities.md",
     "experiments/places/README.md": "experiments/places.md",
     "experiments/adequacy/README.md": "experiments/adequacy.md",
+    "experiments/gate/README.md": "experiments/gate.md",
     "experiments/calibration/README.md": "experiments/calibration.md",
     "experiments/matrix/README.md": "experiments/matrix.md",
     "experiments/missing_force/README.md": "experiments/missing_force.md",

@@ -286,6 +286,13 @@ def test_json_follows_the_contract(cubic: Diagnosis) -> None:
         content[name]
         for name in ("gap_by_record", "gap_by_band", "gap_by_state", "gap_by_path", "gap_by_time")
     )
+    for own in content["gap_by_record"]:
+        assert own["rms"] == pytest.approx(own["after"] * own["measured_rms"])
+        assert 1.0 <= own["freedom"] <= own["n_samples"]
+    asked = {(own["record"], own["name"]) for own in content["numbers_by_record"]}
+    assert asked >= {
+        (own["record"], name) for own in content["gap_by_record"] for name in ("k_3", "gain of x")
+    }
     for candidate in content["candidates"]:
         assert {"effects", "probability", "validation_nrmse", "parameters"} <= set(candidate)
         assert set(candidate["validation_nrmse"]) == {"x"}

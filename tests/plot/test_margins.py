@@ -39,7 +39,7 @@ def records(size: float) -> Figure:
     parts = [
         RecordPart(
             **gaps(size), output="x", record="r", role="validation", kind="sweep", amplitude=0.5, scored=True, n_samples=9,
-            interval={},
+            duration=0.1, measured_rms=1.0, rms=1.0, freedom=9.0, interval={},
         )
         for _ in range(3)
     ]  # fmt: skip

@@ -125,7 +125,7 @@ def localization() -> Localization:
         by_record=tuple(
             RecordPart(
                 **figures("psi"), record=name, role=role, kind="sweep", amplitude=0.5, scored=role == "validation",
-                n_samples=2000, interval=limits,
+                n_samples=2000, duration=20.0, measured_rms=0.03, rms=0.003, freedom=500.0, interval=limits,
             )
             for name, role in zip(names, ("validation", "estimation"), strict=True)
         ),

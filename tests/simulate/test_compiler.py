@@ -52,6 +52,19 @@ def test_no_compiler_at_all_is_told_with_both_ways_out(tmp_path, monkeypatch):
         first_library(TEXT, ())
 
 
+def test_a_kept_library_is_used_without_a_compiler(tmp_path, monkeypatch):
+    monkeypatch.setenv("RIGSIGHT_CACHE_DIR", str(tmp_path / "kept"))
+    text = "int one(void) { return 1; }\n"
+    made = compiling.library_file(text)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compiling.importlib.util, "find_spec", lambda _: None)
+    assert compiling.is_kept(text)
+    assert compiling.library_file(text) == made
+    with pytest.raises(InputError, match="No C compiler was found"):
+        compiling.library_file("int two(void) { return 2; }\n")
+
+
 @pytest.mark.parametrize(
     ("named", "message"),
     [

@@ -13,7 +13,8 @@ from rigsight.compare import Comparison, Competitor
 from rigsight.report.comparison import overall_figure, record_figures
 from rigsight.report.notebook import comparison_html
 from rigsight.simulate.model import Model
-from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig, write_comparison
+from rigsight.workflow.campaign.model_file import of_this_rig
+from rigsight.workflow.compare import compare_campaign, named_competitors, write_comparison
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import listening
 

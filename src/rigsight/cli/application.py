@@ -14,10 +14,12 @@ from rigsight.cli.check import check
 from rigsight.cli.compare import compare
 from rigsight.cli.demo import demo
 from rigsight.cli.diagnose import diagnose
+from rigsight.cli.difference import difference
 from rigsight.cli.discover import discover
 from rigsight.cli.effects import list_effects
 from rigsight.cli.exit_codes import ended_by_signals, report_errors, report_output_errors
 from rigsight.cli.export import export
+from rigsight.cli.gate import gate
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
@@ -64,7 +66,9 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "identify": identify,
     "discover": discover,
     "compare": compare,
+    "difference": difference,
     "simulate": simulate,
+    "gate": gate,
     "export": export,
     "vary": vary,
     "blind": blind_command(),

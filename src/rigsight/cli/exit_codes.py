@@ -1,7 +1,7 @@
 """Errors and termination signals become one message on stderr and an exit code.
 
-Exit codes: 0 success; 1 a defect of rigsight; 2 unusable input, or results that cannot be written; 130 Ctrl-C; 143 ended by kill;
-129 the terminal was closed; 141 the output is no longer read.
+Exit codes: 0 success; 1 a defect of rigsight, or a closed gate; 2 unusable input, or results that cannot be written; 130 Ctrl-C;
+143 ended by kill; 129 the terminal was closed; 141 the output is no longer read.
 """
 
 from __future__ import annotations

@@ -221,6 +221,7 @@ class FreeRun:
     estimated: bool
     # Output -> RMS(measured - simulated) / RMS(measured - mean), over all windows, each from its own state.
     nrmse: dict[str, float]
+    residuals: dict[str, Floats]  # output -> measured - simulated of all windows, shape (n_samples,)
 
 
 def free_run(
@@ -240,11 +241,12 @@ def free_run(
 
     runs = [run(window, index) for index, window in enumerate(windows)]
     whole = runs[0] if len(windows) == 1 else run(record, 0)
-    errors = {}
+    errors, residuals = {}, {}
     for signal in rig.outputs:
         if signal.name in record:
             measured, simulated = (np.concatenate([r[signal.name] for r in part]) for part in (windows, runs))
             if not np.all(np.isfinite(simulated)):
                 raise SimulationError(f"The simulated {signal.name} diverges.")
-            errors[signal.name] = nrmse(measured - simulated, measured)
-    return FreeRun(whole, bool(np.isfinite(found.cost)), errors)
+            residuals[signal.name] = measured - simulated
+            errors[signal.name] = nrmse(residuals[signal.name], measured)
+    return FreeRun(whole, bool(np.isfinite(found.cost)), errors, residuals)

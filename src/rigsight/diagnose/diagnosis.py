@@ -28,6 +28,7 @@ from rigsight.diagnose.result import (
     OutputGap,
     probability_not_tried,
 )
+from rigsight.diagnose.trust.record_numbers import record_numbers
 from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.uncertainty.bootstrap import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
@@ -110,7 +111,8 @@ def diagnose(
     own = next(candidate for candidate in diagnosis.candidates if candidate.effects == named.names)
     std = {name: estimate.std for name, estimate in own.parameters.items()}
     diagnosis = replace(
-        diagnosis, trust=trust(found.context, named, campaign.records, campaign.constants, std)
+        diagnosis,
+        trust=trust(found.context, named, campaign.records, campaign.constants, std),
     )
     say("trust in the numbers")
     return diagnosis
@@ -209,6 +211,7 @@ def _assembled(
         traces=traces,
         units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
         given=dict(campaign.given),
+        record_numbers=record_numbers(context, after, campaign.estimation[0].hold),
         model=Model.of(after.fit.structure, after.fit.values, campaign.estimation[0].hold).to_json(),
         notes=tuple(notes),
         windows=found.windowing.length,

@@ -13,6 +13,7 @@ from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.search.places import SuspectedPlace
+from rigsight.diagnose.trust.record_numbers import RecordNumbers
 from rigsight.diagnose.trust.result import Trust
 from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
 from rigsight.diagnose.verdict.judgement import Verdict
@@ -170,6 +171,8 @@ class Diagnosis:
     trust
         Whether the parameters of the diagnosed model are the same in every record, at every amplitude and in shorter windows;
         None where that was not tested.
+    record_numbers
+        The change of each number of the model that each record asks for, one number at a time.
     """
 
     title: str
@@ -202,6 +205,7 @@ class Diagnosis:
     likely: LikelyCauses = field(default_factory=LikelyCauses)
     error_of_choice: float | None = None
     trust: Trust | None = None
+    record_numbers: RecordNumbers = field(default_factory=dict)
     given: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -232,6 +236,11 @@ class Diagnosis:
             "adequate": self.adequate,
             "remainder": self.remainder and self.remainder.to_json(),
             "trust": self.trust and self.trust.to_json(),
+            "numbers_by_record": [
+                {"record": record, **vars(own)}
+                for record, numbers in self.record_numbers.items()
+                for own in numbers
+            ],
             "ambiguous_with": self.ambiguous_with,
             "given": self.given,
             "likely_causes": {"effects": self.likely.sets, "outside": self.likely.outside},

@@ -2,6 +2,7 @@
 
 from rigsight.identify.fit.coordinates import Coordinates as Coordinates
 from rigsight.identify.fit.covariance import SMOOTHED as SMOOTHED
+from rigsight.identify.fit.covariance import mean_square_freedom as mean_square_freedom
 from rigsight.identify.fit.covariance import sandwich_covariance as sandwich_covariance
 from rigsight.identify.fit.covariance import spectral_product as spectral_product
 from rigsight.identify.fit.derivatives import Derivatives as Derivatives

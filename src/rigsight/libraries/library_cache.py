@@ -215,12 +215,11 @@ def _caches_at_home() -> Path:
 def library_file(text: str, included: Sequence[str] = ()) -> Path:
     """Return an intact library of a C text, of the first compiler for which one is cached or can be compiled.
 
-    The folders hold headers that are not the compiler's.
+    A machine without a compiler takes one that any compiler made. The folders hold headers that are not the compiler's.
     """
-    for compiler in c_compilers():
-        path = _path(text, compiler)
-        if _sound(path):
-            return path
+    kept = _kept(text)
+    if kept is not None:
+        return kept
     compiler, content = first_library(
         {"kernel.c": text}, (*kernel_options(), *(f"-I{folder}" for folder in included))
     )
@@ -231,7 +230,15 @@ def library_file(text: str, included: Sequence[str] = ()) -> Path:
 
 def is_kept(text: str) -> bool:
     """Return True if an intact library of a C text is already cached."""
-    return any(_sound(_path(text, compiler)) for compiler in c_compilers())
+    return _kept(text) is not None
+
+
+def _kept(text: str) -> Path | None:
+    compilers = c_compilers()
+    paths = [_path(text, compiler) for compiler in compilers]
+    if not compilers:
+        paths = sorted(cache_folder().glob(f"{_name(text)}-*{library_suffix()}"))
+    return next(filter(_sound, paths), None)
 
 
 def kernel_options() -> tuple[str, ...]:
@@ -241,9 +248,17 @@ def kernel_options() -> tuple[str, ...]:
 
 
 def _path(text: str, compiler: Compiler) -> Path:
-    parts = (text, " ".join(compiler.command), compiler.identity, " ".join(kernel_options()), processor())
-    name = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
-    return cache_folder() / f"{name}{library_suffix()}"
+    made_by = _digest(" ".join(compiler.command), compiler.identity)
+    return cache_folder() / f"{_name(text)}-{made_by}{library_suffix()}"
+
+
+def _name(text: str) -> str:
+    """Return the part of a library's name that does not depend on its compiler."""
+    return _digest(text, " ".join(kernel_options()), processor())
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:24]
 
 
 @cache

@@ -25,7 +25,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.equilibrium import can_drift
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
+from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model, of_this_rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent
@@ -173,22 +173,6 @@ def given_model(campaign: Campaign) -> Model:
             "under [rig.parameters]."
         )
     return Model(structure, {name: values[name] for name in structure.names}, campaign.estimation[0].hold)
-
-
-def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
-    """Return a model that can be compared on the records of a campaign."""
-    own, rig = model.structure.rig, campaign.rig
-    if own.name == rig.name and own.mechanism != rig.mechanism:
-        raise InputError(
-            f"Model '{name}' is of a rig '{own.name}' with other equations or units than the rig of {campaign.called}: only "
-            "models of the same rig can be compared. Leave it out, or make it again with this rig file."
-        )
-    if own.name != rig.name:
-        raise InputError(
-            f"Model '{name}' is of the rig '{model.structure.rig.name}', the records of {campaign.called} are of the rig "
-            f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."
-        )
-    return model
 
 
 def _name_and_source(text: str) -> tuple[str, str]:

@@ -15,9 +15,9 @@ from rigsight.errors import InputError
 from rigsight.records import Record, Role
 from rigsight.rigs import is_built_in_motion
 from rigsight.workflow.campaign.in_memory import make_campaign, make_model
-from rigsight.workflow.campaign.model_file import model_of, read_model
+from rigsight.workflow.campaign.model_file import model_of, of_this_rig, read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig
+from rigsight.workflow.compare import compare_campaign, named_competitors
 from rigsight.workflow.diagnose import diagnose_campaign, run_diagnose
 
 CUBIC = effect_named("cubic_stiffness")

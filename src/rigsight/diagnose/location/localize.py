@@ -23,8 +23,10 @@ from rigsight.diagnose.location.state_plane import joint_parts, state_parts
 from rigsight.diagnose.location.trace import STAGES, Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
 from rigsight.diagnose.policy import MAPS
+from rigsight.identify import mean_square_freedom
 from rigsight.metrics import rms
 from rigsight.records.record import Floats
+from rigsight.rigs import Rig
 
 
 def localize(
@@ -46,7 +48,7 @@ def localize(
     one_motion = context.rig.has_one_motion
     by_path = path_parts(context, before, reidentified, after) if one_motion else ()
     return Localization(
-        by_record=tuple(_by_record(traces, scored_on, context.noise, rng)),
+        by_record=tuple(_by_record(context.rig, traces, scored_on, context.noise, rng)),
         by_amplitude=tuple(_by_amplitude(context, traces, scored_on)),
         by_band=tuple(_by_band(scored, context.noise, stretches)),
         by_state=(state_parts if one_motion else joint_parts)(context, reidentified, scored),
@@ -58,7 +60,11 @@ def localize(
 
 
 def _by_record(
-    traces: Sequence[Trace], scored_on: str, noise: Mapping[str, float], rng: np.random.Generator
+    rig: Rig,
+    traces: Sequence[Trace],
+    scored_on: str,
+    noise: Mapping[str, float],
+    rng: np.random.Generator,
 ) -> list[RecordPart]:
     parts = []
     for trace in traces:
@@ -66,6 +72,8 @@ def _by_record(
         for output in trace.measured:
             spread = _spread([trace], output)
             floor = noise[output] / spread
+            remainder = trace.residual("after", output)
+            unit = rig.signal_units[output]
             parts.append(
                 RecordPart(
                     output=output,
@@ -76,6 +84,11 @@ def _by_record(
                     amplitude=trace.amplitude,
                     scored=trace.role == scored_on,
                     n_samples=trace.t.size,
+                    duration=trace.t.size * trace.dt,
+                    measured_rms=spread,
+                    rms=rms(remainder),
+                    freedom=mean_square_freedom(remainder),
+                    units={"duration": "s", "measured_rms": unit, "rms": unit},
                     interval=budget_intervals([trace], output, floor, rng),
                 )
             )

@@ -158,6 +158,16 @@ def smoothed_spectrum(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128
     return np.asarray(np.convolve(around, np.full(2 * half + 1, 1.0 / (2 * half + 1)), "valid"))
 
 
+def mean_square_freedom(residual: Floats) -> float:
+    """Return the degrees of freedom of the mean square of a colored residual, shape (n_samples,).
+
+    F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110: those of a chi-squared variable with the same relative variance.
+    """
+    power = smoothed_spectrum(np.abs(np.fft.fft(residual)) ** 2 + 0j).real
+    squares = float(np.sum(power**2))
+    return max(1.0, float(np.sum(power)) ** 2 / squares) if squares > 0.0 else float(residual.size)
+
+
 def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
     """Return eigenvalues in ascending order, shape (n,), and eigenvectors as columns, shape (n, n)."""
     # Divide and conquer is faster but has failed on a well-conditioned matrix of 90 rows; relatively robust representations are

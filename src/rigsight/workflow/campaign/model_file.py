@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from rigsight.campaign import Campaign
 from rigsight.discover.monomials import known_terms
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
@@ -105,6 +106,22 @@ def named_model(model: str | Path, own_effects: Iterable[Effect] = (), own_rigs:
     found = sets[str(model)]
     structure = structure_named(found.rig, [effect_named(name) for name in found.effects])
     return Model(structure, {name: found.values()[name] for name in structure.names}, "foh")
+
+
+def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
+    """Return a model that can be compared on the records of a campaign."""
+    own, rig = model.structure.rig, campaign.rig
+    if own.name == rig.name and own.mechanism != rig.mechanism:
+        raise InputError(
+            f"Model '{name}' is of a rig '{own.name}' with other equations or units than the rig of {campaign.called}: only "
+            "models of the same rig can be compared. Leave it out, or make it again with this rig file."
+        )
+    if own.name != rig.name:
+        raise InputError(
+            f"Model '{name}' is of the rig '{model.structure.rig.name}', the records of {campaign.called} are of the rig "
+            f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."
+        )
+    return model
 
 
 def _locate(model: Path) -> Path:

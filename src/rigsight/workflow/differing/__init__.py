@@ -1,0 +1,1 @@
+"""What differs between diagnoses, and how they are read again."""

@@ -1,0 +1,154 @@
+"""What did a diagnosis find? Its numbers with their errors and their scatter between its records, read from its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rigsight.compare.random_effects import Prediction
+from rigsight.diagnose.trust.patterns import Role, roles
+from rigsight.effects import Effect, Family
+from rigsight.errors import InputError
+from rigsight.rigs import Rig
+from rigsight.workflow.campaign.model_file import json_object, read_model
+from rigsight.workflow.run.results import DIAGNOSIS_FILE
+
+_MEND = "Name folders that 'rigsight diagnose' wrote."
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+@dataclass(frozen=True)
+class Known:
+    """A number that a diagnosis found."""
+
+    value: float
+    std: float  # infinite where its records do not determine it
+    between: float  # variance between its records beyond their errors; 0 where that is not known
+    n_records: int  # number of records that determine it alone
+    entangled: tuple[str, ...]  # numbers from which its records can hardly separate it
+
+    @property
+    def with_scatter(self) -> float:
+        """Standard error that includes the scatter between records."""
+        return float(np.sqrt(self.std**2 + self.between / max(1, self.n_records)))
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a diagnosis found."""
+
+    name: str
+    rig: str
+    effects: tuple[str, ...]  # with ``@place`` where the rig has several
+    numbers: Mapping[str, Known]
+    units: Mapping[str, str]
+    roles: Mapping[str, Role | Family]  # of each number in the equations, the family for one of an effect
+
+
+class _Estimate(BaseModel):
+    value: _Number
+    std: _Number | None
+    unit: str
+
+
+class _Candidate(BaseModel):
+    effects: list[str]
+    where: list[str]
+    parameters: dict[str, _Estimate]
+
+
+class _Group(BaseModel):
+    value: _Number
+    std: _Number | None
+
+
+class _Parameter(BaseModel):
+    name: str
+    by_group: dict[str, list[_Group]]
+
+
+class _Pair(BaseModel):
+    names: list[str]
+
+
+class _Trust(BaseModel):
+    parameters: list[_Parameter]
+    entangled: list[_Pair]
+
+
+class _Diagnosis(BaseModel):
+    """What is read of ``diagnosis.json``."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    title: str
+    rig: str
+    effects: list[str]
+    where: list[str]
+    candidates: list[_Candidate]
+    trust: _Trust | None
+
+
+def read_units(folders: Sequence[Path], own_effects: Iterable[Effect], own_rigs: Iterable[Rig]) -> list[Unit]:
+    """Return what each diagnosis found, with names of their own, and refuse those of different rigs."""
+    effects, rigs = tuple(own_effects), tuple(own_rigs)
+    found = [_unit(folder, effects, rigs) for folder in folders]
+    for other in found[1:]:
+        if other.rig != found[0].rig:
+            raise InputError(
+                f"{found[0].name} is of the rig '{found[0].rig}', {other.name} of '{other.rig}': only diagnoses of one rig "
+                "can be compared."
+            )
+    return found
+
+
+def _unit(folder: Path, own_effects: Iterable[Effect], own_rigs: Iterable[Rig]) -> Unit:
+    file = folder / DIAGNOSIS_FILE
+    if not file.is_file():
+        raise InputError(f"{folder} contains no {DIAGNOSIS_FILE}. {_MEND}")
+    try:
+        found = _Diagnosis.model_validate(json_object(file, "diagnosis", _MEND))
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]
+        key = ".".join(map(str, problem["loc"]))
+        raise InputError(f"{file}: {key}: {problem['msg'][0].lower()}{problem['msg'][1:]}. {_MEND}") from None
+    model = read_model(folder, own_effects, own_rigs)
+    own = [one for one in found.candidates if one.effects == found.effects]
+    candidate = next((one for one in own if one.where == found.where), own[0] if own else None)
+    if candidate is None:
+        raise InputError(f"{file}: candidates: none has the effects of the verdict. {_MEND}")
+    structure = model.structure
+    families = {
+        structure.parameter_name(effect, p.name): effect.family
+        for effect in structure.effects
+        for p in effect.parameters
+    }
+    return Unit(
+        str(folder),
+        found.rig,
+        structure.effect_names,
+        {name: _known(name, estimate, found.trust) for name, estimate in candidate.parameters.items()},
+        {name: estimate.unit for name, estimate in candidate.parameters.items()},
+        {**roles(structure.rig, []), **families},
+    )
+
+
+def _known(name: str, estimate: _Estimate, trust: _Trust | None) -> Known:
+    groups = (
+        [] if trust is None else [p.by_group.get("record", []) for p in trust.parameters if p.name == name]
+    )
+    alone = [(g.value, g.std**2) for own in groups for g in own if g.std is not None and g.std > 0.0]
+    pairs = [] if trust is None else [pair.names for pair in trust.entangled if name in pair.names]
+    between = Prediction.of(*map(np.array, zip(*alone, strict=True))).between if len(alone) > 1 else 0.0
+    return Known(
+        estimate.value,
+        np.inf if estimate.std is None else estimate.std,
+        between,
+        len(alone),
+        tuple(other for names in pairs for other in names if other != name),
+    )
