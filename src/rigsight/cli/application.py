@@ -20,6 +20,7 @@ from rigsight.cli.export import export
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
+from rigsight.cli.open_app import open_app
 from rigsight.cli.power import power
 from rigsight.cli.rigs import list_rigs
 from rigsight.cli.simulate import simulate
@@ -53,6 +54,7 @@ def not_installed() -> None:
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": demo,
+    "app": open_app,
     "inspect": inspect,
     "init": init,
     "diagnose": diagnose,
