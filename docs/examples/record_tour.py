@@ -41,6 +41,20 @@ Recorded by [record_tour.py](examples/record_tour.py): every command was run as 
 records are those of the [first diagnosis](first_diagnosis.md), which explains each step: a positioning stage on dry guides,
 whose simulation lacks the friction.
 """
+TAIL = """## The same in a browser
+
+`rigsight app stage` opens these steps as pages ([a first use](app.md), filmed): what is in a file,
+
+![The page of a file: a table of its channels, and their plots over time](images/app/2-channels.png)
+
+a diagnosis with its progress, the time left and a button to cancel it,
+
+![The page Diagnosis while it runs: a bar, the candidate that was fitted last, the time left](images/app/6-running.png)
+
+and its report.
+
+![The page Diagnosis when it is done: the report, with its verdict](images/app/7-diagnosis.png)
+"""
 
 
 def shown(command: str, folder: Path) -> str:
@@ -76,7 +90,7 @@ def main() -> None:
             text.append(
                 f"{words}\n\n```console\n$ {command}\n{output}\n```\n".replace("\n\n```\n", "\n```\n")
             )
-    PAGE.write_text("\n".join(text), encoding="utf-8")
+    PAGE.write_text("\n".join([*text, TAIL]), encoding="utf-8")
 
 
 if __name__ == "__main__":

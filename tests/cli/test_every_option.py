@@ -41,6 +41,7 @@ WORK = {
     "export": "rigsight.workflow.export.run_export",
     "vary": "rigsight.workflow.vary.run_vary",
     "blind": "rigsight_bench.benches.run_blind",
+    "app": "rigsight.app.server.serve",
 }
 """The function that a command calls; what it makes of its arguments is asked of it in its own tests."""
 ELSEWHERE = {
@@ -114,13 +115,15 @@ GIVEN: dict[str, list[str]] = {
     "--gear": ["elbow=500", "--mjcf", "arm.xml"],
     "--lock": ["elbow=0.5", "--mjcf", "arm.xml"],
     "--as-it-is": ["--mjcf", "arm.xml"],
+    "--host": ["10.0.0.1"],
+    "--port": ["8080"],
 }
 VALUES_OF = {
     ("vary", "--to"): ["9.0"],
     ("export", "--out"): ["elsewhere.py"],
     ("discover", "--method"): ["full"],
 }
-NOT_PASSED_ON = ("--simulator", "--markdown", "--picture")
+NOT_PASSED_ON = ("--simulator", "--markdown", "--picture", "--no-browser")
 """Used by the command itself: tests below and in `test_own_simulators`."""
 REFUSED = {
     "identify": [["--seed", "3"], ["--method", "thesis", "--resolution", "0.5"]],

@@ -164,3 +164,17 @@ def test_the_help_names_every_format(run: Run) -> None:
     """It is written out there: to import the table of formats would make all help slow."""
     shown = " ".join(run("inspect", "--help")[1].split())
     assert [known.name for known in KNOWN if known.suffixes and known.name not in shown] == []
+
+
+def test_channels_are_plotted_over_the_time_of_the_file(
+    run: Run, write_csv: Callable[..., Path], tmp_path: Path
+) -> None:
+    picture = tmp_path / "plots" / "sweep.svg"
+    code, out, _ = run("inspect", write_csv(), "--picture", picture, "--json")
+    assert (code, len(json.loads(out)["channels"])) == (0, 4)
+    drawn = picture.read_text(encoding="utf-8")
+    assert [name for name in ("t", "u", "psi", "y") if f">{name}</text>" in drawn] == ["t", "u", "psi", "y"]
+    assert drawn.count(">t</text>") == 1
+    code, _, err = run("inspect", write_csv(), "--picture", tmp_path / "sweep.pdf")
+    assert code == 2
+    assert ".svg" in err

@@ -12,7 +12,7 @@ import pytest
 from rigsight.diagnose.result import Diagnosis
 from rigsight.report import render_report
 
-from .chromium import BROWSERS, Chromium, find
+from ..chromium import BROWSERS, Chromium, find
 
 pytestmark = pytest.mark.release
 FIRST = "document.querySelector('#record-1-output-1')"

@@ -23,6 +23,7 @@ from rigsight.cli.gate import gate
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
+from rigsight.cli.open_app import open_app
 from rigsight.cli.power import power
 from rigsight.cli.reproduce import reproduce
 from rigsight.cli.rigs import list_rigs
@@ -57,6 +58,7 @@ def not_installed() -> None:
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": demo,
+    "app": open_app,
     "inspect": inspect,
     "init": init,
     "check": check,

@@ -29,6 +29,15 @@ def inspect(
             help="A measured file: CSV, MATLAB, HDF5, MDF4, TDMS, Parquet, UFF, JSON, ROS bag (MCAP too) or ULog.",
         ),
     ],
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--picture",
+            metavar="FILE",
+            show_default="none",
+            help="Plot the channels into a PNG or SVG file as well.",
+        ),
+    ] = None,
     rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -36,10 +45,15 @@ def inspect(
 ) -> None:
     """Show the channels of a measured file with units, sample rates, ranges and gaps, and propose its entry in a campaign."""
     with report_errors(debug):
-        from rigsight.workflow.inspect import run_inspect
+        from rigsight.plot import channel_plots, encoded
+        from rigsight.workflow.inspect import plotted_channels, run_inspect
         from rigsight.workflow.own.own_rigs import own_rigs
+        from rigsight.workflow.run.picture import write_picture
 
         found = run_inspect(file, own_rigs(rigs or []).values())
+        if picture is not None:
+            plots = plotted_channels(file)
+            write_picture(picture, lambda suffix: encoded(channel_plots(plots), suffix, file.name))
     if json:
         show_as_json(found.to_json())
     elif not quiet:

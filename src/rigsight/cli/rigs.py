@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,12 +11,7 @@ from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError, check_option
-from rigsight.workflow.run.results import check_target, write_together
-
-if TYPE_CHECKING:
-    from rigsight.rigs import Rig
-
-_DPI = 200
+from rigsight.workflow.run.picture import write_picture
 
 
 def list_rigs(
@@ -38,6 +33,7 @@ def list_rigs(
     If a file of --rigs cannot be used, the error and its place in the file are printed and the exit code is 2.
     """
     with report_errors(debug):
+        from rigsight.plot import encoded, rig_picture
         from rigsight.rigs import rig_file_text
         from rigsight.workflow.own.own_rigs import known_rigs, own_rigs, own_simulators
 
@@ -49,7 +45,8 @@ def list_rigs(
                 raise InputError(
                     "--picture needs the name of the rig to draw: rigsight rigs NAME --picture FILE.png."
                 )
-            written = str(write_rig_picture(known[check_option("Rig", name, known)], picture))
+            rig = known[check_option("Rig", name, known)]
+            written = str(write_picture(picture, lambda suffix: encoded(rig_picture(rig), suffix, rig.name)))
             show_as_json({"name": name, "picture": written}) if json else typer.echo(written)
             return
         if name is not None:
@@ -78,14 +75,3 @@ def list_rigs(
             typer.echo(f"{rig.name:{width}}{rig.summary}")
         if files:
             typer.echo(f"\nYour own, checked: {', '.join(rig.name for rig in files.values())}")
-
-
-def write_rig_picture(rig: Rig, file: Path) -> Path:
-    """Draw a rig into a PNG or SVG file."""
-    from rigsight.plot import png_bytes, rig_picture, svg_text
-
-    ending = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
-    check_target(file)
-    figure = rig_picture(rig)
-    content = svg_text(figure, rig.name) if ending == ".svg" else png_bytes(figure, _DPI)
-    return write_together(file.parent, {file.name: content})[0]

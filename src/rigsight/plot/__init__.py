@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from rigsight.plot.channels import ChannelPlot as ChannelPlot
+from rigsight.plot.channels import channel_plots as channel_plots
 from rigsight.plot.diagnosis import ForceLoop as ForceLoop
 from rigsight.plot.diagnosis import comparison as comparison
 from rigsight.plot.diagnosis import detail_window as detail_window
@@ -11,6 +13,7 @@ from rigsight.plot.diagnosis import ranking as ranking
 from rigsight.plot.diagnosis import step_window as step_window
 from rigsight.plot.drawing import DisplayScale as DisplayScale
 from rigsight.plot.drawing import display_scale as display_scale
+from rigsight.plot.drawing import encoded as encoded
 from rigsight.plot.drawing import envelope as envelope
 from rigsight.plot.drawing import png_bytes as png_bytes
 from rigsight.plot.drawing import style as style

@@ -72,6 +72,7 @@ PAGE_WIDTH = 5.4
 _PREFIXES = {6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}
 _PREFIXED = ("rad", "m", "N", "N m", "A", "V", "Pa", "W", "K")
 _ENVELOPE_BINS = 600
+_DPI = 200
 _POINTS = 72.0
 """In an inch."""
 _LABEL = 0.17
@@ -241,6 +242,11 @@ def svg_text(figure: Figure, key: str) -> str:
         finally:
             figure.set_layout_engine(engine)
     return stream.getvalue()
+
+
+def encoded(figure: Figure, suffix: str, key: str) -> str | bytes:
+    """Return a figure as the contents of a file of this suffix, ``".svg"`` or ``".png"``."""
+    return svg_text(figure, key) if suffix == ".svg" else png_bytes(figure, _DPI)
 
 
 def png_bytes(figure: Figure, dpi: int) -> bytes:

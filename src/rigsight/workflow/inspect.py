@@ -9,15 +9,18 @@ from typing import Any
 
 from rigsight.errors import InputError
 from rigsight.json_data import json_data
+from rigsight.plot import ChannelPlot
 from rigsight.records.channel_names import closeness
 from rigsight.records.channel_summary import ChannelSummary, open_measurement, summarize, time_summary
-from rigsight.records.formats.channel import Channel, ChannelFile, Refused
+from rigsight.records.formats.channel import Channel, ChannelFile, Refused, as_floats
 from rigsight.records.read_record import TIME
 from rigsight.rigs import RIGS, Rig
 from rigsight.workflow.campaign.record_proposal import propose
 
 SCHEMA_VERSION = 1
 _NAMED = 2.0
+_MOST_DRAWN = 40
+"""Number of channels in a picture; a flight log holds hundreds."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +58,7 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
     path = Path(path)
     with open_measurement(path) as file:
         file, channels = _readable(path, file)
-        times = {
-            channel.name: time_summary(channel)
-            for channel in file.channels
-            if closeness(channel.name, TIME) >= _NAMED
-        }
+        times = {channel.name: time_summary(channel) for channel in file.channels if _is_time(channel)}
         if not channels:
             reasons = "; ".join(f"'{one.name}' {one.reason}" for one in file.refused[:5]) or "it is empty"
             raise InputError(f"{path.name} ({file.format}) contains no signal over time: {reasons}.")
@@ -74,6 +73,30 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
         proposal.toml("estimation", '"validation" for records that are only scored'),
         proposal.n_blanks,
     )
+
+
+def plotted_channels(path: Path) -> list[ChannelPlot]:
+    """Return the channels of a file over their own time, over the channel that looks like time, or over their samples."""
+    with open_measurement(path) as opened:
+        file, _ = _readable(path, opened)
+        time = next((channel for channel in file.channels if _is_time(channel)), None)
+        drawn = [channel for channel in file.channels if channel is not time] or list(file.channels)
+        return [_plot(channel, time) for channel in drawn[:_MOST_DRAWN]]
+
+
+def _plot(channel: Channel, time: Channel | None) -> ChannelPlot:
+    values = as_floats(channel.load())
+    if channel.axis is not None:
+        return ChannelPlot(
+            channel.name, channel.unit, values, channel.axis.stamps(), f"time [{channel.axis.unit}]"
+        )
+    if time is not None and time.n_samples == values.size:
+        return ChannelPlot(channel.name, channel.unit, values, as_floats(time.load()), time.name)
+    return ChannelPlot(channel.name, channel.unit, values, None, "sample")
+
+
+def _is_time(channel: Channel) -> bool:
+    return closeness(channel.name, TIME) >= _NAMED
 
 
 def _readable(path: Path, file: ChannelFile) -> tuple[ChannelFile, tuple[ChannelSummary, ...]]:

@@ -12,7 +12,7 @@ import pytest
 from rigsight_bench.report.page import render_blind
 from rigsight_bench.scoring import Outcome
 
-from ...report.chromium import BROWSERS, Chromium, find
+from ...chromium import BROWSERS, Chromium, find
 from .blind_content import content_of
 
 Like = Callable[..., Outcome]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -13,6 +15,8 @@ _REMEMBERED = 24 * 3600.0
 """Time [s] over which the speed of steps is averaged."""
 _BETWEEN_LINES = 30.0
 """Interval [s] of progress lines in a log."""
+PROGRESS_VARIABLE, JSON_LINES = "RIGSIGHT_PROGRESS", "json"
+"""Environment variable and its value with which every step is a line of JSON on stderr, for other programs."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +62,12 @@ class Stage:
 
 @contextlib.contextmanager
 def listening(quiet: bool) -> Iterator[Listener]:
-    """Show progress on stderr: a bar on a terminal, a line at intervals in a log, nothing if quiet."""
+    """Show progress on stderr: a bar on a terminal, a line at intervals in a log, JSON where asked for, nothing if quiet."""
     # A process without a terminal may have no stderr at all.
     if quiet or sys.stderr is None:
         yield silent
+    elif os.environ.get(PROGRESS_VARIABLE) == JSON_LINES:
+        yield json_lines()
     elif not sys.stderr.isatty():
         yield log_lines()
     else:
@@ -85,6 +91,17 @@ def log_lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time
         # A full disk or a closed terminal must not end hours of work.
         with contextlib.suppress(OSError):
             sys.stderr.write(f"{line}\n")
+
+    return say
+
+
+def json_lines(clock: Callable[[], float] = time.monotonic) -> Listener:
+    """Return a listener that prints every step as a line of JSON, with the time [s] since it was made."""
+    begun = clock()
+
+    def say(step: Step) -> None:
+        with contextlib.suppress(OSError):
+            sys.stderr.write(json.dumps({**vars(step), "seconds": round(clock() - begun, 3)}) + "\n")
 
     return say
 

@@ -54,7 +54,9 @@ class Chromium:
             self.send(f"{domain}.enable")
 
     def close(self) -> None:
-        """End the browser."""
+        """End the browser, once."""
+        if self._process.returncode is not None:
+            return
         self._process.terminate()
         try:
             self._process.wait(timeout=60)
@@ -90,9 +92,15 @@ class Chromium:
         return json.loads(text)
 
     def open(
-        self, page: Path, width: int = 1280, height: int = 900, *, touch: bool = False, dark: bool = False
+        self,
+        page: Path | str,
+        width: int = 1280,
+        height: int = 900,
+        *,
+        touch: bool = False,
+        dark: bool = False,
     ) -> None:
-        """Show a page on a screen of this size."""
+        """Show a file or an address on a screen of this size."""
         self.events.clear()
         self.send(
             "Emulation.setDeviceMetricsOverride",
@@ -106,7 +114,7 @@ class Chromium:
             "Emulation.setEmulatedMedia",
             features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
         )
-        self.send("Page.navigate", url=page.as_uri())
+        self.send("Page.navigate", url=page if isinstance(page, str) else page.as_uri())
         self.wait("document.readyState === 'complete'")
 
     def evaluate(self, expression: str) -> Any:
@@ -145,6 +153,17 @@ class Chromium:
             for event in self.events
             if event.get("method") == "Network.requestWillBeSent"
         ]
+
+    def choose_files(self, selector: str, files: list[Path]) -> None:
+        """Choose files in a field, as its dialog does."""
+        field = self.send("Runtime.evaluate", expression=f"document.querySelector({selector!r})")["result"]
+        self.send("DOM.setFileInputFiles", files=[str(file) for file in files], objectId=field["objectId"])
+
+    def named(self) -> list[tuple[str, str]]:
+        """Return role and name of everything that a screen reader finds on the page."""
+        nodes = self.send("Accessibility.getFullAXTree")["nodes"]
+        told = [node for node in nodes if not node.get("ignored")]
+        return [(n.get("role", {}).get("value", ""), n.get("name", {}).get("value", "")) for n in told]
 
     def mouse(self, kind: str, x: float, y: float, **more: Any) -> None:
         """Send a mouse event: ``"mousePressed"``, ``"mouseMoved"`` or ``"mouseReleased"``."""

@@ -1,0 +1,239 @@
+"""The pages on the campaign: choose the rig, which begins it, and edit its text with errors by line."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from rigsight.app import jobs
+from rigsight.app.page_parts import address_of, page_of, run_panel, telling, text, watch
+from rigsight.app.steps import ROBOT_SUFFIXES, Site, picture_of
+from rigsight.app.workspace import (
+    CAMPAIGN,
+    Draft,
+    campaign_text,
+    find_draft,
+    keep_draft,
+    save_campaign,
+    set_aside,
+)
+from rigsight.errors import InputError
+
+_GUESS = ""
+_PICTURE = "picture"
+_WORDS = "Which column is which signal, in which unit, and the values of the given simulation. Comments mark guesses."
+# The editor has no option for what a screen reader calls it, and is loaded after the page.
+_NAME_THE_FIELD = """(function name() {
+  const field = document.querySelector('.cm-content');
+  field ? field.setAttribute('aria-label', 'Text of the campaign') : setTimeout(name, 100);
+})()"""
+_UNSAVED = "Not saved yet; kept if this page is closed."
+_LINE = re.compile(r"line (\d+)")
+
+
+def rig_page(site: Site) -> None:
+    """Choose a rig, which begins the campaign; afterwards show the rig of the campaign."""
+
+    @ui.refreshable
+    def content() -> None:
+        _chosen(site) if (site.root / CAMPAIGN).is_file() else _choice(site)
+
+    with page_of(site, "/rig", "Rig"):
+        content()
+        watch(lambda: ((site.root / CAMPAIGN).is_file(), _begun(site)), content.refresh)
+
+
+def _chosen(site: Site) -> None:
+    def aside() -> None:
+        with telling():
+            ui.notify(f"Moved to {set_aside(site.root, CAMPAIGN)}.")
+
+    text("p", f"The campaign of this folder is {CAMPAIGN}. Its rig:")
+    table = _rig_table(site.root)
+    _picture(site, picture_arguments(site.root, model=table.get("model"), file=table.get("file")))
+    if output := _begun(site):
+        text("pre", output).props('tabindex="0" aria-label="What was written"')
+    ui.link("Next: the campaign", "/campaign").classes("next")
+    ui.button("Move this campaign aside and begin another", on_click=aside).props("outline no-caps")
+
+
+def _begun(site: Site) -> str:
+    """Return what the command that began the campaign printed."""
+    job = jobs.find(site.root, "init")
+    return job.output if job is not None and job.exit_code == 0 else ""
+
+
+def _choice(site: Site) -> None:
+    from rigsight.rigs import RIGS
+
+    options = {_GUESS: "Choose the one that matches the channels best"}
+    options |= {f"--model {name}": f"{name}: {rig.summary}" for name, rig in RIGS.items()}
+    options |= {f"--rigs {name}": f"{name} (rig file)" for name in site.files(".toml")}
+    options |= {f"--mjcf {name}": f"{name} (model of a robot)" for name in site.files(*ROBOT_SUFFIXES)}
+
+    def arguments() -> tuple[str, ...]:
+        option, _, name = str(choice.value).partition(" ")
+        return ("init", ".", *((option, name) if name else ()))
+
+    def chosen() -> None:
+        show_command()
+        option, _, name = str(choice.value).partition(" ")
+        with drawn, telling():
+            drawn.clear()
+            found = {"--model": {"model": name}, "--rigs": {"file": name}}.get(option)
+            _picture(site, None if found is None else picture_arguments(site.root, **found))
+
+    text("p", "What do the records come from? This writes the campaign, with every guess marked in it.")
+    choice = ui.select(options, value=_GUESS, label="Rig").classes("wide")
+    drawn = ui.element("div")
+    show_command = run_panel(site, "init", "Begin the campaign", arguments)
+    choice.on_value_change(chosen)
+
+
+def picture_arguments(
+    root: Path, *, model: str | None = None, file: str | None = None
+) -> tuple[str, ...] | None:
+    """Return the arguments that draw a rig; None if its file does not say a name."""
+    if file is not None:
+        try:
+            name = tomllib.loads((root / file).read_text(encoding="utf-8")).get("name")
+        except (OSError, ValueError):
+            return None
+        return (
+            ("rigs", name, "--rigs", file, "--picture", picture_of(file)) if isinstance(name, str) else None
+        )
+    return None if model is None else ("rigs", model, "--picture", picture_of(model))
+
+
+def _picture(site: Site, arguments: Sequence[str] | None) -> None:
+    """Show the picture of a rig once the command that draws it has ended."""
+    if arguments is None:
+        return
+    file = arguments[-1]
+    source = site.root / arguments[3] if "--rigs" in arguments else None
+
+    def is_drawn() -> bool:
+        picture = site.root / file
+        return picture.is_file() and (source is None or source.stat().st_mtime < picture.stat().st_mtime)
+
+    @ui.refreshable
+    def image() -> None:
+        job = jobs.find(site.root, _PICTURE)
+        if is_drawn():
+            ui.element("img").props(
+                f'src="{address_of(file)}" alt="Picture of the rig {arguments[1]}"'
+            ).classes("rig")
+        elif job is not None and not job.is_running and job.arguments == tuple(arguments):
+            for message in job.messages():
+                text("p", message, "message")
+        else:
+            text("p", "Drawing ...").props('role="status"')
+
+    def state() -> tuple[bool, bool]:
+        job = jobs.find(site.root, _PICTURE)
+        if not is_drawn() and (job is None or (not job.is_running and job.arguments != tuple(arguments))):
+            with telling():
+                job = jobs.start(site.root, _PICTURE, arguments)
+        return is_drawn(), job is not None and job.is_running
+
+    watch(state, image.refresh)
+    image()
+
+
+def _rig_table(root: Path) -> dict[str, Any]:
+    try:
+        table = tomllib.loads(campaign_text(root) or "").get("rig", {})
+    except ValueError:
+        # Not valid yet: the blanks of a begun campaign are filled in on its page.
+        return {key: found[1] for key in ("model", "file")
+                if (found := re.search(rf'^{key} = "([^"]+)"', campaign_text(root) or "", re.MULTILINE))}  # fmt: skip
+    return table if isinstance(table, dict) else {}
+
+
+def campaign_errors(file: Path) -> list[str]:
+    """Return what cannot be used in a campaign, one message per error, without reading its records."""
+    from rigsight.workflow.campaign.campaign_file import read_campaign_table
+
+    try:
+        read_campaign_table(file)
+    except InputError as error:
+        return str(error).splitlines()
+    return []
+
+
+async def campaign_page(site: Site) -> None:
+    """Edit the text of the campaign."""
+    kept = find_draft(site.root)
+    saved = campaign_text(site.root) if kept is None else kept.begun_from
+    shown = saved if kept is None else kept.text
+    with page_of(site, "/campaign", "Campaign"):
+        if shown is None:
+            text("p", "This folder has no campaign yet.")
+            ui.link("Begin one: the rig", "/rig").classes("next")
+            return
+        text("p", _WORDS)
+        text("p", "Tab indents; Escape and then Tab leaves the field. Ctrl-S saves.", "hint")
+        with ui.element("div").classes("command"):
+            button = ui.button("Save")
+            note = text("p", "" if kept is None else _UNSAVED, "note").props('role="status"')
+        errors = ui.element("div").props('role="status" aria-label="Errors"')
+        editor = ui.codemirror(shown, language="TOML", line_wrapping=True).classes("editor")
+        ui.link(*_after(site)).classes("next")
+
+    def changed() -> None:
+        nonlocal kept
+        draft = Draft(editor.value, saved)
+        with telling():
+            keep_draft(site.root, draft, kept)
+            kept = draft
+            note.text = _UNSAVED if site.is_edited() else ""
+
+    async def show_errors() -> None:
+        found = await asyncio.to_thread(campaign_errors, site.root / CAMPAIGN)
+        lines = {int(place[1]) for message in found if (place := _LINE.search(message))}
+        editor.decorations = [{"kind": "line", "line": line, "class": "wrong"} for line in sorted(lines)]
+        note.text = "" if found else "Saved, and every key can be used."
+        errors.clear()
+        with errors:
+            for message in found:
+                _error(editor, message)
+
+    async def save() -> None:
+        nonlocal saved
+        with telling():
+            aside = save_campaign(site.root, Draft(editor.value, saved))
+            saved = editor.value
+            if aside is not None:
+                words = f"{CAMPAIGN} was changed elsewhere meanwhile; that text is kept as {aside}."
+                ui.notify(words, timeout=0, close_button="Close")
+            await show_errors()
+
+    editor.on_value_change(changed)
+    editor.map_key("Mod-s", save)
+    button.on_click(save)
+    await ui.context.client.connected()
+    ui.run_javascript(_NAME_THE_FIELD)
+    if kept is None:
+        await show_errors()
+
+
+def _error(editor: ui.codemirror, message: str) -> None:
+    with ui.element("div").classes("error"):
+        text("p", message, "message")
+        if place := _LINE.search(message):
+            line = int(place[1])
+            ui.button(f"Go to line {line}", on_click=lambda: editor.reveal_line(line)).props(
+                "flat dense no-caps"
+            )
+
+
+def _after(site: Site) -> tuple[str, str]:
+    """Return words and address of the step after the campaign."""
+    following = site.runs[0]
+    return f"Next: {following.title.lower()}", f"/{following.key}"

@@ -1,0 +1,202 @@
+"""What every page consists of: heading and steps, a command with its run, files to take away, messages."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from urllib.parse import quote
+
+from nicegui import ui
+from nicegui.elements.mixins.text_element import TextElement
+
+from rigsight.app import jobs
+from rigsight.app.steps import Site
+from rigsight.errors import RigsightError
+
+_COLOR = "#0b5a91"
+"""Of buttons; white on it can be read."""
+_EVERY = 0.5
+"""Interval [s] at which a page looks into the folder."""
+STYLE = (Path(__file__).parent / "pages.css").read_text(encoding="utf-8")
+
+
+def text(tag: str, words: str, classes: str = "") -> TextElement:
+    """Show words in an HTML element of their own."""
+    return TextElement(tag=tag, text=words).classes(classes)
+
+
+def address_of(path: str) -> str:
+    """Return the address at which a file of the folder is served."""
+    return f"/folder/{quote(path)}"
+
+
+@contextlib.contextmanager
+def telling() -> Iterator[None]:
+    """Show an error on the page instead of ending the server's part of it."""
+    try:
+        yield
+    except (RigsightError, OSError) as error:
+        ui.notify(str(error), type="negative", timeout=0, close_button="Close", multi_line=True)
+
+
+@contextlib.contextmanager
+def page_of(site: Site, current: str, title: str) -> Iterator[None]:
+    """Show the frame of a page: folder, steps, and room for what is on it."""
+    ui.add_css(STYLE)
+    ui.colors(primary=_COLOR)
+    ui.page_title(f"{title} - {site.root.name} - rigsight")
+    # Its own landmark would surround ours.
+    ui.query("main.q-page").props("role=presentation")
+    with ui.element("header").classes("top"):
+        ui.link("rigsight", "/").classes("name")
+        text("span", str(site.root), "folder")
+    with ui.element("div").classes("columns"):
+        with ui.element("nav").props('aria-label="Steps"'):
+
+            @ui.refreshable
+            def steps() -> None:
+                for number, (address, name, is_done) in enumerate(site.steps(), 1):
+                    link = ui.link(f"{number} {name}", address)
+                    if address == current:
+                        link.props('aria-current="page"')
+                    if is_done:
+                        with link:
+                            text("span", "done", "done")
+
+            steps()
+            watch(site.steps, steps.refresh)
+        with ui.element("main").classes("content"):
+            text("h1", title)
+            yield
+
+
+def watch(state: Callable[[], object], act: Callable[[], object]) -> None:
+    """Act whenever what a function returns is no longer what it was."""
+    seen = state()
+
+    def look() -> None:
+        nonlocal seen
+        if (now := state()) != seen:
+            seen = now
+            act()
+
+    ui.timer(_EVERY, look)
+
+
+def command_shown(arguments: Sequence[str]) -> None:
+    """Show a command, to be copied into a terminal."""
+    line = jobs.shown(arguments)
+    with ui.element("div").classes("command"):
+        text("code", line)
+        ui.button(icon="content_copy", on_click=lambda: _copied(line)).props(
+            'flat dense aria-label="Copy the command"'
+        )
+
+
+def _copied(line: str) -> None:
+    ui.clipboard.write(line)
+    ui.notify("Copied.")
+
+
+def run_panel(
+    site: Site,
+    name: str,
+    label: str,
+    arguments: Callable[[], Sequence[str]],
+    ended: Callable[[], object] = lambda: None,
+    shows_output: bool = True,
+) -> Callable[[], object]:
+    """Show a command with its button, its run and its outcome; return what shows the command anew."""
+
+    def state() -> tuple[float, bool] | None:
+        job = jobs.find(site.root, name)
+        return None if job is None else (job.started, job.is_running)
+
+    def begin() -> None:
+        with telling():
+            jobs.start(site.root, name, arguments())
+            panel.refresh()
+
+    @ui.refreshable
+    def panel() -> None:
+        job = jobs.find(site.root, name)
+        if job is not None and job.is_running:
+            command_shown(job.arguments)
+            _running(job)
+            return
+        command_shown(arguments())
+        ui.button(label, on_click=begin)
+        if job is not None:
+            _outcome(job, shows_output)
+
+    def changed() -> None:
+        panel.refresh()
+        if (now := state()) is not None and not now[1]:
+            ended()
+
+    with ui.element("section").classes("run").props(f'aria-label="{label}"'):
+        panel()
+        watch(state, changed)
+    return lambda: panel.refresh()
+
+
+def _running(job: jobs.Job) -> None:
+    words = text("p", "Starting ...").props('role="status"')
+    bar = ui.linear_progress(value=0.0, show_value=False).props('aria-label="Progress" rounded size="10px"')
+    ui.button("Cancel", on_click=job.cancel).props("outline")
+    notes = text("p", "", "message")
+
+    def look() -> None:
+        notes.text = "\n".join(job.messages())
+        if (found := job.progress()) is not None:
+            left = "" if found.seconds_left is None else f", {_time(found.seconds_left)} left"
+            words.text = f"{found.text}{left}"
+            bar.value = found.share
+
+    look()
+    ui.timer(_EVERY, look)
+
+
+def _time(seconds: float) -> str:
+    return f"about {seconds:.0f} s" if seconds < 90 else f"about {seconds / 60:.0f} min"
+
+
+def _outcome(job: jobs.Job, shows_output: bool) -> None:
+    code = job.exit_code
+    kind, words = ("bad", "Ended without a result: its process was killed. Start it again.")
+    if code == 0:
+        kind, words = "good", "Done."
+    elif code in jobs.CANCELED:
+        kind, words = "bad", "Canceled."
+    elif code is not None:
+        kind, words = "bad", "Not done:"
+    text("p", words, kind).props('role="status"')
+    for message in job.messages():
+        text("p", message, "message")
+    if shows_output and (output := job.output):
+        with ui.element("details"):
+            text("summary", "What the command printed")
+            text("pre", output).props('tabindex="0" aria-label="Output of the command"')
+
+
+def shown_page(site: Site, path: str, title: str) -> None:
+    """Show a page of results inside of this one."""
+    file = site.root / path
+    if not file.is_file():
+        return
+    if site.is_outdated(path):
+        text("p", "The campaign was changed after this result: run it again.", "bad").props('role="status"')
+    ui.link("Open it in a window of its own", address_of(path), new_tab=True)
+    # Without an origin of its own, what an uploaded file brought into a report cannot reach this server.
+    ui.element("iframe").props(
+        f'src="{address_of(path)}?{file.stat().st_mtime_ns}" title="{title}" sandbox="allow-scripts allow-downloads"'
+    )
+
+
+def downloads(paths: Sequence[str]) -> None:
+    """List files to take away."""
+    with ui.element("ul").classes("files"):
+        for path in paths:
+            with ui.element("li"):
+                ui.link(path, address_of(path)).props(f'download aria-label="Download {path}"')
