@@ -26,7 +26,8 @@ _SPEC.loader.exec_module(cart)
 
 DT, N = 0.005, 400
 VALUES = {"m_p": 0.23, "k_u": 2.1, "d_c": 1.4, "k_c": 26.0, "d_p": 0.005}
-WAYS = ("mujoco", "fmu 2.0", "fmu 3.0", "python")
+KINDS = {"fmu": "ModelExchange", "steps": "CoSimulation"}
+WAYS = ("mujoco", "fmu 2.0", "fmu 3.0", "steps 2.0", "steps 3.0", "python")
 
 
 def record(n: int = N) -> Record:
@@ -47,8 +48,9 @@ def rig_of(way: str, folder: Path):
     elif kind == "mujoco":
         (folder / "cart.xml").write_text(cart.MJCF)
         text = cart.MUJOCO.replace("FILE", "cart.xml")
-    elif kind == "fmu":
-        text = cart.FMU.replace("FILE", cart.written_fmu(folder / f"cart_{version}.fmu", version).name)
+    elif kind in KINDS:
+        path = folder / f"cart_{kind}_{version}.fmu"
+        text = cart.FMU.replace("FILE", cart.written_fmu(path, version, KINDS[kind]).name)
     else:
         give_function("cart", cart.accelerations)
         text = cart.PYTHON

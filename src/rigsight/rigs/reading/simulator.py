@@ -28,9 +28,9 @@ def check_simulator(declaration: Declaration) -> None:
         declaration.refuse(
             (_KEY,), "every coordinate of a simulated rig must be a degree of freedom; remove prescribed_by"
         )
-    others = {"rates": own.rates, "forces": own.forces, "without_armature": own.without_armature}
-    for key, wanted in {"rates": "fmu", "forces": "fmu", "without_armature": "mujoco"}.items():
-        if others[key] and own.kind != wanted:
+    owners = {"rates": "fmu", "forces": "fmu", "step": "fmu", "without_armature": "mujoco"}
+    for key, wanted in owners.items():
+        if getattr(own, key) and own.kind != wanted:
             declaration.refuse((_KEY, key), f"it belongs to {wanted}, but this is {own.kind}; remove it")
     if own.digest and own.kind == "python":
         declaration.refuse(
@@ -75,6 +75,7 @@ def simulated_bodies(declaration: Declaration) -> Bodies | None:
             tuple(own.parameters.values()),
             rates=tuple(own.rates.get(name, "") for name in free),
             forces=tuple(own.forces.get(name, "") for name in free),
+            step=own.step or 0.0,
             without_armature=own.without_armature,
         )
         _ = bodies.program
