@@ -137,7 +137,7 @@ _EQUATIONS = f"""
 #define EXPORT __attribute__((visibility("default")))
 #endif
 /* 0 position, 1 angle, 2 speed, 3 turning, 4 to 7 their derivatives, 8 force, 9 torque, 10 mass */
-typedef struct {{ double value[11], time; }} own;
+typedef struct {{ double value[11], time, lag; int fixed; }} own;
 static int start(own *c) {{ memset(c, 0, sizeof *c); c->value[10] = {MASSES["m_p"]}; return 0; }}
 static void *made(void) {{ own *c = calloc(1, sizeof *c); start(c); return c; }}
 static int rates(const own *c, double *dx) {{
@@ -162,6 +162,7 @@ static int stepped(own *c, double length) {{
         status = status ? status : rates(&there, dy);
         for (i = 0; i < 4; i++) c->value[i] += 0.5 * h * (dx[i] + dy[i]);
         c->time += h;
+        c->lag += 5.0 * h * (c->value[0] - c->lag);
     }}
     return status;
 }}
@@ -174,11 +175,11 @@ EXPORT void *fmi2Instantiate(const char *n, int type, const char *guid, const ch
 EXPORT void fmi2FreeInstance(void *c) { free(c); }
 EXPORT int fmi2SetupExperiment(void *c, int a, double b, double d, int e, double f) { return 0; }
 EXPORT int fmi2EnterInitializationMode(void *c) { return 0; }
-EXPORT int fmi2ExitInitializationMode(void *c) { return 0; }
+EXPORT int fmi2ExitInitializationMode(void *c) { INITIALIZED return 0; }
 EXPORT int fmi2NewDiscreteStates(void *c, event *e) { memset(e, 0, sizeof *e); return 0; }
 EXPORT int fmi2EnterContinuousTimeMode(void *c) { return 0; }
 EXPORT int fmi2SetReal(void *c, const unsigned *r, size_t n, const double *y) {
-    size_t i; for (i = 0; i < n; i++) ((own *)c)->value[r[i]] = y[i]; return 0; }
+    size_t i; for (i = 0; i < n; i++) if (r[i] > 3 || !((own *)c)->fixed) ((own *)c)->value[r[i]] = y[i]; return 0; }
 EXPORT int fmi2SetContinuousStates(void *c, const double *x, size_t n) { memcpy(((own *)c)->value, x, 8 * n); return 0; }
 EXPORT int fmi2GetDerivatives(void *c, double *dx, size_t n) { return rates(c, dx); }
 EXPORT int fmi2Reset(void *c) { return start(c); }
@@ -217,7 +218,10 @@ def _description(version: str, kind: str) -> str:
         scalar = '<ScalarVariable name="{}" valueReference="{}" causality="{}" variability="{}"><Real {}/></ScalarVariable>'
     else:
         scalar = '<Float64 name="{}" valueReference="{}" causality="{}" variability="{}" {}/>'
-    rows = [scalar.format(name, i, "output", 'continuous" initial="exact', 'start="0"') for i, name in enumerate(_STATES)]
+    rows = [
+        scalar.format(name, i, "output", 'continuous" initial="exact', 'start="0"')
+        for i, name in enumerate(_STATES)
+    ]
     shift = 1 if version == "2.0" else 0
     rows += [
         scalar.format(f"der({name})", 4 + i, "local", "continuous", f'derivative="{i + shift}"')
@@ -244,9 +248,14 @@ def _description(version: str, kind: str) -> str:
     )
 
 
-def written_fmu(path: Path, version: str = "2.0", kind: str = "ModelExchange", fault: str = "") -> Path:
-    """Write the FMU and return its path; C text of a fault is executed with each evaluation of its equations."""
-    text = _EQUATIONS.replace("FAULT", fault) + _WRAPPERS[version]
+def written_fmu(
+    path: Path, version: str = "2.0", kind: str = "ModelExchange", fault: str = "", initialized: str = ""
+) -> Path:
+    """Write the FMU and return its path.
+
+    C text of a fault is executed with each evaluation of its equations, that of initial equations after they are set.
+    """
+    text = _EQUATIONS.replace("FAULT", fault) + _WRAPPERS[version].replace("INITIALIZED", initialized)
     binary = library(c_compilers()[0], {"cart.c": text}, ("-O2", "-w"))
     folder = (
         platform
