@@ -33,18 +33,24 @@ HIDDEN = {
     "cubic_stiffness@track": {"k_3": (20000.0, 60000.0)},
 }
 """What is hidden, and the range that its number is drawn from."""
+FMUS = {
+    "fmu": ("2.0", "ModelExchange"),
+    "co-simulation": ("2.0", "CoSimulation"),
+    "co-simulation 3": ("3.0", "CoSimulation"),
+}
+"""Ways that are FMUs: version of FMI and kind."""
 FEW = ("coulomb_friction", "quadratic_damping", "input_delay", "cubic_stiffness", "actuator_lag")
 
 
 def written_rig(way: str, folder: Path) -> Path:
     """Write the rig file of a way, with what it names."""
     file = folder / f"{way}.toml"
-    text = {"native": cart.NATIVE, "mujoco": cart.MUJOCO, "fmu": cart.FMU, "python": cart.PYTHON}[way]
+    text = {"native": cart.NATIVE, "mujoco": cart.MUJOCO, "python": cart.PYTHON}.get(way, cart.FMU)
     if way == "mujoco":
         (folder / "cart.xml").write_text(cart.MJCF, encoding="utf-8")
         text = text.replace("FILE", "cart.xml")
-    if way == "fmu":
-        text = text.replace("FILE", cart.written_fmu(folder / "cart.fmu").name)
+    if way in FMUS:
+        text = text.replace("FILE", cart.written_fmu(folder / "cart.fmu", *FMUS[way]).name)
     if way == "python":
         give_function("cart", cart.accelerations)
     file.write_text(cart.RIG + text, encoding="utf-8")
@@ -62,7 +68,7 @@ def write_campaign(way: str, seed: int, folder: Path) -> tuple[str, dict[str, fl
     number = {own: float(rng.uniform(*ends)) for own, ends in HIDDEN[name].items()}
     t = DT * np.arange(round(SECONDS / DT))
     text = [f'[rig]\nfile = "{way}.toml"\n']
-    text += [] if way == "native" else [f'simulator = "{way}"\n']
+    text += [] if way == "native" else [f'simulator = "{"fmu" if way in FMUS else way}"\n']
     text += ["[rig.parameters]\n", *(f"{key} = {value}\n" for key, value in GIVEN.items())]
     for i, role in enumerate(("estimation", "estimation", "validation")):
         u = (
@@ -118,7 +124,7 @@ def row(way: str, seed: int, effects: list[Effect] | None) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("ways", nargs="*", default=("native", "mujoco", "fmu", "python"))
+    parser.add_argument("ways", nargs="*", default=("native", "mujoco", *FMUS, "python"))
     parser.add_argument("--seeds", type=int, nargs="+", default=(0, 1, 2))
     parser.add_argument("--few", action="store_true", help=f"try {', '.join(FEW)} alone")
     choice = parser.parse_args()

@@ -95,6 +95,7 @@ USED: dict[str, Any] = {
     "simulator.kind": "python",
     "simulator.file": "b.fmu",
     "simulator.digest": "1",
+    "simulator.step": 0.001,
     "simulator.coordinates": {"x": "slide"},
     "simulator.parameters": {"m": "mass", "n": "other"},
     "simulator.rates": {"x": "der(x)"},

@@ -71,6 +71,7 @@ class Bodies:
     # along them.
     rates: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
+    step: float = 0.0  # of an FMU for co-simulation, its communication step [s]; 0 for that which it allows
     without_armature: bool = False  # of MuJoCo, whether the inertia of rotors at joints is left to the rig
 
     @cached_property

@@ -94,6 +94,7 @@ class SimulatorTable(_Table):
     file: Text
     digest: Text | None = None
     without_armature: bool = False
+    step: Annotated[Number, Field(gt=0.0)] | None = None
     coordinates: dict[str, Text] = {}
     parameters: dict[str, Text] = {}
     states: dict[str, Text] = {}

@@ -28,15 +28,15 @@ def check_simulator(declaration: Declaration) -> None:
         declaration.refuse(
             (_KEY,), "every coordinate of a simulated rig must be a degree of freedom; remove prescribed_by"
         )
-    others = {
-        "states": own.states,
-        "rates": own.rates,
-        "forces": own.forces,
-        "without_armature": own.without_armature,
+    owners = {
+        "states": "mujoco",
+        "rates": "fmu",
+        "forces": "fmu",
+        "step": "fmu",
+        "without_armature": "mujoco",
     }
-    belonging = {"states": "mujoco", "rates": "fmu", "forces": "fmu", "without_armature": "mujoco"}
-    for key, wanted in belonging.items():
-        if others[key] and own.kind != wanted:
+    for key, wanted in owners.items():
+        if getattr(own, key) and own.kind != wanted:
             declaration.refuse((_KEY, key), f"it belongs to {wanted}, but this is {own.kind}; remove it")
     if own.digest and own.kind == "python":
         declaration.refuse(
@@ -88,6 +88,7 @@ def simulated_bodies(declaration: Declaration) -> Bodies | None:
             states=tuple(own.states.values()),
             rates=tuple(own.rates.get(name, "") for name in free),
             forces=tuple(own.forces.get(name, "") for name in free),
+            step=own.step or 0.0,
             without_armature=own.without_armature,
         )
         _ = bodies.program
