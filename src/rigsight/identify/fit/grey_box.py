@@ -12,11 +12,12 @@ residuals. M. A. Branch, T. F. Coleman and Y. Li, SIAM J. Sci. Comput. 21 (1999)
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from rigsight.errors import SimulationError
+from rigsight.errors import InputError, SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
@@ -45,8 +46,10 @@ class GreyBoxFit:
     A record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of them
     (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of the
     result. `scales` are those of `characteristic_scales`; residuals are divided by `output_noise`. The number of substeps
-    follows from the relative accuracy of the simulations. A prior counts in the search; cost and covariance of a finished fit
-    are those of the records. A fit that the memory holds is not repeated and gives the same result.
+    follows from the relative accuracy of the simulations. If records tell how many of their first samples determine the
+    initial state (`Record.starting_samples`), it is held at what these give, and the parameters are those of the free run. A
+    prior counts in the search; cost and covariance of a finished fit are those of the records. A fit that the memory holds is
+    not repeated and gives the same result.
     """
 
     def __init__(
@@ -75,6 +78,12 @@ class GreyBoxFit:
             threads=threads or IdleThreads(),
             prior=prior,
         )
+        self._beginnings = [
+            record.slice(0, record.starting_samples) for record in records if record.starting_samples
+        ]
+        if self._beginnings and len(self._beginnings) < len(records):
+            raise InputError("Either all records of a fit tell their starting samples, or none does.")
+        self._output_noise = dict(output_noise)
         self._problem: list[Any] = []
         if memory is not None:
             self._problem = [
@@ -114,11 +123,45 @@ class GreyBoxFit:
         accurate residuals. ``success`` is False, with the reason as ``message``, if the start cannot be simulated or the
         optimizer ran out of evaluations.
         """
-        begin = SearchStart.of(self.data, self.scales, start, free, initial_states)
-        coordinates, theta = begin.coordinates, begin.theta
-        lower = np.concatenate([coordinates.lower, *begin.lower])
-        upper = np.concatenate([coordinates.upper, *begin.upper])
-        problem = Problem(self.data, coordinates, begin.n_states, upper)
+
+        def found(values: Mapping[str, float], states: Sequence[Floats] | None) -> FitResult:
+            return self._fit(values, free, states, max_evaluations, tolerance, finish, substeps)
+
+        if not self._beginnings:
+            return found(start, initial_states)
+        result = found(start, self._first_states(start))
+        for _ in range(_MOST_ROUNDS if free else 0):
+            before, result = result, found(result.values, self._first_states(result.values))
+            if not abs(result.cost - before.cost) > _WORTH_A_ROUND * before.cost:
+                break
+        return result
+
+    def _first_states(self, values: Mapping[str, float]) -> list[Floats]:
+        """Return the initial states that fit the first samples of each record best."""
+        records = [replace(record, starting_samples=0) for record in self._beginnings]
+        beginnings = GreyBoxFit(self.structure, records, self.scales, self._output_noise, self.data.accuracy)
+        return list(beginnings.fit(values, (), finish=False).initial_states)
+
+    def _fit(
+        self,
+        start: Mapping[str, float],
+        free: Sequence[str],
+        initial_states: Sequence[Floats] | None,
+        max_evaluations: int,
+        tolerance: float,
+        finish: bool,
+        substeps: Sequence[int] | None,
+    ) -> FitResult:
+        """Search once; the initial states are held where records tell their starting samples."""
+        held = bool(self._beginnings)
+        begin = SearchStart.of(self.data, self.scales, start, free, initial_states, as_given=held)
+        coordinates = begin.coordinates
+        lower, upper, theta, n_states = coordinates.lower, coordinates.upper, begin.theta, begin.n_states
+        if held:
+            theta, n_states = theta[: len(free)], 0
+        else:
+            lower, upper = np.concatenate([lower, *begin.lower]), np.concatenate([upper, *begin.upper])
+        problem = Problem(self.data, coordinates, n_states, upper, np.array(begin.places) if held else None)
         if substeps is None:
             problem.choose_substeps(theta)
         else:
@@ -142,7 +185,7 @@ class GreyBoxFit:
             return theta, bool(solution.status > 0), str(solution.message)
 
         settings = [max_evaluations, tolerance, *map(int, problem.substeps), finish, substeps is None]
-        outcome = self._recalled(self._key(coordinates, start, theta, settings), problem, search)
+        outcome = self._recalled(self._key(coordinates, start, begin.theta, settings), problem, search)
         return self._result(problem, *outcome, finish)
 
     def fit_windows(

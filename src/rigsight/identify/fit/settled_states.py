@@ -237,11 +237,12 @@ class SearchStart:
         values: Mapping[str, float],
         free: Sequence[str],
         initial_states: Sequence[Floats] | None = None,
+        as_given: bool = False,
     ) -> SearchStart:
-        """Return the start of a search."""
+        """Return the start of a search; initial states stay `as_given` also where rest would fit the records better."""
         coordinates = Coordinates.of(data.structure, free, values, scales)
         states = list(initial_states) if initial_states is not None else guessed_states(data, values)
-        if has_dry_friction(data.structure):
+        if has_dry_friction(data.structure) and not as_given:
             states = moving_or_at_rest(data, values, states)
         own = coordinates.from_values(values)
         sizes = data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]

@@ -231,7 +231,9 @@ def _sizes(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
 def _window_length(
     structure: Structure, values: Mapping[str, float], records: Sequence[Record]
 ) -> float | None:
-    """Return the longest possible free run [s]; None if every record can be simulated as a whole."""
+    """Return the longest possible free run [s]; None if every record can be simulated as a whole, or is asked to be."""
+    if any(record.starting_samples for record in records):
+        return None
     try:
         linear = near_rest(structure, values, records)
     except SimulationError:
