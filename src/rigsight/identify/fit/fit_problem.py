@@ -74,22 +74,10 @@ class Evaluation:
 
 
 class Problem:
-    """Cost, gradient and Gauss-Newton matrix as functions of the coordinates, with the last evaluation kept.
+    """Cost, gradient and Gauss-Newton matrix as functions of the coordinates, with the last evaluation kept."""
 
-    Coordinates are the free parameters and `n_states` initial states of each record, unless all initial states are `held`: places
-    in units of their sizes, shape (n_records, number of states).
-    """
-
-    def __init__(
-        self,
-        data: FitData,
-        coordinates: Coordinates,
-        n_states: int,
-        upper: Floats,
-        held: Floats | None = None,
-    ) -> None:
+    def __init__(self, data: FitData, coordinates: Coordinates, n_states: int, upper: Floats) -> None:
         self.data = data
-        self.held = held
         self.coordinates = coordinates
         self.n_states = n_states
         self.upper = upper
@@ -107,14 +95,9 @@ class Problem:
 
     def states(self, theta: Floats) -> list[Floats]:
         """Return the initial states per record."""
+        places = theta[self.n_free :].reshape(len(self.data.records), self.n_states)
         sizes = self.data.state_sizes(self.coordinates.to_parameters(theta[: self.n_free])[:, None])[:, 0]
-        return [row * sizes for row in self._state_places(theta)]
-
-    def _state_places(self, theta: Floats) -> Floats:
-        """Return the initial states in units of their sizes, shape (n_records, number of states)."""
-        if self.held is not None:
-            return self.held
-        return theta[self.n_free :].reshape(len(self.data.records), self.n_states)
+        return [row * sizes for row in places]
 
     def choose_substeps(self, theta: Floats) -> None:
         """Choose the substeps of each record that give the requested accuracy at these coordinates."""
@@ -262,11 +245,10 @@ class Problem:
         # Structures for which this is called have no limited states, so that the units of states do not depend on the parameters.
         own = theta[: self.n_free]
         p = self.coordinates.to_parameters(own)
-        places = self._state_places(theta)
-        sizes = self.data.state_sizes(p[:, None])[: places.shape[1], 0]
+        sizes = self.data.state_sizes(p[:, None])[: self.n_states, 0]
         dp = np.hstack([self.coordinates.derivatives(own), np.zeros((p.size, self.n_states))])
-        dx0 = np.hstack([np.zeros((sizes.size, self.n_free)), np.diag(sizes)[:, : self.n_states]])
-        return p, dp, places * sizes, dx0
+        dx0 = np.hstack([np.zeros((self.n_states, self.n_free)), np.diag(sizes)])
+        return p, dp, theta[self.n_free :].reshape(len(self.data.records), self.n_states) * sizes, dx0
 
     def _sets(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the shift of each coordinate, and the sets of which differences are taken: the point and each shifted point."""
@@ -279,9 +261,10 @@ class Problem:
             moved[i] += shifts[i]
             shifted.append(self.coordinates.to_parameters(moved))
         p = np.column_stack([base, *shifted, *[base] * self.n_states])
-        states = np.repeat(self._state_places(theta)[:, :, None], p.shape[1], axis=2)
+        places = theta[self.n_free :].reshape(len(self.data.records), self.n_states)
+        states = np.repeat(places[:, :, None], p.shape[1], axis=2)
         own = np.arange(self.n_states)
-        states[:, own, 1 + self.n_free + own] += shifts[self.n_free :].reshape(len(states), self.n_states)
+        states[:, own, 1 + self.n_free + own] += shifts[self.n_free :].reshape(places.shape)
         return shifts, p, states * self.data.state_sizes(p)
 
     def _products(self, theta: Floats) -> list[Floats]:

@@ -22,6 +22,7 @@ from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
+from rigsight.identify.fit.free_run import FreeRun, state_slopes
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.fit.prior import Prior
 from rigsight.identify.fit.search import FINE_TOLERANCE, VariableProjection, off_kinks, searched
@@ -78,12 +79,16 @@ class GreyBoxFit:
             threads=threads or IdleThreads(),
             prior=prior,
         )
-        self._beginnings = [
-            record.slice(0, record.starting_samples) for record in records if record.starting_samples
+        beginnings = [
+            replace(record.slice(0, record.starting_samples), starting_samples=0)
+            for record in records
+            if record.starting_samples
         ]
-        if self._beginnings and len(self._beginnings) < len(records):
+        if beginnings and len(beginnings) < len(records):
             raise InputError("Either all records of a fit tell their starting samples, or none does.")
-        self._output_noise = dict(output_noise)
+        self._beginnings = (
+            GreyBoxFit(structure, beginnings, scales, output_noise, accuracy) if beginnings else None
+        )
         self._problem: list[Any] = []
         if memory is not None:
             self._problem = [
@@ -127,20 +132,15 @@ class GreyBoxFit:
         def found(values: Mapping[str, float], states: Sequence[Floats] | None) -> FitResult:
             return self._fit(values, free, states, max_evaluations, tolerance, finish, substeps)
 
-        if not self._beginnings:
+        if self._beginnings is None:
             return found(start, initial_states)
-        result = found(start, self._first_states(start))
+        result = found(start, self._beginnings.fit(start, (), finish=False).initial_states)
         for _ in range(_MOST_ROUNDS if free else 0):
-            before, result = result, found(result.values, self._first_states(result.values))
+            states = self._beginnings.fit(result.values, (), finish=False).initial_states
+            before, result = result, found(result.values, states)
             if not abs(result.cost - before.cost) > _WORTH_A_ROUND * before.cost:
                 break
         return result
-
-    def _first_states(self, values: Mapping[str, float]) -> list[Floats]:
-        """Return the initial states that fit the first samples of each record best."""
-        records = [replace(record, starting_samples=0) for record in self._beginnings]
-        beginnings = GreyBoxFit(self.structure, records, self.scales, self._output_noise, self.data.accuracy)
-        return list(beginnings.fit(values, (), finish=False).initial_states)
 
     def _fit(
         self,
@@ -152,16 +152,19 @@ class GreyBoxFit:
         finish: bool,
         substeps: Sequence[int] | None,
     ) -> FitResult:
-        """Search once; the initial states are held where records tell their starting samples."""
-        held = bool(self._beginnings)
-        begin = SearchStart.of(self.data, self.scales, start, free, initial_states, as_given=held)
-        coordinates = begin.coordinates
-        lower, upper, theta, n_states = coordinates.lower, coordinates.upper, begin.theta, begin.n_states
-        if held:
-            theta, n_states = theta[: len(free)], 0
-        else:
+        """Search once."""
+        as_given = self._beginnings is not None
+        begin = SearchStart.of(self.data, self.scales, start, free, initial_states, as_given)
+        coordinates, theta = begin.coordinates, begin.theta
+        lower, upper = coordinates.lower, coordinates.upper
+        if self._beginnings is None:
             lower, upper = np.concatenate([lower, *begin.lower]), np.concatenate([upper, *begin.upper])
-        problem = Problem(self.data, coordinates, n_states, upper, np.array(begin.places) if held else None)
+            problem = Problem(self.data, coordinates, begin.n_states, upper)
+        else:
+            theta = theta[: len(free)]
+            states = [] if initial_states is None else initial_states
+            slopes = state_slopes(self._beginnings.data, self.scales, start, free, states)
+            problem = FreeRun(self.data, coordinates, theta, begin.places, slopes)
         if substeps is None:
             problem.choose_substeps(theta)
         else:

@@ -102,7 +102,8 @@ def identify_rig(
             loose = _without_spring(campaign, options, n_jobs)
             if loose is not None:
                 return loose
-        if campaign.modelled:
+        # The search for a start knows terms of motions, and levels alone have none.
+        if campaign.modelled or not rig.mechanism.coordinates:
             windows = cut(records, length)
             start = start_with_effects(campaign, windows, start, held, _sizes(rig, windows))
         swallowed = _swallowed(structure, cut(records, length), {**campaign.constants, **start}, held)
