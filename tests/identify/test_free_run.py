@@ -71,6 +71,20 @@ def test_the_free_run_is_better_than_that_of_fitted_states() -> None:
     assert own < 0.9 * usual
 
 
+@pytest.mark.parametrize("position", [-0.02, 0.02])
+@pytest.mark.parametrize("velocity", [-0.5, 0.5])
+def test_a_sensor_of_magnitudes_shows_where_a_motion_begins(position: float, velocity: float) -> None:
+    """A push tells the direction; where the motion crosses zero at once, the reading does not begin with its slope."""
+    values = {**TRUTH, "k": 300.0, "r": 1.0}
+    structure = compose(AXIS, [effect_named("rectified_sensor")])
+    push = Record("push", DT, {"u": np.full(400, 3.0)}, {}, hold="zoh")
+    run = simulate(structure, values, push, np.array([position, velocity]))
+    seen = run.with_signals(x=run["x"] + np.random.default_rng(0).normal(scale=NOISE, size=400))
+    scales = characteristic_scales(AXIS, [seen], values)
+    fit = GreyBoxFit(structure, [seen], scales, {"x": NOISE}).fit(values, ())
+    assert np.allclose(fit.initial_states[0], [position, velocity], atol=1e-3)
+
+
 def test_records_with_and_without_are_not_mixed() -> None:
     with pytest.raises(InputError):
         fitted([record(), run_free(record())], FREE)

@@ -10,36 +10,32 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.fit_data import FitData
 from rigsight.identify.fit.fit_problem import Problem
 from rigsight.identify.fit.settled_states import SearchStart
 from rigsight.records.record import Floats
 
-_DETERMINED = 1e-12
+_DETERMINED = 1e-8
 """Share of the largest influence, squared, below which a combination of states has none on the first samples."""
 
 
 class FreeRun(Problem):
     """Cost, gradient and Gauss-Newton matrix as functions of the parameters' coordinates, with states that follow from these.
 
-    `places` are the initial states at the coordinates `at` in units of their sizes, and `slopes` their derivatives by the
-    coordinates, shape (n_states, n_free), of each record.
+    `slopes` are the derivatives of the initial states, in units of their sizes, by the coordinates from where the search begins,
+    shape (n_states, n_free), of each record.
     """
 
     def __init__(
         self,
         data: FitData,
-        coordinates: Coordinates,
-        at: Floats,
-        places: Sequence[Floats],
+        begin: SearchStart,
         slopes: Sequence[Floats],
     ) -> None:
-        super().__init__(data, coordinates, 0, coordinates.upper)
-        n_states = places[0].size
-        unbounded = np.full(n_states * len(places), np.inf)
-        self._whole = Problem(data, coordinates, n_states, np.concatenate([coordinates.upper, unbounded]))
-        self._begin, self._places, self._slopes = at, places, slopes
+        super().__init__(data, begin.coordinates, 0, begin.coordinates.upper)
+        upper = np.concatenate([begin.coordinates.upper, *begin.upper])
+        self._whole = Problem(data, begin.coordinates, begin.n_states, upper)
+        self._begin, self._slopes = begin, slopes
 
     def states(self, theta: Floats) -> list[Floats]:
         """Return the initial states per record."""
@@ -61,13 +57,15 @@ class FreeRun(Problem):
         ]
 
     def _with_states(self, theta: Floats) -> Floats:
-        moved = theta - self._begin
-        return np.concatenate(
-            [
-                theta,
-                *(place + slope @ moved for place, slope in zip(self._places, self._slopes, strict=True)),
-            ]
-        )
+        begin = self._begin
+        moved = theta - begin.theta[: self.n_free]
+        states = [
+            np.clip(place + slope @ moved, low, high)
+            for place, slope, low, high in zip(
+                begin.places, self._slopes, begin.lower, begin.upper, strict=True
+            )
+        ]
+        return np.concatenate([theta, *states])
 
     def _like_this(self) -> Problem:
         """Return the problem with states as coordinates, with the same integration and difference steps."""

@@ -164,7 +164,7 @@ class GreyBoxFit:
             theta = theta[: len(free)]
             states = [] if initial_states is None else initial_states
             slopes = state_slopes(self._beginnings.data, self.scales, start, free, states)
-            problem = FreeRun(self.data, coordinates, theta, begin.places, slopes)
+            problem = FreeRun(self.data, begin, slopes)
         if substeps is None:
             problem.choose_substeps(theta)
         else:

@@ -182,7 +182,9 @@ def _begin(
 ) -> tuple[dict[str, float], float | None]:
     """Return start values of the rig without effects, and the length of windows [s] if it drifts or diverges."""
     rig, constants, structure = campaign.rig, campaign.constants, compose(campaign.rig)
-    starts = [linear_start(rig, records, constants, held)]
+    # The search for a start cuts records as it needs them.
+    uncut = [replace(record, starting_samples=0) for record in records]
+    starts = [linear_start(rig, uncut, constants, held)]
     given = rig.in_own_parameters(campaign.parameters, constants)
     if all(p.name in given for p in rig.parameters):
         starts.append({p.name: given[p.name] for p in rig.parameters})
