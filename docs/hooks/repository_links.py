@@ -39,6 +39,7 @@ MOVED = {
     "experiments/evidence/README.md": "experiments/evidence.md",
     "experiments/coverage/README.md": "experiments/coverage.md",
     "experiments/any_rig_start/README.md": "experiments/any_rig_start.md",
+    "experiments/boards/README.md": "experiments/boards.md",
     "experiments/thesis/README.md": "experiments/thesis.md",
 }
 """Files outside docs/ that are pages: their path in the repository -> that on the site."""

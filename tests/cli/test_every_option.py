@@ -77,6 +77,8 @@ GIVEN: dict[str, list[str]] = {
     "--simulator": ["own_motion.py:move"],
     "--method": ["h1"],
     "--resolution": ["0.5"],
+    "--objective": ["free-run"],
+    "--initial-samples": ["50"],
     "--pointwise": [],
     "--one-by-one": [],
     "--step-seconds": ["2.0"],
@@ -126,7 +128,12 @@ VALUES_OF = {
 NOT_PASSED_ON = ("--simulator", "--markdown", "--picture", "--no-browser")
 """Used by the command itself: tests below and in `test_own_simulators`."""
 REFUSED = {
-    "identify": [["--seed", "3"], ["--method", "thesis", "--resolution", "0.5"]],
+    "identify": [
+        ["--seed", "3"],
+        ["--method", "thesis", "--resolution", "0.5"],
+        ["--initial-samples", "50"],
+        ["--objective", "free-run", "--effect", "bouc_wen_hysteresis"],
+    ],
     "init": [
         ["--gear", "elbow=500"],
         ["--lock", "elbow=0.5"],

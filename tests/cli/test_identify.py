@@ -28,6 +28,15 @@ def test_identify_leaves_all_results_and_shows_the_table(
     assert code == 0, stderr
 
 
+def test_identify_fits_the_free_run(axis_campaign: Path, tmp_path: Path, run: Run) -> None:
+    out = tmp_path / "out"
+    options = ["--objective", "free-run", "--initial-samples", "30"]
+    code, _, stderr = run("identify", axis_campaign, "-o", out, "-j", "1", *options)
+    assert code == 0, stderr
+    assert json.loads((out / "identification.json").read_text())["initial_samples"] == 30
+    assert "--objective free-run" in (out / "identification.html").read_text()
+
+
 @pytest.mark.slow
 def test_identify_says_nothing_if_quiet(axis_campaign: Path, tmp_path: Path, run: Run) -> None:
     assert run("identify", axis_campaign, "-o", tmp_path / "out", "--quiet") == (0, "", "")
@@ -40,6 +49,9 @@ def test_identify_says_nothing_if_quiet(axis_campaign: Path, tmp_path: Path, run
         (["--resolution", "0.01"], "too short for a resolution"),
         (["--resolution", "0"], "positive number"),
         (["--jobs", "0"], "--jobs"),
+        (["--objective", "freerun"], "Did you mean 'free-run'"),
+        (["--objective", "free-run", "--initial-samples", "1"], "--initial-samples"),
+        (["--objective", "free-run", "--initial-samples", "99999"], "--initial-samples"),
         (["--effect", "bouc_wen"], "Did you mean 'bouc_wen_hysteresis'"),
         (["--effect", "cubic_stiffness"], "name one that does: bouc_wen_hysteresis"),
         (["--effect", "bouc_wen_hysteresis", "--effect", "iwan_hysteresis"], "name one of them"),

@@ -17,7 +17,7 @@ from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.simulate import simulate_model
 
 PAGE = (Path(__file__).parents[2] / "docs/rigs.md").read_text(encoding="utf-8")
-RIG, DRIVEN_STATE, CAMPAIGN = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+RIG, DRIVEN_STATE, LEVEL, CAMPAIGN = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 
 def test_the_campaign_of_the_page_is_read_and_its_simulation_runs(tmp_path: Path) -> None:
@@ -74,3 +74,12 @@ unit = "m"
 def test_the_page_names_every_table_of_a_rig_file() -> None:
     reported = set(re.findall(r"^\| `\[(\w+)", PAGE, re.MULTILINE))
     assert reported == set(RigTable.model_fields) - {"name", "summary", "alternatives"}
+
+
+def test_a_rig_without_inertia_is_read() -> None:
+    numbers = {"k_u": ("parameters", "m/(V s)"), "k_h": ("parameters", "m/s"), "full": ("constants", "m")}
+    numbers["floor"] = ("constants", "m")
+    declared = "".join(f'[{kind}.{name}]\nunit = "{unit}"\n' for name, (kind, unit) in numbers.items())
+    rig = rig_of_text(f'name = "tank"\n[inputs.u]\nunit = "V"\n{declared}{LEVEL}')
+    assert [state.name for state in rig.mechanism.states] == ["level"]
+    assert not rig.mechanism.coordinates

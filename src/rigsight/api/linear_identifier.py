@@ -11,6 +11,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
+from rigsight.identify.record_identification import EstimationOptions
 from rigsight.report.notebook import identification_html
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
@@ -50,6 +51,11 @@ class LinearIdentifier(CampaignEstimator):
         Effects with which the rig is calibrated as well, by name or as declarations; at least one of them with memory.
     seed
         Seed of this calibration.
+    objective
+        What fits over time minimize: ``"windows"``, the error with fitted initial states, over windows where the rig drifts; or
+        ``"free-run"``, the error of each whole record from the state that its first samples give.
+    initial_samples
+        Number of these first samples; None for 20.
 
     Attributes
     ----------
@@ -82,6 +88,8 @@ class LinearIdentifier(CampaignEstimator):
         rig: str | Rig | None = None,
         effects: Sequence[str | Effect] = (),
         seed: int = 0,
+        objective: str = "windows",
+        initial_samples: int | None = None,
     ) -> None:
         self.method = method
         self.resolution = resolution
@@ -90,17 +98,23 @@ class LinearIdentifier(CampaignEstimator):
         self.rig = rig
         self.effects = effects
         self.seed = seed
+        self.objective = objective
+        self.initial_samples = initial_samples
 
     def _check_settings(self) -> None:
-        checked_options(self.method, self.resolution)
+        self._options()
+
+    def _options(self) -> EstimationOptions:
+        return checked_options(self.method, self.resolution, self.objective, self.initial_samples)
 
     def _effects(self) -> Sequence[Effect]:
         return effects_of(self.effects)
 
     def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> IdentificationResult:
-        options = checked_options(self.method, self.resolution)
         effects = self._effects()
-        found = identify_campaign(campaign, options, n_jobs, listener, effects=effects, seed=self.seed)
+        found = identify_campaign(
+            campaign, self._options(), n_jobs, listener, effects=effects, seed=self.seed
+        )
         self.identification_ = IdentificationResult.of(found)
         return self.identification_
 

@@ -46,6 +46,24 @@ def identify(
             help="Frequency resolution: width of the local bands, or spacing of the averaged frequencies.",
         ),
     ] = None,
+    objective: Annotated[
+        str,
+        typer.Option(
+            "--objective",
+            metavar="NAME",
+            help="What fits over time minimize: windows, the error with fitted initial states, over windows if the rig drifts; "
+            "or free-run, the error of each whole record, from the state that its first samples give.",
+        ),
+    ] = "windows",
+    initial_samples: Annotated[
+        int | None,
+        typer.Option(
+            "--initial-samples",
+            metavar="N",
+            show_default="20",
+            help="Number of first samples that give the initial state of a free run.",
+        ),
+    ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
@@ -83,6 +101,8 @@ def identify(
             out,
             method=method,
             resolution=resolution,
+            objective=objective,
+            initial_samples=initial_samples,
             effects=named(effect, own) if effect else (),
             own_effects=own,
             own_rigs=own_rigs(rigs or []).values(),

@@ -56,6 +56,8 @@ class EstimationOptions:
 
     method: Method = "local_rational"  # estimator of the frequency responses
     resolution: float | None = None  # requested width [rad/s]; None takes the default of each record
+    # First samples of each record that alone determine its initial state in fits over time; 0: those of its window.
+    starting_samples: int = 0
 
 
 def identify_record(

@@ -57,6 +57,8 @@ class Record:
         Outputs whose sensor has its own offset in this record: a fit estimates it together with the initial state.
     window_of
         Name of the record that this is a window of; empty for a whole record.
+    starting_samples
+        Number of first samples that alone determine the initial state in a fit; the rest is a free run. 0: all samples do.
     clock_uncertainty
         Time [s] by which signals may be late against each other, as far as the clocks that stamped them can tell.
 
@@ -81,6 +83,7 @@ class Record:
     observed: Mapping[str, float] = field(default_factory=dict)
     free_offsets: tuple[str, ...] = ()
     window_of: str = ""
+    starting_samples: int = 0
     clock_uncertainty: float = 0.0
 
     def __post_init__(self) -> None:

@@ -68,8 +68,10 @@ class Mechanism:
 
     @property
     def first_joint(self) -> Joint:
-        """The joint that effects at drives and sensors read; without joints, the first motion, which nothing resists."""
-        return self.joints[0] if self.joints else Joint("", self.coordinates[0].symbol)
+        """The joint that effects at drives and sensors read; without joints, the first motion, if any, which nothing resists."""
+        if self.joints:
+            return self.joints[0]
+        return Joint("", self.coordinates[0].symbol if self.coordinates else sp.Integer(0))
 
     def joint_named(self, name: str | None) -> Joint:
         """Return a joint by its name; the first one for any other name."""

@@ -28,6 +28,9 @@ from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 
+OBJECTIVES = ("windows", "free-run")
+"""How fits over time compare a model with a record."""
+_STARTING_SAMPLES = 20
 IDENTIFICATION_FILE = "identification.json"
 PAGE_FILE = "identification.html"
 
@@ -38,6 +41,8 @@ def run_identify(
     *,
     method: str = "local_rational",
     resolution: float | None = None,
+    objective: str = "windows",
+    initial_samples: int | None = None,
     effects: Sequence[Effect] = (),
     own_effects: Sequence[Effect] = (),
     own_rigs: Iterable[Rig] = (),
@@ -50,7 +55,7 @@ def run_identify(
 
     The rig with effects of memory is calibrated as well if some are named.
     """
-    options = checked_options(method, resolution)
+    options = checked_options(method, resolution, objective, initial_samples)
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out), IDENTIFICATION_FILE, MODEL_FILE, PAGE_FILE)
@@ -61,6 +66,8 @@ def run_identify(
         asked = [word for effect in effects for word in ("--effect", effect.name)]
         estimated = [] if method == "local_rational" else ["--method", method]
         resolved = [] if resolution is None else ["--resolution", f"{resolution!r}"]
+        aimed = [] if objective == "windows" else ["--objective", objective]
+        started = [] if initial_samples is None else ["--initial-samples", str(initial_samples)]
         seeded = ["--seed", str(seed)] if seed else []
         quoted = [
             "rigsight",
@@ -68,6 +75,8 @@ def run_identify(
             str(campaign),
             *estimated,
             *resolved,
+            *aimed,
+            *started,
             *asked,
             *seeded,
             "--out",
@@ -77,8 +86,10 @@ def run_identify(
     return identification
 
 
-def checked_options(method: str, resolution: float | None) -> EstimationOptions:
-    """Return how records are to be read."""
+def checked_options(
+    method: str, resolution: float | None, objective: str = "windows", initial_samples: int | None = None
+) -> EstimationOptions:
+    """Return how records are to be read and fitted."""
     check_option("The method", method, METHODS)
     if resolution is not None and not (math.isfinite(resolution) and resolution > 0.0):
         raise InputError(f"The resolution must be a positive number of rad/s, got {resolution!r}.")
@@ -87,7 +98,18 @@ def checked_options(method: str, resolution: float | None) -> EstimationOptions:
             "The method 'thesis' takes every line of a record, so --resolution would change nothing. Leave it out, or choose "
             "another --method."
         )
-    return EstimationOptions(cast("Method", method), resolution)
+    check_option("The objective", objective, OBJECTIVES)
+    if initial_samples is not None and objective != "free-run":
+        raise InputError(
+            "Only a free run takes its initial state from the first samples, so --initial-samples would change nothing. Leave it "
+            "out, or choose --objective free-run."
+        )
+    if initial_samples is not None and initial_samples < 2:
+        raise InputError(
+            f"A position and a speed need at least 2 initial samples, got --initial-samples {initial_samples}."
+        )
+    starting = (initial_samples or _STARTING_SAMPLES) if objective == "free-run" else 0
+    return EstimationOptions(cast("Method", method), resolution, starting)
 
 
 def identify_campaign(
@@ -110,7 +132,13 @@ def identify_campaign(
             f"The method 'thesis' fits rigs whose input moves a mass, and that of {campaign.rig.name} prescribes the motion. Use "
             "--method local_rational."
         )
+    if options.starting_samples and effects:
+        raise InputError(
+            "The calibration of an effect with memory fits the initial states, so --effect has no --objective free-run. Name the "
+            "effect in the campaign instead: effects = [...] under [rig]."
+        )
     report_notes(campaign.notes, listener)
+    campaign = _free_run(campaign, options.starting_samples)
     structure = structure_with_memory(campaign, effects) if effects else None
     # The rig is identified without the effects that are calibrated, also where its simulation has one of them already.
     asked = {effect.name for effect in effects_on(campaign.rig, effects, "--effect")}
@@ -122,6 +150,20 @@ def identify_campaign(
     if structure is None:
         return identification
     return with_hysteresis(identification, campaign, structure, seed, n_jobs, listener)
+
+
+def _free_run(campaign: Campaign, starting_samples: int) -> Campaign:
+    """Return a campaign whose records are run free from the state that their first samples give; the same for none."""
+    for record in campaign.records if starting_samples else ():
+        if record.n_samples <= starting_samples:
+            raise InputError(
+                f"Record '{record.name}' has {record.n_samples} samples, so that nothing is left to run free after the first "
+                f"{starting_samples}. Choose fewer with --initial-samples, or leave the record out."
+            )
+    return replace(
+        campaign,
+        records=tuple(replace(record, starting_samples=starting_samples) for record in campaign.records),
+    )
 
 
 def write_identification(

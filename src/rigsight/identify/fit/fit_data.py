@@ -80,6 +80,7 @@ def record_digest(record: Record) -> str:
     # Added only if present, so that outcomes stored before such constants existed remain valid.
     reported += [sorted(record.constants.items())] if record.constants else []
     reported += [sorted(record.observed.items())] if record.observed else []
+    reported += [record.starting_samples] if record.starting_samples else []
     digest.update(json.dumps(reported).encode())
     for name in sorted(record.signals):
         digest.update(np.ascontiguousarray(record[name]).tobytes())

@@ -12,15 +12,17 @@ residuals. M. A. Branch, T. F. Coleman and Y. Li, SIAM J. Sci. Comput. 21 (1999)
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from rigsight.errors import SimulationError
+from rigsight.errors import InputError, SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
+from rigsight.identify.fit.free_run import FreeRun, state_slopes
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.fit.prior import Prior
 from rigsight.identify.fit.search import FINE_TOLERANCE, VariableProjection, off_kinks, searched
@@ -45,8 +47,10 @@ class GreyBoxFit:
     A record may lack sensors, but not the first one of a rig with one motion. Offsets that are free in one of them
     (`Record.free_offsets`) are estimated in each. An observer (`Record.observed`) is used in the fit, but is not part of the
     result. `scales` are those of `characteristic_scales`; residuals are divided by `output_noise`. The number of substeps
-    follows from the relative accuracy of the simulations. A prior counts in the search; cost and covariance of a finished fit
-    are those of the records. A fit that the memory holds is not repeated and gives the same result.
+    follows from the relative accuracy of the simulations. If records tell how many of their first samples determine the
+    initial state (`Record.starting_samples`), it is held at what these give, and the parameters are those of the free run. A
+    prior counts in the search; cost and covariance of a finished fit are those of the records. A fit that the memory holds is
+    not repeated and gives the same result.
     """
 
     def __init__(
@@ -74,6 +78,16 @@ class GreyBoxFit:
             accuracy=accuracy,
             threads=threads or IdleThreads(),
             prior=prior,
+        )
+        beginnings = [
+            replace(record.slice(0, record.starting_samples), starting_samples=0)
+            for record in records
+            if record.starting_samples
+        ]
+        if beginnings and len(beginnings) < len(records):
+            raise InputError("Either all records of a fit tell their starting samples, or none does.")
+        self._beginnings = (
+            GreyBoxFit(structure, beginnings, scales, output_noise, accuracy) if beginnings else None
         )
         self._problem: list[Any] = []
         if memory is not None:
@@ -114,11 +128,43 @@ class GreyBoxFit:
         accurate residuals. ``success`` is False, with the reason as ``message``, if the start cannot be simulated or the
         optimizer ran out of evaluations.
         """
-        begin = SearchStart.of(self.data, self.scales, start, free, initial_states)
+
+        def found(values: Mapping[str, float], states: Sequence[Floats] | None) -> FitResult:
+            return self._fit(values, free, states, max_evaluations, tolerance, finish, substeps)
+
+        if self._beginnings is None:
+            return found(start, initial_states)
+        result = found(start, self._beginnings.fit(start, (), finish=False).initial_states)
+        for _ in range(_MOST_ROUNDS if free else 0):
+            states = self._beginnings.fit(result.values, (), finish=False).initial_states
+            before, result = result, found(result.values, states)
+            if not abs(result.cost - before.cost) > _WORTH_A_ROUND * before.cost:
+                break
+        return result
+
+    def _fit(
+        self,
+        start: Mapping[str, float],
+        free: Sequence[str],
+        initial_states: Sequence[Floats] | None,
+        max_evaluations: int,
+        tolerance: float,
+        finish: bool,
+        substeps: Sequence[int] | None,
+    ) -> FitResult:
+        """Search once."""
+        as_given = self._beginnings is not None
+        begin = SearchStart.of(self.data, self.scales, start, free, initial_states, as_given)
         coordinates, theta = begin.coordinates, begin.theta
-        lower = np.concatenate([coordinates.lower, *begin.lower])
-        upper = np.concatenate([coordinates.upper, *begin.upper])
-        problem = Problem(self.data, coordinates, begin.n_states, upper)
+        lower, upper = coordinates.lower, coordinates.upper
+        if self._beginnings is None:
+            lower, upper = np.concatenate([lower, *begin.lower]), np.concatenate([upper, *begin.upper])
+            problem = Problem(self.data, coordinates, begin.n_states, upper)
+        else:
+            theta = theta[: len(free)]
+            states = [] if initial_states is None else initial_states
+            slopes = state_slopes(self._beginnings.data, self.scales, start, free, states)
+            problem = FreeRun(self.data, begin, slopes)
         if substeps is None:
             problem.choose_substeps(theta)
         else:
@@ -142,7 +188,7 @@ class GreyBoxFit:
             return theta, bool(solution.status > 0), str(solution.message)
 
         settings = [max_evaluations, tolerance, *map(int, problem.substeps), finish, substeps is None]
-        outcome = self._recalled(self._key(coordinates, start, theta, settings), problem, search)
+        outcome = self._recalled(self._key(coordinates, start, begin.theta, settings), problem, search)
         return self._result(problem, *outcome, finish)
 
     def fit_windows(

@@ -7,11 +7,13 @@ fit itself converges, and longer stretches are left to it.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigsight.effects import Effect
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.first_states import first_state, moves_freely, state_at_rest
 from rigsight.identify.fit.fit_data import FitData, RecordData
@@ -77,7 +79,47 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
             return guesses[index]
         return settled_state(data, record, p, guesses[index])
 
-    return data.of_each_record(settled)
+    found = data.of_each_record(settled)
+    rectified = [effect for effect in data.structure.effects if effect.loses_sign]
+    if not rectified:
+        return found
+    return data.of_each_record(
+        lambda i: _of_either_direction(data, data.records[i], values, rectified, found[i], guesses[i])
+    )
+
+
+def _of_either_direction(
+    data: FitData,
+    record: RecordData,
+    values: Mapping[str, float],
+    rectified: Sequence[Effect],
+    found: Floats,
+    guess: Floats,
+) -> Floats:
+    """Return the most likely initial state where sensors show magnitudes: that found, or one of a reading with either sign."""
+    # A descent cannot pass the sign change. There the magnitude is least, or the sign stays over the first samples.
+    structure = data.structure
+    outputs = [signal.name for signal in structure.rig.outputs]
+    places = [outputs.index(structure.rig.acts_at(effect)) for effect in rectified]
+    signless = [place for place in places if record.weights[place] > 0.0]
+    if not signless:
+        return found
+    nulls = {
+        structure.parameter_name(effect, q.name): q.null
+        for effect in rectified
+        for q in effect.parameters
+        if q.null is not None
+    }
+    p, signed = (parameter_vector(structure, {**values, **own}) for own in ({}, nulls))
+    states = [found]
+    least = np.nanargmin(record.measured[:_FIRST_SAMPLES, signless], axis=0)
+    later = np.arange(record.measured.shape[0])[:, None] > least
+    for sign, turns in itertools.product((1.0, -1.0), (False, True)):
+        measured = record.measured.copy()
+        measured[:, signless] *= np.where(later & turns, -sign, sign)
+        begin = settled_state(data, replace(record, measured=measured), signed, sign * guess)
+        states.append(settled_state(data, record, p, begin))
+    return _likeliest(data, record, p, np.column_stack(states))
 
 
 def moving_or_at_rest(data: FitData, values: Mapping[str, float], states: Sequence[Floats]) -> list[Floats]:
@@ -237,11 +279,12 @@ class SearchStart:
         values: Mapping[str, float],
         free: Sequence[str],
         initial_states: Sequence[Floats] | None = None,
+        as_given: bool = False,
     ) -> SearchStart:
-        """Return the start of a search."""
+        """Return the start of a search; initial states stay `as_given` also where rest would fit the records better."""
         coordinates = Coordinates.of(data.structure, free, values, scales)
         states = list(initial_states) if initial_states is not None else guessed_states(data, values)
-        if has_dry_friction(data.structure):
+        if has_dry_friction(data.structure) and not as_given:
             states = moving_or_at_rest(data, values, states)
         own = coordinates.from_values(values)
         sizes = data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]

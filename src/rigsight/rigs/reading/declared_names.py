@@ -10,7 +10,7 @@ from rigsight.rigs.reading.expressions import FUNCTIONS, RATE, force_name, is_id
 
 _LONGEST_NAME = 60
 _NEEDED = {
-    "coordinates": "a motion",
+    "coordinates": "a motion, or a [states.NAME]",
     "joints": "a place where friction and other effects can act; one without resistance needs only a motion",
     "sensors": "a recorded signal",
 }
@@ -23,8 +23,11 @@ def check_declared_names(declaration: Declaration) -> None:
     """Refuse names that are none, that are taken, and those that stand for nothing where a name must."""
     table = declaration.table
     for key, what in _NEEDED.items():
-        # Where every motion is prescribed, sensors alone may be what is identified.
-        if key == "joints" and table.coordinates and all(c.prescribed_by for c in table.coordinates.values()):
+        # States alone may move: levels, temperatures, pressures.
+        if key == "coordinates" and table.states:
+            continue
+        # Where every motion is prescribed, or there is none, sensors alone may be what is identified.
+        if key == "joints" and all(c.prescribed_by for c in table.coordinates.values()):
             continue
         if not getattr(table, key):
             declaration.refuse((), f"a rig needs at least one [{key}.NAME], {what}")

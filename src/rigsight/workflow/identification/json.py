@@ -37,6 +37,8 @@ def identification_json(identification: Identification, figures: Mapping[str, st
         "rig": identification.rig,
         "effects": identification.model["effects"],
         "method": identification.method,
+        # Of a free run; 0 where initial states are fitted.
+        "initial_samples": identification.records[0].record.starting_samples,
         "level": LEVEL,
         "warnings": identification.warnings,
         "amplitudes": {

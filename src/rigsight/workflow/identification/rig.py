@@ -102,7 +102,8 @@ def identify_rig(
             loose = _without_spring(campaign, options, n_jobs)
             if loose is not None:
                 return loose
-        if campaign.modelled:
+        # The search for a start knows terms of motions, and levels alone have none.
+        if campaign.modelled or not rig.mechanism.coordinates:
             windows = cut(records, length)
             start = start_with_effects(campaign, windows, start, held, _sizes(rig, windows))
         swallowed = _swallowed(structure, cut(records, length), {**campaign.constants, **start}, held)
@@ -181,7 +182,9 @@ def _begin(
 ) -> tuple[dict[str, float], float | None]:
     """Return start values of the rig without effects, and the length of windows [s] if it drifts or diverges."""
     rig, constants, structure = campaign.rig, campaign.constants, compose(campaign.rig)
-    starts = [linear_start(rig, records, constants, held)]
+    # The search for a start cuts records as it needs them.
+    uncut = [replace(record, starting_samples=0) for record in records]
+    starts = [linear_start(rig, uncut, constants, held)]
     given = rig.in_own_parameters(campaign.parameters, constants)
     if all(p.name in given for p in rig.parameters):
         starts.append({p.name: given[p.name] for p in rig.parameters})
@@ -231,7 +234,9 @@ def _sizes(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
 def _window_length(
     structure: Structure, values: Mapping[str, float], records: Sequence[Record]
 ) -> float | None:
-    """Return the longest possible free run [s]; None if every record can be simulated as a whole."""
+    """Return the longest possible free run [s]; None if every record can be simulated as a whole, or is asked to be."""
+    if any(record.starting_samples for record in records):
+        return None
     try:
         linear = near_rest(structure, values, records)
     except SimulationError:
