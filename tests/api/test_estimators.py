@@ -25,6 +25,7 @@ ESTIMATORS = (rs.Diagnoser, rs.EquationDiscoverer, rs.LinearIdentifier)
 OTHER: dict[str, Any] = {
     "effects": ["end_stop"], "seed": 7, "n_jobs": 3, "verbose": True, "method": "full", "pointwise": True,
     "one_by_one": True, "resolution": 0.5, "rig": "axis",
+    "objective": "free-run", "initial_samples": 30,
 }  # fmt: skip
 
 
@@ -79,6 +80,8 @@ def test_fit_returns_the_estimator_and_leaves_the_settings(campaign: rs.Campaign
         "effects": (),
         "method": "local_rational",
         "n_jobs": 1,
+        "initial_samples": None,
+        "objective": "windows",
         "resolution": None,
         "rig": None,
         "seed": 0,
