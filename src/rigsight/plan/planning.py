@@ -1,0 +1,244 @@
+"""The plan: the experiment, what each rival predicts, what probability is expected afterwards, and whether simulations keep it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rigsight.campaign import Campaign
+from rigsight.errors import InputError
+from rigsight.json_data import json_data
+from rigsight.plan.discrimination import Refits, posterior, predicted
+from rigsight.plan.experiments import Bench
+from rigsight.plan.limits import Limit, with_recorded_range
+from rigsight.plan.rivals import Contest, Named, contest_of
+from rigsight.plan.search import Scored, Search
+from rigsight.records import Record
+from rigsight.records.record import Floats
+
+SCHEMA_VERSION = 1
+DRAWS = 6
+"""Simulated outcomes for each rival as the truth."""
+_FEWEST, _MOST = 500, 100_000
+_LISTED = 5
+DECIDED = 0.95
+"""Probability from which rivals count as decided: odds of 20 to 1, nearly."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What a rival says of the experiment."""
+
+    effects: str
+    probability: float  # before
+    values: Mapping[str, float]  # of its free numbers
+    readings: Record  # with the numbers before
+    left: Floats  # of the readings of the most probable model once it is fitted again, shape (n_samples, n_outputs)
+    evidence: float  # expected logarithm of the likelihood ratio then
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Simulated outcomes: noise is drawn, each rival in turn is the truth, and all are fitted again."""
+
+    n: int
+    right: float  # share in which the truth is the most probable, each rival as often as it is probable
+    decided: float  # share in which it reaches `DECIDED`
+    wrong: float  # share in which another one does
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """An experiment to be played.
+
+    Attributes
+    ----------
+    title, rig
+        Of the campaign.
+    what
+        The experiment in words.
+    record
+        Its inputs, with the constants of the rig that it needs.
+    limits
+        With the largest value in the simulations of all rivals.
+    rivals
+        Most probable first.
+    errors
+        Error to be expected of each output.
+    promised
+        Expected probability of the truth afterwards.
+    trials
+        The simulated outcomes.
+    others
+        Further experiments with their linearized worth.
+    """
+
+    title: str
+    rig: str
+    what: str
+    record: Record
+    limits: tuple[tuple[Limit, float], ...]
+    rivals: tuple[Prediction, ...]
+    errors: Mapping[str, float]
+    promised: float
+    trials: Trials
+    others: tuple[Scored, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of ``plan.json``."""
+        content = {
+            "schema_version": SCHEMA_VERSION,
+            "title": self.title,
+            "rig": self.rig,
+            "experiment": self.what,
+            "dt": self.record.dt,
+            "n_samples": self.record.n_samples,
+            "hold": self.record.hold,
+            "constants": dict(self.record.constants),
+            "limits": [
+                {"signal": limit.name, "limit": limit.value, "largest": largest} for limit, largest in self.limits
+            ],
+            "rivals": [
+                {
+                    "effects": one.effects,
+                    "probability": one.probability,
+                    "values": one.values,
+                    "log_likelihood_ratio": one.evidence,
+                }
+                for one in self.rivals
+            ],
+            "error": self.errors,
+            "probability_now": self.rivals[0].probability,
+            "probability_expected": self.promised,
+            "simulated": vars(self.trials),
+            "other_experiments": [
+                {"experiment": s.experiment.what, "amplitude": s.experiment.amplitude, "log_odds": s.worth}
+                for s in self.others
+            ],
+        }
+        return dict(json_data(content))
+
+
+def plan_experiment(
+    campaign: Campaign,
+    named: Sequence[Named],
+    limits: Sequence[Limit],
+    seconds: float,
+    seed: int,
+    say: Callable[[str], None],
+    draws: int = DRAWS,
+) -> Plan:
+    """Return the experiment that separates rivals best.
+
+    Parameters
+    ----------
+    campaign
+        With the records so far.
+    named
+        At least two rivals.
+    limits
+        To be kept in the simulations of all rivals.
+    seconds
+        Duration of the experiment.
+    seed
+        Seed of drawn phases and noise.
+    say
+        Called with what has been done.
+    draws
+        Simulated outcomes for each rival as the truth.
+
+    Raises
+    ------
+    InputError
+        If the rig has no input, or no experiment keeps the limits.
+    SimulationError
+        If a rival cannot be simulated near the records.
+    """
+    rig, dt = campaign.rig, campaign.estimation[0].dt
+    if not rig.inputs:
+        raise InputError(f"{rig.name} has no input, so there is nothing to plan.")
+    n_samples = round(seconds / dt)
+    if not _FEWEST <= n_samples <= _MOST:
+        raise InputError(
+            f"--seconds must give {_FEWEST} to {_MOST} samples at the campaign's sample time of {dt:g} s: "
+            f"{_FEWEST * dt:g} to {_MOST * dt:g} s, got {seconds:g}."
+        )
+    rng = np.random.default_rng(seed)
+    kept = with_recorded_range(limits, rig, campaign.records)
+    contest = contest_of(campaign, named, say)
+    bench = Bench.of(rig, campaign.estimation, kept, n_samples, 1.0 / contest.context.scales["time"])
+    constants = list({tuple(sorted(r.constants.items())): r.constants for r in campaign.estimation}.values())
+    search = Search(contest, bench, kept).best(constants, rng, say)
+    chosen = search[0]
+    against, left = _evidence(contest, chosen.readings)
+    say("fitted again")
+    readings = [predicted(rival, bench.record(chosen.experiment)) for rival in contest.rivals]
+    trials, promised = _simulated(contest, readings, draws, rng, say)
+    return Plan(
+        campaign.title,
+        rig.name,
+        chosen.experiment.what,
+        bench.record(chosen.experiment),
+        tuple((limit, max(limit.reached(one) for one in readings)) for limit in kept),
+        tuple(
+            Prediction(
+                rival.label,
+                rival.probability,
+                {name: rival.fit.values[name] for name in rival.fit.free},
+                shown,
+                own,
+                evidence,
+            )
+            for rival, shown, own, evidence in zip(contest.rivals, readings, left, against, strict=True)
+        ),
+        contest.remainder.errors(chosen.readings),
+        promised,
+        trials,
+        _different(search),
+    )
+
+
+def _evidence(contest: Contest, readings: Record) -> tuple[list[float], list[Floats]]:
+    """Return the evidence against each rival in readings without noise, and what each leaves of them."""
+    refits, errors = Refits(contest), contest.remainder.errors(readings)
+    against = [refits.evidence_against(rival, readings, errors) for rival in contest.rivals]
+    left = [refits.fitted(rival, readings, errors)[1] for rival in contest.rivals]
+    return [one - against[0] for one in against], left
+
+
+def _simulated(
+    contest: Contest, readings: Sequence[Record], draws: int, rng: np.random.Generator, say: Callable[[str], None]
+) -> tuple[Trials, float]:
+    """Return the outcomes of simulated experiments, and the probability of the truth that is expected without noise."""
+    probabilities = [rival.probability for rival in contest.rivals]
+    refits, names = Refits(contest), list(contest.remainder.floors)
+    columns = [[s.name for s in contest.context.rig.outputs].index(name) for name in names]
+    right, decided, wrong, promised = np.zeros(4)
+    for truth, (weight, shown) in enumerate(zip(probabilities, readings, strict=True)):
+        errors = contest.remainder.errors(shown)
+
+        def outcome(record: Record, errors: Mapping[str, float] = errors) -> Floats:
+            against = [refits.evidence_against(rival, record, errors) for rival in contest.rivals]
+            return posterior(probabilities, against)
+
+        promised += weight * outcome(shown)[truth]
+        for _ in range(draws):
+            noise = contest.remainder.drawn(shown.n_samples, rng)
+            noisy = {n: shown[n] + errors[n] * noise[:, i] for n, i in zip(names, columns, strict=True) if n in shown}
+            found = outcome(shown.with_signals(**noisy))
+            right += weight / draws * (int(np.argmax(found)) == truth)
+            decided += weight / draws * (found[truth] >= DECIDED)
+            wrong += weight / draws * (np.max(np.delete(found, truth)) >= DECIDED)
+            say("simulated outcome")
+    return Trials(draws * len(readings), float(right), float(decided), float(wrong)), float(promised)
+
+
+def _different(search: Sequence[Scored]) -> tuple[Scored, ...]:
+    """Return the best experiment of each kind."""
+    kinds: dict[str, Scored] = {}
+    for scored in search:
+        kinds.setdefault(scored.experiment.what, scored)
+    return tuple(kinds.values())[:_LISTED]
