@@ -21,6 +21,7 @@ from rigsight.cli.export import export
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
+from rigsight.cli.plan import plan
 from rigsight.cli.power import power
 from rigsight.cli.rigs import list_rigs
 from rigsight.cli.simulate import simulate
@@ -58,6 +59,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "init": init,
     "check": check,
     "diagnose": diagnose,
+    "plan": plan,
     "power": power,
     "identify": identify,
     "discover": discover,

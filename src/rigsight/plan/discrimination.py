@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,49 +64,43 @@ def worth(contest: Contest, readings: Record) -> float:
     return math.log(contest.best.probability) - float(np.logaddexp.reduce(left))
 
 
-class Refits:
-    """Fits of all rivals to the old records and a new one together."""
+@dataclass(frozen=True)
+class Refitted:
+    """A rival fitted to the old records and a new one together."""
 
-    def __init__(self, contest: Contest) -> None:
-        self._contest = contest
-
-    def evidence_against(self, rival: Rival, readings: Record, errors: Mapping[str, float]) -> float:
-        """Return minus the logarithm of the likelihood of new readings for a rival, up to a constant common to all rivals."""
-        cost = self.fitted(rival, readings, errors)[0]
-        return max(cost - rival.fit.cost, 0.0) / (2.0 * self._contest.remainder.independence)
-
-    def fitted(self, rival: Rival, readings: Record, errors: Mapping[str, float]) -> tuple[float, Floats]:
-        """Return the sum of squares of all records, and what is left of the new one, shape (n_samples, n_outputs)."""
-        contest, fit = self._contest, rival.fit
-        new = contest.windowing.cut([readings])
-        problem = GreyBoxFit(fit.structure, [*contest.records, *new], contest.context.scales, contest.errors)
-        problem.data = _with_errors(problem.data, len(new), [s.name for s in contest.context.rig.outputs], errors)
-        states = guessed_states(problem.data, fit.values)[len(contest.records) :]
-        found = problem.fit(fit.values, fit.free, initial_states=[*fit.initial_states, *states])
-        if not found.residuals:
-            return math.inf, np.zeros((0, 0))
-        return found.cost, np.concatenate(found.residuals[len(contest.records) :])
+    against: float  # minus the logarithm of the likelihood of the new record, up to a constant common to all rivals
+    left: Floats  # of its readings, in units of their errors, shape (n_samples, n_outputs)
 
 
-def _with_errors(data: FitData, n_new: int, outputs: Sequence[str], errors: Mapping[str, float]) -> FitData:
-    """Return fit data whose last records count in units of their own errors."""
+def refitted(contest: Contest, rival: Rival, readings: Record, errors: Mapping[str, float]) -> Refitted:
+    """Fit a rival again to all records, of which the new one counts in units of its own errors."""
+    fit, n_old = rival.fit, len(contest.records)
+    new = contest.windowing.cut([readings])
+    problem = GreyBoxFit(fit.structure, [*contest.records, *new], contest.context.scales, contest.errors)
+    outputs = [signal.name for signal in contest.context.rig.outputs]
+    units = np.array([errors.get(name, np.inf) for name in outputs])
+    problem.data = _with_errors(problem.data, len(new), units)
+    states = guessed_states(problem.data, fit.values)[n_old:]
+    found = problem.fit(fit.values, fit.free, initial_states=[*fit.initial_states, *states])
+    if not found.residuals:
+        return Refitted(math.inf, np.full((readings.n_samples, len(errors)), np.inf))
+    against = max(found.cost - fit.cost, 0.0) / (2.0 * contest.remainder.independence)
+    return Refitted(against, (np.concatenate(found.residuals[n_old:]) / units)[:, np.isfinite(units)])
+
+
+def _with_errors(data: FitData, n_new: int, errors: Floats) -> FitData:
+    """Return fit data whose last records count in units of these errors of the outputs."""
     scaled = [
-        replace(
-            one,
-            weights=np.array(
-                [1.0 / errors[name] if weight > 0.0 else 0.0 for name, weight in zip(outputs, one.weights, strict=True)]
-            ),
-        )
-        for one in data.records[-n_new:]
+        replace(one, weights=np.where(one.weights > 0.0, 1.0 / errors, 0.0)) for one in data.records[-n_new:]
     ]
     return replace(data, records=(*data.records[:-n_new], *scaled))
 
 
 def posterior(probabilities: Sequence[float], against: Sequence[float]) -> Floats:
     """Return the probabilities of rivals after evidence against each; none exceeds that of a verdict."""
-    logs = np.log(probabilities) - np.array(against)
+    logs: Floats = np.log(probabilities) - np.array(against)
     if not np.any(np.isfinite(logs)):
         return np.array(probabilities)
     weights = np.exp(logs - np.max(logs))
-    return np.minimum(weights / np.sum(weights), MOST)
-
+    shares: Floats = weights / np.sum(weights)
+    return np.minimum(shares, MOST)

@@ -42,7 +42,9 @@ class Experiment:
     """Inputs to play."""
 
     what: str  # in words
-    shapes: Mapping[str, Floats]  # excitation of each moved input, shape (n_samples,), the largest sample is one
+    shapes: Mapping[
+        str, Floats
+    ]  # excitation of each moved input, shape (n_samples,), the largest sample is one
     constants: Mapping[str, float] = field(default_factory=dict)  # such as a payload
     amplitude: float = 1.0  # of the shapes, in units of the room that the limits leave an input
 
@@ -81,7 +83,8 @@ class Bench:
                     )
         if not any(room.values()):
             raise InputError(
-                f"The inputs ({', '.join(middles)}) rest in all records; give a limit for one, such as --limit {next(iter(middles))}=1."
+                f"The inputs ({', '.join(middles)}) rest in all records. Give a limit for one, such as "
+                f"--limit {next(iter(middles))}=1."
             )
         return cls(rig, records[0], n_samples, middles, room, omega)
 
@@ -96,7 +99,9 @@ class Bench:
         """Return the inputs of an experiment as a record to be simulated."""
         moved = {
             name: middle
-            + experiment.amplitude * self.room.get(name, 0.0) * experiment.shapes.get(name, np.zeros(self.n_samples))
+            + experiment.amplitude
+            * self.room.get(name, 0.0)
+            * experiment.shapes.get(name, np.zeros(self.n_samples))
             for name, middle in self.middles.items()
         }
         return Record(
@@ -109,7 +114,9 @@ class Bench:
             free_offsets=self.like.free_offsets,
         )
 
-    def library(self, constants: Sequence[Mapping[str, float]], rng: np.random.Generator) -> Iterator[Experiment]:
+    def library(
+        self, constants: Sequence[Mapping[str, float]], rng: np.random.Generator
+    ) -> Iterator[Experiment]:
         """Yield the experiments that are tried first: each input alone, then all of them together."""
         moved = [name for name, room in self.room.items() if room > 0.0]
         groups = [(name,) for name in moved] + ([tuple(moved)] if len(moved) > 1 else [])
@@ -155,7 +162,7 @@ class Bench:
         lines = multisine_lines(n, self.like.dt, *band)
         chosen = np.unique(np.round(np.geomspace(1, lines.size, min(_LINES, lines.size))).astype(int)) - 1
         wave = multisine(n, self.like.dt, lines[chosen], 1.0, rng, crest_iterations=5).samples
-        return wave / np.max(np.abs(wave))
+        return np.asarray(wave / np.max(np.abs(wave)))
 
     def changed(self, experiment: Experiment, rng: np.random.Generator) -> Experiment:
         """Return an experiment with one line of drawn frequency, amplitude and phase added to one input."""

@@ -66,9 +66,7 @@ def read_limits(rig: Rig, asked: Sequence[str]) -> tuple[Limit, ...]:
     return tuple(found.values())
 
 
-def with_recorded_range(
-    limits: Sequence[Limit], rig: Rig, records: Sequence[Record]
-) -> tuple[Limit, ...]:
+def with_recorded_range(limits: Sequence[Limit], rig: Rig, records: Sequence[Record]) -> tuple[Limit, ...]:
     """Return the limits, with the largest recorded value for each input that has none."""
     limited = {limit.signal for limit in limits if not limit.is_rate}
     added = []

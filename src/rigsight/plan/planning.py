@@ -1,4 +1,4 @@
-"""The plan: the experiment, what each rival predicts, what probability is expected afterwards, and whether simulations keep it."""
+"""The plan: the experiment, what each rival predicts, what probability to expect afterwards, and whether simulations keep it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.errors import InputError
 from rigsight.json_data import json_data
-from rigsight.plan.discrimination import Refits, posterior, predicted
+from rigsight.plan.discrimination import posterior, predicted, refitted
 from rigsight.plan.experiments import Bench
 from rigsight.plan.limits import Limit, with_recorded_range
 from rigsight.plan.rivals import Contest, Named, contest_of
@@ -36,7 +36,9 @@ class Prediction:
     probability: float  # before
     values: Mapping[str, float]  # of its free numbers
     readings: Record  # with the numbers before
-    left: Floats  # of the readings of the most probable model once it is fitted again, shape (n_samples, n_outputs)
+    # Of the readings of the most probable model once it is fitted again, in units of the errors, shape (n_samples, n_outputs).
+    left: Floats
+    rms_left: float
     evidence: float  # expected logarithm of the likelihood ratio then
 
 
@@ -99,13 +101,15 @@ class Plan:
             "hold": self.record.hold,
             "constants": dict(self.record.constants),
             "limits": [
-                {"signal": limit.name, "limit": limit.value, "largest": largest} for limit, largest in self.limits
+                {"signal": limit.name, "limit": limit.value, "largest": largest}
+                for limit, largest in self.limits
             ],
             "rivals": [
                 {
                     "effects": one.effects,
                     "probability": one.probability,
                     "values": one.values,
+                    "rms_left": one.rms_left,
                     "log_likelihood_ratio": one.evidence,
                 }
                 for one in self.rivals
@@ -173,7 +177,8 @@ def plan_experiment(
     constants = list({tuple(sorted(r.constants.items())): r.constants for r in campaign.estimation}.values())
     search = Search(contest, bench, kept).best(constants, rng, say)
     chosen = search[0]
-    against, left = _evidence(contest, chosen.readings)
+    errors = contest.remainder.errors(chosen.readings)
+    again = [refitted(contest, rival, chosen.readings, errors) for rival in contest.rivals]
     say("fitted again")
     readings = [predicted(rival, bench.record(chosen.experiment)) for rival in contest.rivals]
     trials, promised = _simulated(contest, readings, draws, rng, say)
@@ -189,45 +194,46 @@ def plan_experiment(
                 rival.probability,
                 {name: rival.fit.values[name] for name in rival.fit.free},
                 shown,
-                own,
-                evidence,
+                own.left,
+                float(np.sqrt(np.nanmean(own.left**2))),
+                own.against - again[0].against,
             )
-            for rival, shown, own, evidence in zip(contest.rivals, readings, left, against, strict=True)
+            for rival, shown, own in zip(contest.rivals, readings, again, strict=True)
         ),
-        contest.remainder.errors(chosen.readings),
+        errors,
         promised,
         trials,
         _different(search),
     )
 
 
-def _evidence(contest: Contest, readings: Record) -> tuple[list[float], list[Floats]]:
-    """Return the evidence against each rival in readings without noise, and what each leaves of them."""
-    refits, errors = Refits(contest), contest.remainder.errors(readings)
-    against = [refits.evidence_against(rival, readings, errors) for rival in contest.rivals]
-    left = [refits.fitted(rival, readings, errors)[1] for rival in contest.rivals]
-    return [one - against[0] for one in against], left
-
-
 def _simulated(
-    contest: Contest, readings: Sequence[Record], draws: int, rng: np.random.Generator, say: Callable[[str], None]
+    contest: Contest,
+    readings: Sequence[Record],
+    draws: int,
+    rng: np.random.Generator,
+    say: Callable[[str], None],
 ) -> tuple[Trials, float]:
     """Return the outcomes of simulated experiments, and the probability of the truth that is expected without noise."""
     probabilities = [rival.probability for rival in contest.rivals]
-    refits, names = Refits(contest), list(contest.remainder.floors)
+    names = list(contest.remainder.floors)
     columns = [[s.name for s in contest.context.rig.outputs].index(name) for name in names]
     right, decided, wrong, promised = np.zeros(4)
     for truth, (weight, shown) in enumerate(zip(probabilities, readings, strict=True)):
         errors = contest.remainder.errors(shown)
 
         def outcome(record: Record, errors: Mapping[str, float] = errors) -> Floats:
-            against = [refits.evidence_against(rival, record, errors) for rival in contest.rivals]
+            against = [refitted(contest, rival, record, errors).against for rival in contest.rivals]
             return posterior(probabilities, against)
 
         promised += weight * outcome(shown)[truth]
         for _ in range(draws):
             noise = contest.remainder.drawn(shown.n_samples, rng)
-            noisy = {n: shown[n] + errors[n] * noise[:, i] for n, i in zip(names, columns, strict=True) if n in shown}
+            noisy = {
+                n: shown[n] + errors[n] * noise[:, i]
+                for n, i in zip(names, columns, strict=True)
+                if n in shown
+            }
             found = outcome(shown.with_signals(**noisy))
             right += weight / draws * (int(np.argmax(found)) == truth)
             decided += weight / draws * (found[truth] >= DECIDED)

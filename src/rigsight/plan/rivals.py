@@ -55,14 +55,18 @@ class Remainder:
     """What the best model leaves of the readings: the unit in which rivals differ."""
 
     floors: Mapping[str, float]
-    shares: Mapping[str, float]  # by output: what is left above the floor, of the standard deviation of the reading
+    shares: Mapping[
+        str, float
+    ]  # by output: what is left above the floor, of the standard deviation of the reading
     independence: float  # samples per independent one
     samples: Floats  # the remainder in units of its RMS, shape (n_samples, n_outputs)
 
     def errors(self, record: Record) -> dict[str, float]:
         """Return the error to be expected of the readings in a record: laws err in proportion to the motion."""
         return {
-            name: float(np.hypot(floor, self.shares[name] * np.std(record[name]))) if name in record else floor
+            name: float(np.hypot(floor, self.shares[name] * np.std(record[name])))
+            if name in record
+            else floor
             for name, floor in self.floors.items()
         }
 
@@ -120,7 +124,9 @@ def contest_of(campaign: Campaign, named: Sequence[Named], say: Callable[[str], 
         say(one.label)
     if not all(fit.residuals for fit in fits):
         failed = next(one.label for one, fit in zip(named, fits, strict=True) if not fit.residuals)
-        raise SimulationError(f"The rival '{failed}' cannot be simulated near the records; leave it out with --rivals.")
+        raise SimulationError(
+            f"The rival '{failed}' cannot be simulated near the records; leave it out with --rivals."
+        )
     return _weighed(context, windowing, named, fits)
 
 
@@ -144,7 +150,10 @@ def _weighed(
     costs = [fit.cost for fit in fits]
     first = int(np.argmax([one.probability or 0.0 for one in named]) if given else np.argmin(costs))
     remainder = _remainder(context, fits[int(np.argmin(costs))])
-    spread = [np.concatenate([r[n] for r in context.estimation if n in r] or [[0.0]]) for n in remainder.floors]
+    spread = [
+        np.concatenate([r[n] for r in context.estimation if n in r] or [np.zeros(1)])
+        for n in remainder.floors
+    ]
     errors = {
         name: float(np.hypot(floor, remainder.shares[name] * np.std(samples)))
         for (name, floor), samples in zip(remainder.floors.items(), spread, strict=True)
@@ -177,7 +186,9 @@ def _remainder(context: FitContext, fit: FitResult) -> Remainder:
     shares = {}
     for i, name in enumerate(names):
         if name in context.noise:
-            reading = np.concatenate([record[name] for record in context.estimation if name in record] or [np.zeros(1)])
+            reading = np.concatenate(
+                [record[name] for record in context.estimation if name in record] or [np.zeros(1)]
+            )
             above = max(float(np.mean(left[:, i] ** 2)) - context.noise[name] ** 2, 0.0)
             shares[name] = float(np.sqrt(above) / (np.std(reading) or 1.0))
     size = np.std(left, axis=0)
