@@ -28,6 +28,8 @@ PACKAGES = (
     "discover",
     "compare",
     "diagnose",
+    "check",
+    "plan",
     "workflow",
     "plot",
     "report",
@@ -38,6 +40,8 @@ PACKAGES = (
 COMMANDS = (
     "campaign.read_campaign",
     "diagnose",
+    "check",
+    "plan",
     "power",
     "identify",
     "discover",

@@ -35,11 +35,11 @@ from rigsight_bench.trials.standard.campaign import draw_rig
 from rigsight_bench.trials.strength import draw_shape, scaled, sized
 
 ODDS = 20.0
-MOST_RIVALS = 6
+MOST_RIVALS = 10
 """Rivals that are tried for each trial."""
 DT, SECONDS = 0.01, 10.0
 AMPLITUDES = (0.1, 0.6)
-SIZES = (3.0, 30.0)
+SIZES = (0.5, 2.0)
 """What a hidden effect adds to the readings of the first record, in units of the noise."""
 NOISES = (1e-3, 1e-2)
 """Noise in units of the readings."""
@@ -109,8 +109,8 @@ def drawn(rng: np.random.Generator) -> Truth:
     def added(own: dict[str, float]) -> float:
         return float(np.std(simulate(structure, values(own), record)["x"] - alone["x"])) / noise
 
-    wished = float(np.exp(rng.uniform(*np.log(SIZES))))
-    found = sized(hidden.name, lambda s: scaled(hidden, shape, s, scales), added, wished)
+    wished = float(np.hypot(1.0, np.exp(rng.uniform(*np.log(SIZES)))))
+    found = sized(hidden.name, lambda s: scaled(hidden, shape, s, scales), added, wished, least=0.0)
     truth = Truth(hidden, values(found.values), noise, record)
     return replace(truth, first=truth.measured(record, rng))
 

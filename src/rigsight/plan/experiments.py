@@ -33,6 +33,7 @@ _LINES = 30
 """Most lines of a multisine."""
 _BELOW_NYQUIST = 0.4
 _REALIZATIONS = 2
+_CHANGED = ", with lines added"
 _LINE_SIZES = (0.1, 0.5)
 """Range of the amplitude of a line that a change adds, in units of the largest sample."""
 
@@ -174,4 +175,7 @@ class Bench:
         line = size * np.cos(omega * t + rng.uniform(0.0, 2.0 * math.pi))
         shape = experiment.shapes[name].copy()
         shape[rest:] += line
-        return replace(experiment, shapes={**experiment.shapes, name: shape / np.max(np.abs(shape))})
+        what = experiment.what.removesuffix(_CHANGED) + _CHANGED
+        return replace(
+            experiment, what=what, shapes={**experiment.shapes, name: shape / np.max(np.abs(shape))}
+        )

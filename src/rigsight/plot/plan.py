@@ -19,6 +19,7 @@ from rigsight.plot.drawing import (
     shown_in,
     with_unit,
 )
+from rigsight.units import INPUT_UNIT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +45,8 @@ def planned_experiment(plan: Plan) -> Figure:
     panels = list(figure.subplots(n_panels, 1, sharex=True, squeeze=False).flat)
     for name in inputs:
         ax = panels.pop(0)
-        factor, unit = shown_in(record.units.get(name, ""), record[name])
+        unit = record.units.get(name, "")
+        factor, unit = shown_in("" if unit == INPUT_UNIT else unit, record[name])
         line(ax, record.t, factor * record[name], color=MEASURED, lw=0.9)
         ax.set_ylabel(with_unit(name, unit))
         if name == inputs[0]:
