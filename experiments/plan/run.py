@@ -175,14 +175,18 @@ def judged(number: int, rng: np.random.Generator) -> Iterator[dict[str, object]]
         "rival": rival.name,
         "before": probability(contest, hidden.name),
         "experiment": plan.what,
+        "without_noise": plan.without_noise,
         "promised": plan.promised,
         "simulated_right": plan.trials.right,
         "simulated_decided": plan.trials.decided,
         "simulated_wrong": plan.trials.wrong,
     }
+    # The numbers before are one of the starts of the fits after, in all three cases.
+    values = {one.label: one.fit.values for one in contest.rivals}
+    known = [replace(one, values=values[one.label]) for one in pair]
     for what, record in (("plan", plan.record), ("menu", by_menu), ("repetition", first)):
         new = replace(truth.measured(record, rng), name=what)
-        after = contest_of(replace(campaign, records=(first, new)), pair, lambda _: None)
+        after = contest_of(replace(campaign, records=(first, new)), known, lambda _: None)
         outcome[what] = probability(after, hidden.name)
     yield outcome
 

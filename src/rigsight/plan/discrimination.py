@@ -52,9 +52,10 @@ def about(contest: Contest, rival: Rival, readings: Record) -> float:
     found = problem.normal_equations(rival.fit.values, rival.fit.free)
     if not math.isfinite(found.cost):
         return 0.0
-    normal = found.normal + rival.information
-    adapted = found.gradient @ np.linalg.pinv(normal, hermitian=True) @ found.gradient
-    return max(found.cost - float(adapted), 0.0) / (2.0 * contest.remainder.independence)
+    tau = contest.remainder.independence
+    normal = found.normal / tau + rival.information
+    adapted = found.gradient @ np.linalg.pinv(normal, hermitian=True) @ found.gradient / tau
+    return max(found.cost - float(adapted), 0.0) / (2.0 * tau)
 
 
 def worth(contest: Contest, readings: Record) -> float:

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.errors import InputError
+from rigsight.errors import InputError, SimulationError
 from rigsight.json_data import json_data
 from rigsight.plan.discrimination import posterior, predicted, refitted
 from rigsight.plan.experiments import Bench
 from rigsight.plan.limits import Limit, with_recorded_range
-from rigsight.plan.rivals import Contest, Named, contest_of
+from rigsight.plan.rivals import Contest, Named, Rival, contest_of
 from rigsight.plan.search import Scored, Search
 from rigsight.records import Record
 from rigsight.records.record import Floats
@@ -44,9 +44,10 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Trials:
-    """Simulated outcomes: noise is drawn, each rival in turn is the truth, and all are fitted again."""
+    """Simulated outcomes: each rival in turn is the truth, its numbers and noise are drawn, and all are fitted again."""
 
     n: int
+    expected: float  # mean probability of the truth
     right: float  # share in which the truth is the most probable, each rival as often as it is probable
     decided: float  # share in which it reaches `DECIDED`
     wrong: float  # share in which another one does
@@ -70,8 +71,8 @@ class Plan:
         Most probable first.
     errors
         Error to be expected of each output.
-    promised
-        Expected probability of the truth afterwards.
+    without_noise
+        Expected probability of the truth afterwards for the numbers so far and readings without noise.
     trials
         The simulated outcomes.
     others
@@ -85,9 +86,14 @@ class Plan:
     limits: tuple[tuple[Limit, float], ...]
     rivals: tuple[Prediction, ...]
     errors: Mapping[str, float]
-    promised: float
+    without_noise: float
     trials: Trials
     others: tuple[Scored, ...]
+
+    @property
+    def promised(self) -> float:
+        """Probability of the truth to be expected afterwards: no more than simulations keep."""
+        return min(self.without_noise, self.trials.expected)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``plan.json``."""
@@ -117,6 +123,7 @@ class Plan:
             "error": self.errors,
             "probability_now": self.rivals[0].probability,
             "probability_expected": self.promised,
+            "probability_without_noise": self.without_noise,
             "simulated": vars(self.trials),
             "other_experiments": [
                 {"experiment": s.experiment.what, "amplitude": s.experiment.amplitude, "log_odds": s.worth}
@@ -181,7 +188,7 @@ def plan_experiment(
     again = [refitted(contest, rival, chosen.readings, errors) for rival in contest.rivals]
     say("fitted again")
     readings = [predicted(rival, bench.record(chosen.experiment)) for rival in contest.rivals]
-    trials, promised = _simulated(contest, readings, draws, rng, say)
+    trials, without_noise = _simulated(contest, readings, draws, rng, say)
     return Plan(
         campaign.title,
         rig.name,
@@ -201,7 +208,7 @@ def plan_experiment(
             for rival, shown, own in zip(contest.rivals, readings, again, strict=True)
         ),
         errors,
-        promised,
+        without_noise,
         trials,
         _different(search),
     )
@@ -218,28 +225,40 @@ def _simulated(
     probabilities = [rival.probability for rival in contest.rivals]
     names = list(contest.remainder.floors)
     columns = [[s.name for s in contest.context.rig.outputs].index(name) for name in names]
-    right, decided, wrong, promised = np.zeros(4)
+    right, decided, wrong, expected, without_noise = np.zeros(5)
     for truth, (weight, shown) in enumerate(zip(probabilities, readings, strict=True)):
-        errors = contest.remainder.errors(shown)
 
-        def outcome(record: Record, errors: Mapping[str, float] = errors) -> Floats:
-            against = [refitted(contest, rival, record, errors).against for rival in contest.rivals]
-            return posterior(probabilities, against)
+        def outcome(record: Record, clean: Record) -> Floats:
+            errors = contest.remainder.errors(clean)
+            return posterior(
+                probabilities, [refitted(contest, rival, record, errors).against for rival in contest.rivals]
+            )
 
-        promised += weight * outcome(shown)[truth]
+        without_noise += weight * outcome(shown, shown)[truth]
         for _ in range(draws):
-            noise = contest.remainder.drawn(shown.n_samples, rng)
+            clean = _drawn_readings(contest, contest.rivals[truth], shown, rng)
+            errors, noise = contest.remainder.errors(clean), contest.remainder.drawn(shown.n_samples, rng)
             noisy = {
-                n: shown[n] + errors[n] * noise[:, i]
-                for n, i in zip(names, columns, strict=True)
-                if n in shown
+                name: clean[name] + errors[name] * noise[:, i]
+                for name, i in zip(names, columns, strict=True)
+                if name in clean
             }
-            found = outcome(shown.with_signals(**noisy))
+            found = outcome(clean.with_signals(**noisy), clean)
             right += weight / draws * (int(np.argmax(found)) == truth)
+            expected += weight / draws * found[truth]
             decided += weight / draws * (found[truth] >= DECIDED)
             wrong += weight / draws * (np.max(np.delete(found, truth)) >= DECIDED)
             say("simulated outcome")
-    return Trials(draws * len(readings), float(right), float(decided), float(wrong)), float(promised)
+    trials = Trials(draws * len(readings), *map(float, (expected, right, decided, wrong)))
+    return trials, float(without_noise)
+
+
+def _drawn_readings(contest: Contest, rival: Rival, shown: Record, rng: np.random.Generator) -> Record:
+    """Return the readings that a rival predicts with drawn numbers; those with its own numbers where they cannot be simulated."""
+    try:
+        return predicted(rival.drawn(contest.context.scales, rng), shown)
+    except SimulationError:
+        return shown
 
 
 def _different(search: Sequence[Scored]) -> tuple[Scored, ...]:

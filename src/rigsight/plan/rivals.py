@@ -17,6 +17,7 @@ from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
+from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.windows import Windowing, liveliest
 from rigsight.records import Record
 from rigsight.records.record import Floats
@@ -24,6 +25,9 @@ from rigsight.records.record import Floats
 _OLD = 8000
 """Samples of the most excited stretches of all records together that rivals are fitted to again and again. Fewer than there are
 leave the rivals more freedom, so that a plan promises less."""
+
+_REACH = 0.3
+"""Largest standard deviation of a drawn coordinate: a factor of 1.35 for a positive number."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,20 @@ class Rival:
     label: str
     fit: FitResult
     probability: float  # given the records, among the rivals
-    information: Floats  # of the records on the coordinates of its free numbers, in units of the error
+    information: Floats  # of the records on the coordinates of its free numbers; samples that repeat each other count once
+
+    def drawn(self, scales: Mapping[str, float], rng: np.random.Generator) -> Rival:
+        """Return the same with numbers drawn as far from the fitted ones as the records allow."""
+        coordinates = Coordinates.of(self.fit.structure, self.fit.free, self.fit.values, scales)
+        eigenvalues, vectors = np.linalg.eigh(self.information)
+        # Directions that the records leave open are drawn within reach of the fit.
+        spread = 1.0 / np.sqrt(np.maximum(eigenvalues, 1.0 / _REACH**2))
+        place = coordinates.from_values(self.fit.values) + vectors @ (
+            spread * rng.standard_normal(spread.size)
+        )
+        p = coordinates.to_parameters(np.clip(place, coordinates.lower, coordinates.upper))
+        numbers = {name: float(p[i]) for name, i in zip(self.fit.free, coordinates.index, strict=True)}
+        return replace(self, fit=replace(self.fit, values={**self.fit.values, **numbers}))
 
 
 @dataclass(frozen=True)
@@ -164,7 +181,9 @@ def _weighed(
         again = problem.fit(fit.values, fit.free, initial_states=fit.initial_states)
         again = again if again.residuals else fit
         normal = problem.normal_equations(again.values, again.free, again.initial_states).normal
-        rivals.append(Rival(one.label, again, one.probability or 0.0, np.nan_to_num(normal)))
+        rivals.append(
+            Rival(one.label, again, one.probability or 0.0, np.nan_to_num(normal) / remainder.independence)
+        )
     if not given:
         # Schwarz's criterion; samples that repeat each other count once.
         tau, n = remainder.independence, rivals[0].fit.n_samples
