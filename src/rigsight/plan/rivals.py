@@ -192,8 +192,8 @@ def _weighed(
         rivals = [replace(r, probability=float(w)) for r, w in zip(rivals, weights, strict=True)]
         first = int(np.argmax(weights))
     total = sum(rival.probability for rival in rivals)
-    # The evidence itself may fail: no rival is less probable than that.
-    shares = [max(rival.probability / total, FAMILIES.failing) for rival in rivals]
+    # The evidence itself may fail, whatever it says.
+    shares = [min(max(r.probability / total, FAMILIES.failing), 1.0 - FAMILIES.failing) for r in rivals]
     rivals = [replace(r, probability=s / sum(shares)) for r, s in zip(rivals, shares, strict=True)]
     ordered = (rivals[first], *(rival for i, rival in enumerate(rivals) if i != first))
     return Contest(context, windowing, context.estimation, errors, remainder, ordered)

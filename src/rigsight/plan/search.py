@@ -33,7 +33,7 @@ class Scored:
 
     experiment: Experiment
     readings: Record  # that the most probable model predicts
-    worth: float  # expected logarithm of the odds afterwards, linearized, for the least favorable of the numbers tried
+    worth: float  # expected logarithm of the odds afterwards, linearized, a mean over the numbers tried
 
 
 class Search:
@@ -83,8 +83,9 @@ class Search:
             readings = predicted(self._contest.best, record)
             if self._use(experiment) > 1.0:
                 return None
-            least = min(worth(self._contest, predicted(truth, record)) for truth in self._truths)
-            return Scored(experiment, readings, least)
+            each = [worth(self._contest, predicted(truth, record)) for truth in self._truths]
+            # A concave mean: to decide with all numbers counts more than to decide still more surely with some.
+            return Scored(experiment, readings, float(np.sinh(np.mean(np.arcsinh(each)))))
         except SimulationError:
             return None
 
