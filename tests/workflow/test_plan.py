@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -72,3 +73,13 @@ def test_what_cannot_be_used_is_refused_before_anything_is_written(
     assert (code, (tmp_path / "out").exists()) == (2, False)
     assert stderr.startswith("rigsight: ")
     assert "Traceback" not in stderr
+
+
+def test_the_file_of_a_rig_is_refused_as_one(tmp_path: Path, run: Run) -> None:
+    file = resources.files("rigsight.rigs") / "files/axis.toml"
+    code, _, stderr = run(
+        "plan", file, "--rivals", "cubic_stiffness,quadratic_damping", "-o", tmp_path / "out"
+    )
+    assert code == 2
+    assert len(stderr.splitlines()) <= 2
+    assert "is the file of a rig" in stderr

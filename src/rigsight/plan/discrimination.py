@@ -45,10 +45,8 @@ def about(contest: Contest, rival: Rival, readings: Record) -> float:
     readings
         A record with the readings of the right one.
     """
-    (record,) = contest.windowing.cut([readings]) if contest.windowing.length is None else (readings,)
-    problem = GreyBoxFit(
-        rival.fit.structure, [record], contest.context.scales, contest.remainder.errors(readings)
-    )
+    new, errors = contest.windowing.cut([readings]), contest.remainder.errors(readings)
+    problem = GreyBoxFit(rival.fit.structure, new, contest.context.scales, errors)
     found = problem.normal_equations(rival.fit.values, rival.fit.free)
     if not math.isfinite(found.cost):
         return 0.0

@@ -171,13 +171,12 @@ def plan_experiment(
     rig, dt = campaign.rig, campaign.estimation[0].dt
     if not rig.inputs:
         raise InputError(f"{rig.name} has no input, so there is nothing to plan.")
-    n_samples = round(seconds / dt)
-    if not _FEWEST <= n_samples <= _MOST:
+    if not _FEWEST * dt <= seconds <= _MOST * dt:
         raise InputError(
             f"--seconds must give {_FEWEST} to {_MOST} samples at the campaign's sample time of {dt:g} s: "
             f"{_FEWEST * dt:g} to {_MOST * dt:g} s, got {seconds:g}."
         )
-    rng = np.random.default_rng(seed)
+    n_samples, rng = round(seconds / dt), np.random.default_rng(seed)
     kept = with_recorded_range(limits, rig, campaign.records)
     contest = contest_of(campaign, named, say)
     bench = Bench.of(rig, campaign.estimation, kept, n_samples, 1.0 / contest.context.scales["time"])

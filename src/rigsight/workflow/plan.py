@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -82,6 +84,7 @@ def run_plan(
             "Give the rivals: either --diagnosis DIR, the results of 'rigsight diagnose', or --rivals NAME,NAME. "
             "'rigsight check' lists the effects that the records do not tell apart."
         )
+    _refuse_rig_file(Path(campaign))
     read = read_campaign(campaign, own_effects, own_rigs)
     known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
     asked = read_limits(read.rig, limits)
@@ -108,6 +111,19 @@ def run_plan(
     return plan
 
 
+def _refuse_rig_file(path: Path) -> None:
+    """Refuse the file of a rig without records: its rivals have no sizes yet."""
+    if not path.is_file():
+        return
+    with contextlib.suppress(OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        if "records" not in tables and {"name", "coordinates"} <= tables.keys():
+            raise InputError(
+                f"{path} is the file of a rig. A plan needs a campaign with at least one record, which gives the rivals their "
+                "sizes; what to record first is in docs/planning.md."
+            )
+
+
 def _listed(campaign: Campaign, text: str, known: Mapping[str, Effect]) -> list[Named]:
     """Return the rivals that a list names: one effect each, or several joined by a plus sign."""
     sets = [[name.strip() for name in part.split("+")] for part in text.split(",") if part.strip()]
@@ -119,7 +135,7 @@ def _listed(campaign: Campaign, text: str, known: Mapping[str, Effect]) -> list[
 
 def _of_diagnosis(campaign: Campaign, folder: Path, known: Mapping[str, Effect]) -> list[Named]:
     """Return the most probable candidate of a diagnosis, and the most probable ones of other families."""
-    path = folder / DIAGNOSIS_FILE if folder.is_dir() or not folder.suffix else folder
+    path = folder / DIAGNOSIS_FILE if folder.is_dir() else folder
     if not path.is_file():
         raise InputError(
             f"--diagnosis {folder}: there is no {DIAGNOSIS_FILE}; name the --out folder of 'rigsight diagnose'."
