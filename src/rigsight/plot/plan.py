@@ -38,7 +38,7 @@ def planned_experiment(plan: Plan) -> Figure:
     plan
         The plan.
     """
-    record, best, others = plan.record, plan.rivals[0], plan.rivals[1:]
+    record, others = plan.record, plan.rivals[1:]
     inputs, outputs = list(record.signals), list(plan.errors)
     n_panels = len(inputs) + 2 * len(outputs)
     figure = new_figure(_WIDTH, 0.5 + _PANEL * n_panels)
@@ -62,11 +62,9 @@ def planned_experiment(plan: Plan) -> Figure:
             line(left, record.t, one.left[:, i], color=color, lw=0.9)
         left.axhspan(-2.0, 2.0, color=OTHER, alpha=0.3, lw=0.0)
         readings.set_ylabel(with_unit(name, unit))
-        readings.set_title("Readings, with the numbers so far")
+        readings.set_title("Readings that each rival predicts with the numbers so far")
         left.set_ylabel(f"left of {name} [errors]")
-        left.set_title(
-            f"Left of the readings of {best.effects.replace('_', ' ')} when fitted again; gray: 2 errors"
-        )
+        left.set_title("What the other rivals leave of them when fitted again; gray: 2 errors")
         if name == outputs[0]:
             readings.legend(ncols=len(plan.rivals), fontsize=8.0, loc="upper left")
             top = np.max(np.abs([factor * one.readings[name] for one in plan.rivals]))
