@@ -3,7 +3,8 @@
 An axis, a hidden effect and its size are drawn by the functions of the blind bench. One short record is measured: a sweep through
 the resonance, a wide one, or a multisine. A rival of another family is drawn until the record leaves less than 20 to 1 between it
 and the hidden effect. Then one more record is measured on the true axis: as planned, as the report advises, or the first one once
-more. All are equally long; the plan keeps to the inputs of the first record, as the advice does, and to the stroke of both.
+more. All are equally long; the plan keeps to the inputs of the first record, as the advice does, and to the stroke of both; a
+further one may use three times as much, as a user may allow.
 
 Usage: python experiments/plan/run.py SEED FIRST LAST OUT.jsonl
 """
@@ -38,6 +39,8 @@ ODDS = 20.0
 MOST_RIVALS = 10
 """Rivals that are tried for each trial."""
 DT, SECONDS = 0.01, 10.0
+WIDER = 3.0
+"""What a user may allow, in units of what the records contain, which today's advice does not leave."""
 AMPLITUDES = (0.1, 0.6)
 SIZES = (0.5, 2.0)
 """What a hidden effect adds to the readings of the first record, in units of the noise."""
@@ -169,6 +172,8 @@ def judged(number: int, rng: np.random.Generator) -> Iterator[dict[str, object]]
     pair = [Named((hidden,)), Named((rival,))]
     seed = int(rng.integers(2**31))
     plan = plan_experiment(campaign, pair, [Limit("x", stroke)], SECONDS, seed, lambda _: None)
+    wider = [Limit("x", WIDER * stroke), Limit("u", WIDER * Limit("u", 1.0).reached(first))]
+    wide = plan_experiment(campaign, pair, wider, SECONDS, seed, lambda _: None)
     outcome: dict[str, object] = {
         "trial": number,
         "hidden": hidden.name,
@@ -177,6 +182,8 @@ def judged(number: int, rng: np.random.Generator) -> Iterator[dict[str, object]]
         "experiment": plan.what,
         "without_noise": plan.without_noise,
         "promised": plan.promised,
+        "wide_promised": wide.promised,
+        "wide_experiment": wide.what,
         "simulated_right": plan.trials.right,
         "simulated_decided": plan.trials.decided,
         "simulated_wrong": plan.trials.wrong,
@@ -184,7 +191,12 @@ def judged(number: int, rng: np.random.Generator) -> Iterator[dict[str, object]]
     # The numbers before are one of the starts of the fits after, in all three cases.
     values = {one.label: one.fit.values for one in contest.rivals}
     known = [replace(one, values=values[one.label]) for one in pair]
-    for what, record in (("plan", plan.record), ("menu", by_menu), ("repetition", first)):
+    for what, record in (
+        ("plan", plan.record),
+        ("wide", wide.record),
+        ("menu", by_menu),
+        ("repetition", first),
+    ):
         new = replace(truth.measured(record, rng), name=what)
         after = contest_of(replace(campaign, records=(first, new)), known, lambda _: None)
         outcome[what] = probability(after, hidden.name)

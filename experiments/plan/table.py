@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-ARMS = ("plan", "menu", "repetition")
+ARMS = ("plan", "wide", "menu", "repetition")
 DECIDED = 20.0 / 21.0
 """Odds of 20 to 1."""
 BINS = ((0.0, 0.6), (0.6, 0.9), (0.9, 0.96), (0.96, 1.0))

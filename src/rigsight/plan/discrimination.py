@@ -56,11 +56,12 @@ def about(contest: Contest, rival: Rival, readings: Record) -> float:
     return max(found.cost - float(adapted), 0.0) / (2.0 * tau)
 
 
-def worth(contest: Contest, readings: Record) -> float:
-    """Return the expected logarithm of the odds of the most probable model after a record with its readings, linearized."""
-    others = contest.rivals[1:]
+def worth(contest: Contest, truth: int, readings: Record) -> float:
+    """Return the expected logarithm of the odds of a rival, by its index, after a record with its readings, linearized."""
+    rivals = contest.rivals
+    others = [rival for index, rival in enumerate(rivals) if index != truth]
     left = [math.log(rival.probability) - about(contest, rival, readings) for rival in others]
-    return math.log(contest.best.probability) - float(np.logaddexp.reduce(left))
+    return math.log(rivals[truth].probability) - float(np.logaddexp.reduce(left))
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from rigsight.records import Record
 
 _CHANGED, _CHANGES = 3, 40
 """Best experiments of the library that are changed, and how often each."""
-_AGAIN, _DRAWN = 10, 2
-"""Best experiments of the library that are judged again, and drawn sets of numbers of the most probable model: what separates the
-rivals with one set may not with another."""
+_AGAIN, _DRAWN = 10, 1
+"""Best experiments of the library that are judged again, and drawn sets of numbers of each rival: what separates the rivals with
+one set may not with another."""
 _WITHIN = 0.98
 """Share of a limit that the largest amplitude uses at most when it is found by steps."""
 _STEPS = 12
@@ -33,7 +33,7 @@ class Scored:
 
     experiment: Experiment
     readings: Record  # that the most probable model predicts
-    worth: float  # expected logarithm of the odds afterwards, linearized, a mean over the numbers tried
+    worth: float  # expected logarithm of the odds afterwards, linearized, a mean over rivals as the truth and their numbers
 
 
 class Search:
@@ -41,7 +41,7 @@ class Search:
 
     def __init__(self, contest: Contest, bench: Bench, limits: Sequence[Limit]) -> None:
         self._contest, self._bench, self._limits = contest, bench, limits
-        self._truths = [contest.best]
+        self._truths = list(enumerate(contest.rivals))
 
     def best(
         self, constants: Sequence[Mapping[str, float]], rng: np.random.Generator, say: Callable[[str], None]
@@ -66,7 +66,9 @@ class Search:
                 "the models exceed one of them even at rest, or with the smallest inputs. Give larger limits."
             )
         found.sort(key=lambda scored: -scored.worth)
-        self._truths += [self._contest.best.drawn(self._contest.context.scales, rng) for _ in range(_DRAWN)]
+        scales = self._contest.context.scales
+        drawn = [(i, r.drawn(scales, rng)) for i, r in enumerate(self._contest.rivals) for _ in range(_DRAWN)]
+        self._truths += drawn
         again = [self.scored(scored.experiment) for scored in found[:_AGAIN]]
         found = [scored for scored in again if scored is not None] or found
         found.sort(key=lambda scored: -scored.worth)
@@ -83,9 +85,10 @@ class Search:
             readings = predicted(self._contest.best, record)
             if self._use(experiment) > 1.0:
                 return None
-            each = [worth(self._contest, predicted(truth, record)) for truth in self._truths]
-            # A concave mean: to decide with all numbers counts more than to decide still more surely with some.
-            return Scored(experiment, readings, float(np.sinh(np.mean(np.arcsinh(each)))))
+            each = [worth(self._contest, i, predicted(truth, record)) for i, truth in self._truths]
+            weights = [truth.probability for _, truth in self._truths]
+            # A concave mean: to decide whichever is true counts more than to decide still more surely in one case.
+            return Scored(experiment, readings, float(np.sinh(np.average(np.arcsinh(each), weights=weights))))
         except SimulationError:
             return None
 
