@@ -43,9 +43,8 @@ class Experiment:
     """Inputs to play."""
 
     what: str  # in words
-    shapes: Mapping[
-        str, Floats
-    ]  # excitation of each moved input, shape (n_samples,), the largest sample is one
+    # Excitation of each moved input, shape (n_samples,); the largest sample is one.
+    shapes: Mapping[str, Floats]
     constants: Mapping[str, float] = field(default_factory=dict)  # such as a payload
     amplitude: float = 1.0  # of the shapes, in units of the room that the limits leave an input
 
@@ -58,7 +57,6 @@ class Experiment:
 class Bench:
     """What is common to all experiments: sample time, duration, operating point, room of each input."""
 
-    rig: Rig
     like: Record  # a record of the campaign, with its sample time, hold and units
     n_samples: int
     middles: Mapping[str, float]  # operating point of each input
@@ -87,13 +85,14 @@ class Bench:
                 f"The inputs ({', '.join(middles)}) rest in all records. Give a limit for one, such as "
                 f"--limit {next(iter(middles))}=1."
             )
-        return cls(rig, records[0], n_samples, middles, room, omega)
+        return cls(records[0], n_samples, middles, room, omega)
 
     @property
     def band(self) -> tuple[float, float]:
         """Lowest and highest angular frequency that is excited [rad/s]."""
+        highest = _BELOW_NYQUIST * math.pi / self.like.dt
         lowest = max(_BAND[0] * self.omega, 2.0 * math.pi * _PERIODS / (self.n_samples * self.like.dt))
-        highest = min(_BAND[1] * self.omega, _BELOW_NYQUIST * math.pi / self.like.dt)
+        lowest, highest = min(lowest, 0.5 * highest), min(_BAND[1] * self.omega, highest)
         return lowest, max(highest, 1.5 * lowest)
 
     def record(self, experiment: Experiment) -> Record:
