@@ -4,7 +4,7 @@ An axis, a hidden effect and its size are drawn by the functions of the blind be
 the resonance, a wide one, or a multisine. A rival of another family is drawn until the record leaves less than 20 to 1 between it
 and the hidden effect. Then one more record is measured on the true axis: as planned, as the report advises, or the first one once
 more. All are equally long; the plan keeps to the inputs of the first record, as the advice does, and to the stroke of both; a
-further one may use three times as much, as a user may allow.
+further one may use three times as much, as a user may allow, and the inputs of the advice are played three times as large, too.
 
 Usage: python experiments/plan/run.py SEED FIRST LAST OUT.jsonl
 """
@@ -196,6 +196,7 @@ def judged(number: int, rng: np.random.Generator) -> Iterator[dict[str, object]]
         ("wide", wide.record),
         ("menu", by_menu),
         ("repetition", first),
+        ("wide_menu", by_menu.with_signals(u=WIDER * by_menu["u"])),
     ):
         new = replace(truth.measured(record, rng), name=what)
         after = contest_of(replace(campaign, records=(first, new)), known, lambda _: None)

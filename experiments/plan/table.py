@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-ARMS = ("plan", "wide", "menu", "repetition")
+ARMS = ("plan", "menu", "repetition", "wide", "wide_menu")
 DECIDED = 20.0 / 21.0
 """Odds of 20 to 1."""
 BINS = ((0.0, 0.6), (0.6, 0.9), (0.9, 0.96), (0.96, 1.0))
@@ -29,7 +29,7 @@ def main(file: Path) -> None:
     print("| one more record | decided for the truth | still open | decided wrongly | truth more probable |")
     print("|---|---|---|---|---|")
     for arm in ARMS:
-        after = np.array([trial[arm] for trial in trials])
+        after = np.array([trial[arm] for trial in trials if arm in trial])
         right, wrong = int(np.sum(after >= DECIDED)), int(np.sum(after <= 1.0 - DECIDED))
         print(
             f"| {arm} | {right} ({right / after.size:.0%}) | {after.size - right - wrong} | {wrong} | "
