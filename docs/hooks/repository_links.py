@@ -31,6 +31,7 @@ MOVED = {
     "experiments/simulators/README.md": "experiments/simulators.md",
     "experiments/sensitivities/README.md": "experiments/sensitivities.md",
     "experiments/places/README.md": "experiments/places.md",
+    "experiments/plan/README.md": "experiments/plan.md",
     "experiments/adequacy/README.md": "experiments/adequacy.md",
     "experiments/gate/README.md": "experiments/gate.md",
     "experiments/calibration/README.md": "experiments/calibration.md",

@@ -24,6 +24,7 @@ from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
 from rigsight.cli.open_app import open_app
+from rigsight.cli.plan import plan
 from rigsight.cli.power import power
 from rigsight.cli.reproduce import reproduce
 from rigsight.cli.rigs import list_rigs
@@ -63,6 +64,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "init": init,
     "check": check,
     "diagnose": diagnose,
+    "plan": plan,
     "power": power,
     "reproduce": reproduce,
     "identify": identify,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +16,6 @@ from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
 from rigsight.records.record import Floats
-from rigsight.records.stamps import digits_for
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.equations.composition import without_vanished_effects
@@ -27,11 +25,8 @@ from rigsight.workflow.campaign.given_simulation import checked_numbers
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import options_of
 from rigsight.workflow.campaign.record_notes import in_units_of
+from rigsight.workflow.run.record_csv import csv_text
 from rigsight.workflow.run.results import check_target, write_together
-
-_DIGITS = 12
-_STAMPS_TO = 1e-4
-"""Of the sample time: how closely time is written, so that the file is evenly sampled when it is read again."""
 
 
 def run_simulate(
@@ -83,7 +78,7 @@ def run_simulate(
     if out is not None:
         names = [signal.name for signal in (*rig.inputs, *rig.outputs)]
         file = Path(out)
-        write_together(file.parent, {file.name: _csv_text(simulated, names)})
+        write_together(file.parent, {file.name: csv_text(simulated, names)})
     return simulated
 
 
@@ -176,18 +171,3 @@ def _of_all_effects(complete: Structure, simulated: Structure, state: Floats) ->
         return state
     known = dict(zip(simulated.states, map(float, state), strict=False))
     return np.array([known.get(symbol, 0.0) for symbol in complete.states])
-
-
-def _csv_text(record: Record, names: list[str]) -> str:
-    file = io.StringIO()
-    table = np.column_stack([record.t, *(record[name] for name in names)])
-    digits = [digits_for(float(record.t[-1]), _STAMPS_TO * record.dt, _DIGITS), *[_DIGITS] * len(names)]
-    np.savetxt(
-        file,
-        table,
-        fmt=[f"%.{n}g" for n in digits],
-        delimiter=",",
-        header=",".join([TIME, *names]),
-        comments="",
-    )
-    return file.getvalue()

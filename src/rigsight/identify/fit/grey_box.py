@@ -21,7 +21,7 @@ from rigsight.errors import InputError, SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
-from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
+from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Evaluation, Problem
 from rigsight.identify.fit.free_run import FreeRun, state_slopes
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.fit.prior import Prior
@@ -234,19 +234,37 @@ class GreyBoxFit:
         This is the Fisher information of relative changes (of changes in units of the size, if a value is zero), shape
         (n_free, n_free); NaN if the start cannot be simulated.
         """
-        begin, n = SearchStart.of(self.data, self.scales, start, free), len(free)
+        normal = self.normal_equations(start, free).normal
+        if not np.all(np.isfinite(normal)):
+            return np.full_like(normal, np.nan)
+        coordinates = Coordinates.of(self.data.structure, free, start, self.scales)
+        sizes = np.array([abs(start[name]) for name in free])
+        sizes = np.where(sizes > 0.0, sizes, coordinates.scale)
+        relative = sizes / np.diag(coordinates.jacobian(coordinates.from_values(start)))
+        return np.asarray(normal * np.outer(relative, relative))
+
+    def normal_equations(
+        self, start: Mapping[str, float], free: Sequence[str], initial_states: Sequence[Floats] | None = None
+    ) -> Evaluation:
+        """Return the normal equations of the free parameters' coordinates at their start, initial states projected out.
+
+        The cost is that with the best initial states in the linear approximation.
+        """
+        begin, n = SearchStart.of(self.data, self.scales, start, free, initial_states), len(free)
         problem = Problem(self.data, begin.coordinates, begin.n_states, np.full(begin.theta.size, np.inf))
         problem.choose_substeps(begin.theta)
-        normal = problem.at(begin.theta).normal
+        whole = problem.at(begin.theta)
+        normal, gradient = whole.normal, whole.gradient
         if not np.all(np.isfinite(normal)):
-            return np.full((n, n), np.nan)
-        own = (
-            normal[:n, :n] - normal[:n, n:] @ np.linalg.pinv(normal[n:, n:], hermitian=True) @ normal[n:, :n]
+            return Evaluation(begin.theta[:n], np.inf, np.full((n, n), np.nan), np.full(n, np.nan))
+        through = normal[:n, n:] @ np.linalg.pinv(normal[n:, n:], hermitian=True)
+        settled = gradient[n:] @ np.linalg.pinv(normal[n:, n:], hermitian=True) @ gradient[n:]
+        return Evaluation(
+            begin.theta[:n],
+            whole.cost - float(settled),
+            normal[:n, :n] - through @ normal[n:, :n],
+            gradient[:n] - through @ gradient[n:],
         )
-        sizes = np.array([abs(start[name]) for name in free])
-        sizes = np.where(sizes > 0.0, sizes, begin.coordinates.scale)
-        relative = sizes / np.diag(begin.coordinates.jacobian(begin.theta[:n]))
-        return np.asarray(own * np.outer(relative, relative))
 
     def _recalled(self, key: str, problem: Problem, search: Callable[[], _Outcome]) -> _Outcome:
         """Return the outcome of a search, from memory if it was done before."""

@@ -1,0 +1,7 @@
+"""Which experiment separates the rivals that the records leave?"""
+
+from rigsight.plan.limits import Limit as Limit
+from rigsight.plan.limits import read_limits as read_limits
+from rigsight.plan.planning import Plan as Plan
+from rigsight.plan.planning import plan_experiment as plan_experiment
+from rigsight.plan.rivals import Named as Named

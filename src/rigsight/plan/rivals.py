@@ -1,0 +1,229 @@
+"""The models between which the records do not decide: fitted again, with what the records say of their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigsight.campaign import Campaign, with_weighed_spring
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.policy import FAMILIES
+from rigsight.diagnose.search.horizon import restores, windowing_of
+from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
+from rigsight.effects import Effect
+from rigsight.errors import SimulationError
+from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
+from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.windows import Windowing, liveliest
+from rigsight.records import Record
+from rigsight.records.record import Floats
+
+_OLD = 8000
+"""Samples of the most excited stretches of all records together that rivals are fitted to again and again. Fewer than there are
+leave the rivals more freedom, so that a plan promises less."""
+
+_REACH = 0.3
+"""Largest standard deviation of a drawn coordinate: a factor of 1.35 for a positive number."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """A rival as it is named: its effects, and what a diagnosis says of it."""
+
+    effects: tuple[Effect, ...]
+    probability: float | None = None
+    values: Mapping[str, float] | None = None
+
+    @property
+    def label(self) -> str:
+        """Names of the effects."""
+        return " and ".join(effect.name for effect in self.effects) or "no effect"
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A model that was fitted to the records."""
+
+    label: str
+    fit: FitResult
+    probability: float  # given the records, among the rivals
+    information: Floats  # of the records on the coordinates of its free numbers; samples that repeat each other count once
+
+    def drawn(self, scales: Mapping[str, float], rng: np.random.Generator) -> Rival:
+        """Return the same with numbers drawn as far from the fitted ones as the records allow."""
+        coordinates = Coordinates.of(self.fit.structure, self.fit.free, self.fit.values, scales)
+        eigenvalues, vectors = np.linalg.eigh(self.information)
+        # Directions that the records leave open are drawn within reach of the fit.
+        spread = 1.0 / np.sqrt(np.maximum(eigenvalues, 1.0 / _REACH**2))
+        place = coordinates.from_values(self.fit.values) + vectors @ (
+            spread * rng.standard_normal(spread.size)
+        )
+        p = coordinates.to_parameters(np.clip(place, coordinates.lower, coordinates.upper))
+        numbers = {name: float(p[i]) for name, i in zip(self.fit.free, coordinates.index, strict=True)}
+        return replace(self, fit=replace(self.fit, values={**self.fit.values, **numbers}))
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What the best model leaves of the readings: the unit in which rivals differ."""
+
+    floors: Mapping[str, float]
+    shares: Mapping[
+        str, float
+    ]  # by output: what is left above the floor, of the standard deviation of the reading
+    independence: float  # samples per independent one
+    samples: Floats  # the remainder in units of its RMS, shape (n_samples, n_outputs)
+
+    def errors(self, record: Record) -> dict[str, float]:
+        """Return the error to be expected of the readings in a record: laws err in proportion to the motion."""
+        return {
+            name: float(np.hypot(floor, self.shares[name] * np.std(record[name])))
+            if name in record
+            else floor
+            for name, floor in self.floors.items()
+        }
+
+    def drawn(self, n_samples: int, rng: np.random.Generator) -> Floats:
+        """Return noise with the spectrum of the remainder and random phases, shape (n_samples, n_outputs).
+
+        J. Theiler et al., Physica D 58 (1992) 77.
+        """
+        spectrum = np.abs(np.fft.rfft(self.samples, axis=0))
+        old, new = np.linspace(0.0, 1.0, spectrum.shape[0]), np.linspace(0.0, 1.0, n_samples // 2 + 1)
+        lines = np.column_stack([np.interp(new, old, column) for column in spectrum.T])
+        drawn = np.fft.irfft(lines * np.exp(2j * np.pi * rng.uniform(size=lines.shape)), n_samples, axis=0)
+        size = np.std(drawn, axis=0)
+        return np.asarray(drawn / np.where(size > 0.0, size, 1.0))
+
+
+@dataclass(frozen=True)
+class Contest:
+    """The rivals, most probable first, with the records that they were fitted to."""
+
+    context: FitContext
+    windowing: Windowing
+    records: tuple[Record, ...]
+    errors: Mapping[str, float]  # of each output in these records
+    remainder: Remainder
+    rivals: tuple[Rival, ...]
+
+    @property
+    def best(self) -> Rival:
+        """The most probable model."""
+        return self.rivals[0]
+
+
+def contest_of(campaign: Campaign, named: Sequence[Named], say: Callable[[str], None]) -> Contest:
+    """Fit rivals to the estimation records of a campaign.
+
+    Raises
+    ------
+    SimulationError
+        If a rival cannot be simulated near the records.
+    """
+    campaign = with_weighed_spring(campaign)
+    start = start_values_of(campaign)
+    drifts = campaign.drifts or not restores(campaign)
+    floors = {f.output: f.std for f in noise_floors(campaign.rig, campaign.records, drifts)}
+    windowing = windowing_of(campaign, floors, 1, start)[0] if drifts else Windowing()
+    context = fit_context_of(campaign, floors, windowing, None, IdleThreads(1), start)
+    if windowing.length is None:
+        records = liveliest(context.estimation, campaign.rig, _OLD)
+        context = replace(context, estimation=records, scoring=records)
+    alone = reidentify(context, context.start)
+    fits = []
+    for one in named:
+        fits.append(_fit(context, one, alone.fit))
+        say(one.label)
+    if not all(fit.residuals for fit in fits):
+        failed = next(one.label for one, fit in zip(named, fits, strict=True) if not fit.residuals)
+        raise SimulationError(
+            f"The rival '{failed}' cannot be simulated near the records; leave it out with --rivals."
+        )
+    return _weighed(context, windowing, named, fits)
+
+
+def _fit(context: FitContext, one: Named, alone: FitResult) -> FitResult:
+    if not one.effects:
+        return alone
+    found = fit_candidate(context, one.effects, alone).fit
+    if one.values:
+        structure = found.structure
+        values = {**found.values, **{n: v for n, v in one.values.items() if n in structure.names}}
+        again = context.problem(structure, context.estimation).fit(values, found.free)
+        found = min((found, again), key=lambda fit: fit.cost if fit.residuals else np.inf)
+    return found
+
+
+def _weighed(
+    context: FitContext, windowing: Windowing, named: Sequence[Named], fits: Sequence[FitResult]
+) -> Contest:
+    """Return the contest, with all fits in units of what the best of them leaves."""
+    given = all(one.probability is not None for one in named)
+    costs = [fit.cost for fit in fits]
+    first = int(np.argmax([one.probability or 0.0 for one in named]) if given else np.argmin(costs))
+    remainder = _remainder(context, fits[int(np.argmin(costs))])
+    spread = [
+        np.concatenate([r[n] for r in context.estimation if n in r] or [np.zeros(1)])
+        for n in remainder.floors
+    ]
+    errors = {
+        name: float(np.hypot(floor, remainder.shares[name] * np.std(samples)))
+        for (name, floor), samples in zip(remainder.floors.items(), spread, strict=True)
+    }
+    rivals = []
+    for one, fit in zip(named, fits, strict=True):
+        problem = GreyBoxFit(fit.structure, context.estimation, context.scales, errors)
+        again = problem.fit(fit.values, fit.free, initial_states=fit.initial_states)
+        again = again if again.residuals else fit
+        normal = problem.normal_equations(again.values, again.free, again.initial_states).normal
+        rivals.append(
+            Rival(one.label, again, one.probability or 0.0, np.nan_to_num(normal) / remainder.independence)
+        )
+    if not given:
+        # Schwarz's criterion; samples that repeat each other count once.
+        tau, n = remainder.independence, rivals[0].fit.n_samples
+        logs = np.array([-0.5 * r.fit.cost / tau - 0.5 * len(r.fit.free) * np.log(n / tau) for r in rivals])
+        weights = np.exp(logs - np.max(logs))
+        rivals = [replace(r, probability=float(w)) for r, w in zip(rivals, weights, strict=True)]
+        first = int(np.argmax(weights))
+    total = sum(rival.probability for rival in rivals)
+    # The evidence itself may fail, whatever it says.
+    shares = [min(max(r.probability / total, FAMILIES.failing), 1.0 - FAMILIES.failing) for r in rivals]
+    rivals = [replace(r, probability=s / sum(shares)) for r, s in zip(rivals, shares, strict=True)]
+    ordered = (rivals[first], *(rival for i, rival in enumerate(rivals) if i != first))
+    return Contest(context, windowing, context.estimation, errors, remainder, ordered)
+
+
+def _remainder(context: FitContext, fit: FitResult) -> Remainder:
+    names = [signal.name for signal in context.rig.outputs]
+    left = np.nan_to_num(np.concatenate(fit.residuals))
+    shares = {}
+    for i, name in enumerate(names):
+        if name in context.noise:
+            reading = np.concatenate(
+                [record[name] for record in context.estimation if name in record] or [np.zeros(1)]
+            )
+            above = max(float(np.mean(left[:, i] ** 2)) - context.noise[name] ** 2, 0.0)
+            shares[name] = float(np.sqrt(above) / (np.std(reading) or 1.0))
+    size = np.std(left, axis=0)
+    samples = (left - np.mean(left, axis=0)) / np.where(size > 0.0, size, 1.0)
+    # The output that repeats itself most decides.
+    independence = max(_independence(column) for column in samples.T)
+    return Remainder({n: context.noise[n] for n in shares}, shares, independence, samples)
+
+
+def _independence(samples: Floats) -> float:
+    """Return the samples per independent one: the sum of the correlations up to the first that is negative."""
+    n = samples.size
+    spectrum = np.abs(np.fft.rfft(samples, 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[:n]
+    if correlation[0] <= 0.0:
+        return 1.0
+    correlation = correlation / correlation[0]
+    below = np.flatnonzero(correlation < 0.0)
+    return float(max(1.0, 2.0 * np.sum(correlation[: below[0] if below.size else n]) - 1.0))

@@ -1,0 +1,73 @@
+"""The figure of a planned experiment: its inputs, the readings to be expected, and what each rival leaves of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigsight.plan import Plan
+from rigsight.plot.drawing import (
+    GIVEN,
+    MEASURED,
+    OTHER,
+    REIDENTIFIED,
+    WITH_EFFECT,
+    in_style,
+    line,
+    new_figure,
+    shown_in,
+    with_unit,
+)
+from rigsight.units import INPUT_UNIT
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_COLORS = (WITH_EFFECT, GIVEN, REIDENTIFIED, OTHER)
+_WIDTH, _PANEL = 7.0, 1.7
+"""Sizes [inch]."""
+
+
+@in_style
+def planned_experiment(plan: Plan) -> Figure:
+    """Draw a planned experiment.
+
+    Parameters
+    ----------
+    plan
+        The plan.
+    """
+    record, others = plan.record, plan.rivals[1:]
+    inputs, outputs = list(record.signals), list(plan.errors)
+    n_panels = len(inputs) + 2 * len(outputs)
+    figure = new_figure(_WIDTH, 0.5 + _PANEL * n_panels)
+    panels = list(figure.subplots(n_panels, 1, sharex=True, squeeze=False).flat)
+    for name in inputs:
+        ax = panels.pop(0)
+        unit = record.units.get(name, "")
+        factor, unit = shown_in("" if unit == INPUT_UNIT else unit, record[name])
+        line(ax, record.t, factor * record[name], color=MEASURED, lw=0.9)
+        ax.set_ylabel(with_unit(name, unit))
+        if name == inputs[0]:
+            ax.set_title(f"Play: {plan.what}")
+    columns = {name: i for i, name in enumerate(outputs)}
+    for name, i in columns.items():
+        readings, left = panels.pop(0), panels.pop(0)
+        factor, unit = shown_in(record.units.get(name, ""), *(one.readings[name] for one in plan.rivals))
+        for one, color in zip(plan.rivals, _COLORS, strict=False):
+            label = one.effects.replace("_", " ")
+            line(readings, record.t, factor * one.readings[name], color=color, lw=0.9, label=label)
+        for one, color in zip(others, _COLORS[1:], strict=False):
+            line(left, record.t, one.left[:, i], color=color, lw=0.9)
+        left.axhspan(-2.0, 2.0, color=OTHER, alpha=0.3, lw=0.0)
+        readings.set_ylabel(with_unit(name, unit))
+        readings.set_title("Readings that each rival predicts with the numbers so far")
+        left.set_ylabel(f"left of {name} [errors]")
+        left.set_title("What the other rivals leave of them when fitted again; gray: 2 errors")
+        if name == outputs[0]:
+            readings.legend(ncols=len(plan.rivals), fontsize=8.0, loc="upper left")
+            top = np.max(np.abs([factor * one.readings[name] for one in plan.rivals]))
+            readings.set_ylim(-1.1 * top, 1.5 * top)
+    figure.axes[-1].set_xlabel("time [s]")
+    return figure

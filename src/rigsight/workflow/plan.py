@@ -1,0 +1,183 @@
+"""The work of `rigsight plan`: a campaign and its rivals -> the experiment that separates them, as a CSV to play."""
+
+from __future__ import annotations
+
+import contextlib
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from threadpoolctl import threadpool_limits
+
+from rigsight.campaign import Campaign
+from rigsight.diagnose.policy import FAMILIES
+from rigsight.effects import AT, CATALOGUE, Effect
+from rigsight.errors import InputError
+from rigsight.plan import Named, Plan, plan_experiment, read_limits
+from rigsight.plot import planned_experiment, png_bytes, svg_text
+from rigsight.rigs import Rig
+from rigsight.workflow.campaign.model_file import json_object
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.own.effect_names import effect_on
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.record_csv import csv_text
+from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, write_together
+
+PLAN_FILE, PLAN_RECORD = "plan.json", "plan.csv"
+PLAN_PICTURES = ("plan.svg", "plan.png")
+_MOST_RIVALS = 4
+_STEPS = 40
+"""Announced to the listener; more raise the total."""
+
+
+class _Value(BaseModel):
+    model_config = ConfigDict(extra="ignore")
+
+    value: float
+
+
+class _Candidate(BaseModel):
+    model_config = ConfigDict(extra="ignore")
+
+    effects: list[str]
+    where: list[str]
+    probability: float
+    parameters: dict[str, _Value]
+
+
+class _Diagnosis(BaseModel):
+    """What a plan reads of a diagnosis.json."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    rig: str
+    candidates: list[_Candidate]
+
+
+def run_plan(
+    campaign: str | Path,
+    out: str | Path | None = None,
+    *,
+    limits: Sequence[str] = (),
+    seconds: float = 20.0,
+    diagnosis: str | Path | None = None,
+    rivals: str | None = None,
+    own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
+    seed: int = 0,
+    listener: Listener = silent,
+) -> Plan:
+    """Return the experiment that separates rivals best, and write it into a folder: plan.csv, plan.json and pictures.
+
+    Raises
+    ------
+    InputError
+        If the campaign, the diagnosis, a limit or a rival cannot be used, or no experiment keeps the limits.
+    SimulationError
+        If a rival cannot be simulated near the records.
+    """
+    if out is not None:
+        check_writable(Path(out), PLAN_FILE, PLAN_RECORD, *PLAN_PICTURES)
+    if (diagnosis is None) == (rivals is None):
+        raise InputError(
+            "Give the rivals: either --diagnosis DIR, the results of 'rigsight diagnose', or --rivals NAME,NAME. "
+            "'rigsight check' lists the effects that the records do not tell apart."
+        )
+    _refuse_rig_file(Path(campaign))
+    read = read_campaign(campaign, own_effects, own_rigs)
+    known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
+    asked = read_limits(read.rig, limits)
+    named = (
+        _of_diagnosis(read, Path(diagnosis), known)
+        if diagnosis is not None
+        else _listed(read, rivals or "", known)
+    )
+    stage = Stage("Planning", _STEPS, listener)
+    with threadpool_limits(limits=1, user_api="blas"):
+        plan = plan_experiment(read, named, asked, seconds, seed, stage.finished)
+    if out is not None:
+        figure = planned_experiment(plan)
+        svg, png = PLAN_PICTURES
+        write_together(
+            Path(out),
+            {
+                PLAN_RECORD: csv_text(plan.record, [signal.name for signal in read.rig.inputs]),
+                PLAN_FILE: json_text(plan.to_json()),
+                svg: svg_text(figure, "plan"),
+                png: png_bytes(figure, dpi=150),
+            },
+        )
+    return plan
+
+
+def _refuse_rig_file(path: Path) -> None:
+    """Refuse the file of a rig without records: its rivals have no sizes yet."""
+    if not path.is_file():
+        return
+    with contextlib.suppress(OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        if "records" not in tables and {"name", "coordinates"} <= tables.keys():
+            raise InputError(
+                f"{path} is the file of a rig. A plan needs a campaign with at least one record, which gives the rivals their "
+                "sizes; what to record first is in docs/planning.md."
+            )
+
+
+def _listed(campaign: Campaign, text: str, known: Mapping[str, Effect]) -> list[Named]:
+    """Return the rivals that a list names: one effect each, or several joined by a plus sign."""
+    sets = [[name.strip() for name in part.split("+")] for part in text.split(",") if part.strip()]
+    named = [
+        Named(tuple(effect_on(campaign.rig, name, known, "--rivals") for name in names)) for names in sets
+    ]
+    return _checked(campaign, named, "--rivals")
+
+
+def _of_diagnosis(campaign: Campaign, folder: Path, known: Mapping[str, Effect]) -> list[Named]:
+    """Return the most probable candidate of a diagnosis, and the most probable ones of other families."""
+    path = folder / DIAGNOSIS_FILE if folder.is_dir() else folder
+    if not path.is_file():
+        raise InputError(
+            f"--diagnosis {folder}: there is no {DIAGNOSIS_FILE}; name the --out folder of 'rigsight diagnose'."
+        )
+    try:
+        found = _Diagnosis.model_validate(json_object(path, "diagnosis", "'rigsight diagnose' writes one."))
+    except ValidationError as error:
+        key = ".".join(map(str, error.errors()[0]["loc"]))
+        raise InputError(
+            f"{path}: {key}: {error.errors()[0]['msg']}. 'rigsight diagnose' writes this file."
+        ) from None
+    if found.rig != campaign.rig.name:
+        raise InputError(
+            f"{path}: is of the rig '{found.rig}', the campaign of '{campaign.rig.name}'. Name its own diagnosis."
+        )
+    named: dict[frozenset[tuple[object, str]], Named] = {}
+    for candidate in sorted(found.candidates, key=lambda one: -one.probability):
+        places = zip(candidate.effects, candidate.where, strict=False)
+        effects = tuple(_placed(campaign.rig, kind, place, known, path) for kind, place in places)
+        family = frozenset((effect.family, campaign.rig.where(effect)) for effect in effects)
+        if candidate.probability >= FAMILIES.listed or len(named) < 2:
+            values = {name: number.value for name, number in candidate.parameters.items()}
+            named.setdefault(family, Named(effects, candidate.probability, values))
+    return _checked(campaign, list(named.values())[:_MOST_RIVALS], str(path))
+
+
+def _placed(rig: Rig, kind: str, place: str, known: Mapping[str, Effect], path: Path) -> Effect:
+    at = f"{AT}{place}" if kind in known and place in rig.places(known[kind].place) else ""
+    return effect_on(rig, f"{kind}{at}", known, str(path))
+
+
+def _checked(campaign: Campaign, named: Sequence[Named], where: str) -> list[Named]:
+    labels = [one.label for one in named]
+    if len(set(labels)) != len(labels) or not 2 <= len(labels) <= _MOST_RIVALS:
+        raise InputError(
+            f"{where}: a plan separates 2 to {_MOST_RIVALS} different rivals, got {', '.join(labels) or 'none'}. "
+            "Name them with --rivals NAME,NAME."
+        )
+    modelled = {effect.name for effect in campaign.modelled}
+    there = [effect.name for one in named for effect in one.effects if effect.name in modelled]
+    if there:
+        raise InputError(
+            f"{where}: the given simulation has {there[0]} already; name effects that it may lack."
+        )
+    return list(named)

@@ -1,0 +1,115 @@
+"""A planned experiment separates rivals that one record left open, keeps the limits, and can be played and read again."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigsight.campaign import Campaign
+from rigsight.effects import effect_named
+from rigsight.errors import InputError
+from rigsight.plan import Named, Plan, plan_experiment, read_limits
+from rigsight.plan.discrimination import about, posterior
+from rigsight.plan.limits import use_of
+from rigsight.plan.rivals import contest_of
+from rigsight.records import Record
+from rigsight.records.read_record import ReadingOptions, read_record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+from rigsight.workflow.run.record_csv import csv_text
+
+DT, NOISE = 0.01, 1e-5
+VALUES = {"gain": 1.0, "m": 2.0, "d": 12.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0, "T_c": 0.01}
+PAIR = [Named((effect_named(name),)) for name in ("coulomb_friction", "quadratic_damping")]
+LIMITS = ["u=3", "x=0.004", "d(x)=0.05"]
+
+
+def moved(record: Record) -> Record:
+    """Return the readings of an axis with dry friction."""
+    return simulate(compose(AXIS, [effect_named("coulomb_friction")]), VALUES, record)
+
+
+def measured(record: Record, seed: int) -> Record:
+    """Return the same with noise."""
+    run = moved(record)
+    noise = np.random.default_rng(seed).normal(scale=NOISE, size=run.n_samples)
+    return run.with_signals(x=run["x"] + noise)
+
+
+@pytest.fixture(scope="module")
+def one_amplitude() -> Campaign:
+    """An axis with dry friction that moved at one amplitude only: more damping looks nearly the same."""
+    t = DT * np.arange(600)
+    first = measured(Record("first", DT, {"u": 0.8 * np.sin(20.0 * t)}, {}), 0)
+    given = {name: VALUES[name] for name in ("m", "d", "k", "x_off", "force_off")}
+    return Campaign("axis", AXIS, {"gain": 1.0}, given, (first,))
+
+
+@pytest.fixture(scope="module")
+def plan(one_amplitude: Campaign) -> Plan:
+    return plan_experiment(one_amplitude, PAIR, read_limits(AXIS, LIMITS), 6.0, 0, lambda _: None, draws=1)
+
+
+def test_the_record_separates_rivals_much_better_than_the_old_one_repeated(
+    one_amplitude: Campaign, plan: Plan
+) -> None:
+    contest = contest_of(one_amplitude, PAIR, lambda _: None)
+    wrong = next(rival for rival in contest.rivals if rival.label == "quadratic_damping")
+    (first,) = one_amplitude.records
+    assert contest.best.probability < 0.8
+    assert about(contest, wrong, moved(plan.record)) > 10.0 * about(contest, wrong, moved(first))
+
+
+def test_the_measured_record_decides_for_the_truth(one_amplitude: Campaign, plan: Plan) -> None:
+    new = replace(measured(plan.record, 2), name="plan")
+    after = contest_of(replace(one_amplitude, records=(*one_amplitude.records, new)), PAIR, lambda _: None)
+    assert after.best.label == "coulomb_friction"
+    assert after.best.probability > 0.95
+
+
+def test_limits_are_kept_in_the_simulations_of_all_rivals(plan: Plan) -> None:
+    limits = read_limits(AXIS, LIMITS)
+    assert [limit.name for limit, _ in plan.limits] == ["u", "x", "d(x)"]
+    assert all(use_of(limits, one.readings) <= 1.0 for one in plan.rivals)
+    assert all(largest <= limit.value for limit, largest in plan.limits)
+
+
+def test_the_promise_is_a_probability_that_simulations_keep(plan: Plan) -> None:
+    assert plan.rivals[0].probability < plan.promised <= plan.trials.expected <= 0.97
+    assert plan.trials.n == 2
+    json.dumps(plan.to_json(), allow_nan=False)
+
+
+def test_the_same_seed_gives_the_same_plan(one_amplitude: Campaign, plan: Plan) -> None:
+    again = plan_experiment(one_amplitude, PAIR, read_limits(AXIS, LIMITS), 6.0, 0, lambda _: None, draws=1)
+    assert np.array_equal(again.record["u"], plan.record["u"])
+
+
+def test_the_file_to_play_is_read_as_a_record(plan: Plan, tmp_path: Path) -> None:
+    file = tmp_path / "plan.csv"
+    file.write_text(csv_text(plan.record, ["u"]))
+    read = read_record(file, AXIS.inputs, AXIS.outputs, ReadingOptions(require_outputs=False))
+    assert read.dt == pytest.approx(DT)
+    assert read["u"] == pytest.approx(plan.record["u"], abs=1e-9)
+
+
+@pytest.mark.parametrize("text", ["y=1", "x", "x=-1", "d(u)=nan"])
+def test_a_limit_that_cannot_be_used_is_refused_with_those_allowed(text: str) -> None:
+    with pytest.raises(InputError, match=r"--limit"):
+        read_limits(AXIS, [text])
+    with pytest.raises(InputError, match=r"u, d\(u\), x, d\(x\)"):
+        read_limits(AXIS, ["y=1"])
+
+
+def test_limits_that_no_experiment_keeps_are_refused(one_amplitude: Campaign) -> None:
+    with pytest.raises(InputError, match="No experiment keeps the limits"):
+        plan_experiment(one_amplitude, PAIR, read_limits(AXIS, ["x=1e-12"]), 6.0, 0, lambda _: None)
+
+
+def test_no_probability_exceeds_that_of_a_verdict() -> None:
+    assert posterior([0.5, 0.5], [0.0, 1e6]) == pytest.approx([0.97, 0.0])
+    assert posterior([0.5, 0.5], [np.inf, np.inf]) == pytest.approx([0.5, 0.5])
