@@ -109,7 +109,6 @@ GIVEN: dict[str, list[str]] = {
     "--campaigns": ["a", "--keys", "b"],
     "--at": ["1,2"],
     "--floors": ["3"],
-    "--limit": ["x=1 mm"],
     "--junit": ["checks.xml"],
     "--keys": ["b", "--campaigns", "a"],
     "--merge": ["a"],
@@ -127,6 +126,7 @@ GIVEN: dict[str, list[str]] = {
     "--port": ["8080"],
 }
 VALUES_OF = {
+    ("gate", "--limit"): ["x=1 mm"],
     ("vary", "--to"): ["9.0"],
     ("export", "--out"): ["elsewhere.py"],
     ("discover", "--method"): ["full"],

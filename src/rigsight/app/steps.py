@@ -25,19 +25,21 @@ class Run:
     out: str
     page: str  # of its results, to be shown
     words: str  # what it does
+    options: tuple[str, ...] = ()  # beside that folder
 
     @property
     def arguments(self) -> tuple[str, ...]:
         """What follows `rigsight`."""
-        return (self.command, ".", "--out", self.out)
+        return (self.command, ".", "--out", self.out, *self.options)
 
 
 RUNS = (
     Run("check", "Check", "check", "check", "check.html", "What do the records allow to find?"),
     Run("diagnosis", "Diagnosis", "diagnose", RESULTS, REPORT_FILE,
         "Which effect does the simulation lack? Finished fits are kept: a canceled diagnosis goes on from there."),
-    Run("plan", "Next experiment", "plan", "plan", "plan.html",
-        "Which record would tell more? The files below are loaded on the bench."),
+    Run("plan", "Next experiment", "plan", "plan", "plan.svg",
+        "Which record would tell the rivals of the diagnosis apart? plan.csv is played on the bench.",
+        ("--diagnosis", RESULTS)),
 )  # fmt: skip
 
 
