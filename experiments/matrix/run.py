@@ -18,6 +18,7 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.check import Check
 from rigsight.effects import CATALOGUE, Effect
+from rigsight.inverse import with_all_inputs
 from rigsight.workflow.check import check_of
 from rigsight.workflow.diagnose import diagnose_campaign
 from rigsight.workflow.own.effect_names import candidates_of
@@ -47,7 +48,8 @@ def judged(trial: Trial, seed: int, number: int, answers: Sequence[str]) -> Iter
     if len(hidden) != 1 or trial.modelled:
         return
     constants = {p.name: trial.values[p.name] for p in trial.rig.constants}
-    campaign = Campaign(f"trial {number}", trial.rig, constants, trial.given, trial.records)
+    records = tuple(with_all_inputs(trial.rig, record) for record in trial.records)
+    campaign = Campaign(f"trial {number}", trial.rig, constants, trial.given, records)
     candidates: dict[str, Effect] = {e.name: e for e in candidates_of(campaign, CATALOGUE)}
     found = check_of(campaign)
     if hidden[0] not in found.matrix.effects:

@@ -11,6 +11,7 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.effects import Effect, Family
 from rigsight.errors import SimulationError
+from rigsight.inverse.effect_terms import EffectTerms
 from rigsight.inverse.propose import along_motion
 from rigsight.inverse.separability import Pushes
 from rigsight.records import Record
@@ -86,35 +87,50 @@ def effect_matrix(
             reason="The sensors do not show the whole motion, or a modelled effect acts at a drive or a sensor. Effects cannot "
             "be compared along the motion."
         )
-    rig, n = campaign.rig, len(terms_of.fit.motions)
-    others = _other_motions(campaign, records, terms_of.values)
-    pushes = Pushes(terms_of.with_records([record for _, record in others]), effects)
-    here = pushes.along(range(n))
-    along = {what: pushes.along([n + i]) for i, (what, _) in enumerate(others)}
-    if along:
-        along["all of these"] = pushes.along(range(n + len(others)))
-    told: list[list[Told]] = [["apart"] * len(pushes.effects) for _ in pushes.effects]
-    motions: dict[tuple[int, int], str] = {}
-    for i in range(len(pushes.effects)):
-        for j in range(i):
-            answer: Told = "apart"
-            if not here.are_apart(i, j):
-                by = next((what for what, own in along.items() if own.are_apart(i, j)), None)
-                known = here.are_apart(i, j)
-                answer = "other motion" if by else "by size" if known is None else "never"
-                if by:
-                    motions[i, j] = by
-            told[i][j] = told[j][i] = answer
-    named = {effect.name for effect in pushes.effects}
+    rig, pushes = campaign.rig, Pushes(terms_of, effects)
+    judged, here = pushes.effects, pushes.along(range(len(terms_of.fit.motions)))
+    told: list[list[Told]] = [["apart"] * len(judged) for _ in judged]
+    alike = [(i, j) for i in range(len(judged)) for j in range(i) if not here.are_apart(i, j)]
+    motions = _told_by_other_motions(
+        terms_of, _other_motions(campaign, records, terms_of.values), judged, alike
+    )
+    for i, j in alike:
+        answer: Told = "by size" if here.are_apart(i, j) is None else "never"
+        told[i][j] = told[j][i] = "other motion" if (i, j) in motions else answer
+    named = {effect.name for effect in judged}
     return EffectMatrix(
-        tuple(effect.name for effect in pushes.effects),
-        tuple(effect.family for effect in pushes.effects),
-        tuple(rig.where(effect) for effect in pushes.effects),
-        tuple(here.is_visible(i) for i in range(len(pushes.effects))),
+        tuple(effect.name for effect in judged),
+        tuple(effect.family for effect in judged),
+        tuple(rig.where(effect) for effect in judged),
+        tuple(here.is_visible(i) for i in range(len(judged))),
         tuple(map(tuple, told)),
         motions,
         tuple(effect.name for effect in effects if effect.name not in named),
     )
+
+
+def _told_by_other_motions(
+    terms_of: EffectTerms,
+    others: Sequence[tuple[str, Record]],
+    judged: Sequence[Effect],
+    pairs: Sequence[tuple[int, int]],
+) -> dict[tuple[int, int], str]:
+    """Return the first other motion that tells a pair of effects apart, of those pairs that one does."""
+    numbers = sorted({i for pair in pairs for i in pair})
+    if not numbers or not others:
+        return {}
+    pushes = Pushes(terms_of.along_records([record for _, record in others]), [judged[i] for i in numbers])
+    names = [effect.name for effect in judged]
+    # Along another motion an effect may not be finite.
+    place = {names.index(effect.name): k for k, effect in enumerate(pushes.effects)}
+    along = {what: pushes.along([k]) for k, (what, _) in enumerate(others)}
+    along["all of these"] = pushes.along(range(len(others)))
+    found: dict[tuple[int, int], str] = {}
+    for i, j in (pair for pair in pairs if place.keys() >= set(pair)):
+        by = next((what for what, own in along.items() if own.are_apart(place[i], place[j])), None)
+        if by is not None:
+            found[i, j] = by
+    return found
 
 
 def _other_motions(

@@ -66,8 +66,8 @@ class EffectTerms:
         self._controllers: dict[str, list[ControlledMotion]] = {}
         self._of_lateness: dict[tuple[str, float], tuple[Floats, ...] | None] = {}
 
-    def with_records(self, records: Sequence[Record]) -> EffectTerms:
-        """Return the terms along the motions of further records, too, with the same numbers and grids.
+    def along_records(self, records: Sequence[Record]) -> EffectTerms:
+        """Return the terms along the motions of other records, with the same numbers and grids.
 
         Raises
         ------
@@ -75,9 +75,9 @@ class EffectTerms:
             If the sensors of a record do not show the motion.
         """
         fit = self.fit
-        motions = [*fit.motions, *record_motions(fit.rig, records, self.values)]
-        wider = EquationFit(fit.rig, motions, fit.modelled, fit.free, self.values)
-        return EffectTerms(wider, self.values, self.scales)
+        motions = record_motions(fit.rig, records, self.values)
+        other = EquationFit(fit.rig, motions, fit.modelled, fit.free, self.values)
+        return EffectTerms(other, self.values, self.scales)
 
     def of(self, effect: Effect) -> Iterator[Term]:
         """Yield an effect at each point of the grid of its nonlinear parameters; nothing where it is no term.
