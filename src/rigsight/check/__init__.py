@@ -6,5 +6,6 @@ from rigsight.check.channels import Channel as Channel
 from rigsight.check.channels import CheckedRecord as CheckedRecord
 from rigsight.check.effect_matrix import EffectMatrix as EffectMatrix
 from rigsight.check.effect_matrix import Told as Told
+from rigsight.check.effect_matrix import Visible as Visible
 from rigsight.check.parameters import CheckedParameter as CheckedParameter
 from rigsight.check.remarks import Remark as Remark

@@ -19,6 +19,9 @@ from rigsight.simulate import compose, record_values, simulate
 
 Told = Literal["apart", "by size", "other motion", "never"]
 """Whether two effects can be told apart: here, depending on their size, by another motion, or not with these sensors."""
+Visible = Literal["yes", "at some sizes", "no"]
+"""Whether an effect shows beside the parameters: for most of its parameter values, for some, or for none."""
+_VISIBLE: Mapping[bool | None, Visible] = {True: "yes", None: "at some sizes", False: "no"}
 _OTHER = 3.0
 """Factor of the amplitude and of the speed of other motions."""
 _LONGEST = 600
@@ -48,7 +51,7 @@ class EffectMatrix:
     effects: tuple[str, ...] = ()
     families: tuple[Family, ...] = ()
     where: tuple[str, ...] = ()
-    visible: tuple[bool, ...] = ()
+    visible: tuple[Visible, ...] = ()
     told: tuple[tuple[Told, ...], ...] = ()
     motions: Mapping[tuple[int, int], str] = field(default_factory=dict)
     not_judged: tuple[str, ...] = ()
@@ -102,7 +105,7 @@ def effect_matrix(
         tuple(effect.name for effect in judged),
         tuple(effect.family for effect in judged),
         tuple(rig.where(effect) for effect in judged),
-        tuple(here.is_visible(i) for i in range(len(judged))),
+        tuple(_VISIBLE[here.is_visible(i)] for i in range(len(judged))),
         tuple(map(tuple, told)),
         motions,
         tuple(effect.name for effect in effects if effect.name not in named),

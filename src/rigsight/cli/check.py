@@ -85,7 +85,7 @@ def _summary(found: Check) -> Group:
             findings.add_row(remark.severity, escape(f"{remark.sentence} {remark.remedy}"))
     apart = Table("Effect", "Where", "Not told apart from", box=box.SIMPLE)
     for rival in rivals(found.matrix):
-        words = ["does not show beside the parameters"] if not rival.visible else []
+        words = [rival.visible] if rival.visible else []
         words += [f"{by}: {names}" for by, names in rival.others]
         apart.add_row(rival.effect, escape(rival.where), escape("; ".join(words)))
     alike = [f"Forms of {family} that are not told apart: {names}." for family, names in forms(found.matrix)]

@@ -53,9 +53,9 @@ class Separability:
     visible: Floats
     apart: Floats
 
-    def is_visible(self, i: int) -> bool:
-        """Return whether an effect shows for most of its parameter values."""
-        return bool(self.visible[i] >= _MOST)
+    def is_visible(self, i: int) -> bool | None:
+        """Return whether an effect shows beside the numbers of the equations for most of its values; None for some."""
+        return _of_most(self.visible[i])
 
     def are_apart(self, i: int, j: int) -> bool | None:
         """Return whether two effects differ for most of their values; None where they do for some.
@@ -66,7 +66,7 @@ class Separability:
         least = self.apart[i, j] if more > 0 else self.apart[j, i]
         if more == 0:
             least = min(self.apart[i, j], self.apart[j, i])
-        return True if least >= _MOST else False if least <= _FEW else None
+        return _of_most(least)
 
     @cached_property
     def _n_fitted(self) -> list[int]:
@@ -140,6 +140,10 @@ class Pushes:
             np.array([np.mean(shows[own]) for own in of_effect]),
             np.array([np.sum(differs[own], axis=0) for own in of_effect]).reshape(n, n) / n_shown[:, None],
         )
+
+
+def _of_most(share: float) -> bool | None:
+    return True if share >= _MOST else False if share <= _FEW else None
 
 
 def _of_motions(regression: Regression) -> Iterator[Floats]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rigsight.check import Check, EffectMatrix, Told
+from rigsight.check import Check, EffectMatrix, Told, Visible
 from rigsight.effects import kind_of
 from rigsight.report.labels import effect_label, listed, place_label
 from rigsight.report.render import rendered
@@ -16,6 +16,11 @@ TOLD_WORDS: Mapping[Told, str] = {
     "other motion": "only by another motion",
     "never": "not with these sensors",
 }
+VISIBLE_WORDS: Mapping[Visible, str] = {
+    "yes": "",
+    "at some sizes": "shows beside the parameters at some sizes only",
+    "no": "does not show beside the parameters",
+}
 _SIGNS: Mapping[Told, str] = {"apart": "", "by size": "~", "other motion": "+", "never": "="}
 
 
@@ -25,7 +30,7 @@ class Rivals:
 
     effect: str
     where: str
-    visible: bool
+    visible: str  # in words; empty where it shows for most sizes
     others: tuple[tuple[str, str], ...]  # what would tell them apart, and their names
 
 
@@ -70,10 +75,10 @@ def rivals(matrix: EffectMatrix) -> Iterator[Rivals]:
             if matrix.told[i][j] != "apart" and _family(matrix, i) != _family(matrix, j):
                 by = matrix.motions.get((max(i, j), min(i, j)), TOLD_WORDS[matrix.told[i][j]])
                 others.setdefault(by, []).append(short_label(matrix, j))
-        if others or not matrix.visible[i]:
+        if others or VISIBLE_WORDS[matrix.visible[i]]:
             named = tuple((by, listed(names)) for by, names in others.items())
             effect, where = effect_label(kind_of(matrix.effects[i])), matrix.where[i].replace("_", " ")
-            yield Rivals(effect, where, matrix.visible[i], named)
+            yield Rivals(effect, where, VISIBLE_WORDS[matrix.visible[i]], named)
 
 
 def forms(matrix: EffectMatrix) -> Iterator[tuple[str, str]]:
