@@ -25,6 +25,8 @@ _LONGEST = 2**16
 """Samples of a segment: longer ones resolve more than octaves need."""
 _TOP = 0.85
 """Share of the spectral lines above which no rig responds (an assumption)."""
+_HELD = 0.5
+"""Share of the samples that equal the one before from which a signal is held (a convention)."""
 _FEWEST_LINES = 8
 _SCATTER = 1.2
 """Standard deviation of the step of the logarithm of the power from line to line: that of noise is 1.81."""
@@ -117,8 +119,10 @@ def _channel(
 def _white_noise(samples: Floats) -> float:
     """Return the standard deviation of the white noise at the top of the spectrum; zero where a signal reaches up there.
 
-    The powers of lines of noise scatter, those of a sweep or a step do not.
+    The powers of lines of noise scatter, those of a sweep or a step do not. A signal that mostly stands still is a command.
     """
+    if np.mean(np.diff(samples) == 0.0) > _HELD:
+        return 0.0
     window = np.hanning(samples.size)
     lines = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2 / np.sum(window**2)
     # Lines next to each other share what the window lets through.

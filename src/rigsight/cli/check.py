@@ -47,7 +47,7 @@ def check(
 ) -> None:
     """Say in seconds what the records can show: their faults, the parameters they determine, the effects they tell apart.
 
-    Writes check.json and check.html into DIR.
+    CAMPAIGN may be a rig file: then a simulated sweep takes the place of records. Writes check.json and check.html into DIR.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.check import CHECK_FILE, CHECK_PAGE, run_check

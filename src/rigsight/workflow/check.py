@@ -12,8 +12,9 @@ from rigsight.effects import CATALOGUE, Effect
 from rigsight.report.check_page import render_check
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.campaign.without_records import campaign_of_rig, is_rig_file
 from rigsight.workflow.own.effect_names import candidates_of
-from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 
 CHECK_FILE, CHECK_PAGE = "check.json", "check.html"
@@ -31,14 +32,19 @@ def run_check(
 ) -> Check:
     """Return what the records of a campaign can show, and write it into a folder as check.json and check.html.
 
+    Of a rig file: what a simulated sweep of the rig would show.
+
     Raises
     ------
     InputError
-        If the campaign or one of its records cannot be read.
+        If the campaign or one of its records cannot be read, or a rig file leaves a number open.
     """
     if out is not None:
         check_writable(Path(out), CHECK_FILE, CHECK_PAGE)
-    found = check_of(read_campaign(campaign, own_effects, own_rigs), effects, listener)
+    path = Path(campaign)
+    read = campaign_of_rig(path) if is_rig_file(path) else read_campaign(path, own_effects, own_rigs)
+    report_notes(read.notes, listener)
+    found = check_of(read, effects, listener)
     if out is not None:
         write_together(Path(out), check_files(found, command))
     return found
