@@ -123,3 +123,26 @@ def test_what_cannot_be_compared_is_told(tmp_path: Path, run: Run) -> None:
         code, said, err = run("difference", *arguments, "--out", out)
         assert (code, said, told in err) == (2, "", True), err
     assert not out.exists()
+
+
+def test_campaigns_are_identified_and_compared(tmp_path: Path, run: Run) -> None:
+    folders = []
+    for number, damping in enumerate((5.0, 7.0)):
+        folder = tmp_path / f"unit_{number}"
+        folder.mkdir()
+        rng, t = np.random.default_rng(number), 0.01 * np.arange(1500)
+        lines = ['[rig]\nmodel = "axis"\n[rig.constants]\ngain = 1.0\n']
+        for i, amplitude in enumerate((2.0, 3.0)):
+            u = amplitude * linear_sweep(t, 1.0, 3.0, 50.0)
+            asked = Record("r", 0.01, {"u": u}, {"u": "N", "x": "m"})
+            x = simulate(compose(AXIS), {**VALUES, "d": damping}, asked)["x"] + rng.normal(0.0, 2e-5, t.size)
+            np.savetxt(
+                folder / f"{i}.csv", np.column_stack([t, u, x]), delimiter=",", header="t,u,x", comments=""
+            )
+            lines.append(f'[[records]]\nfile = "{i}.csv"\nrole = "estimation"\n')
+        (folder / "campaign.toml").write_text("".join(lines))
+        folders.append(folder)
+    code, stdout, stderr = run("difference", *folders, "-o", tmp_path / "out", "--json", "-j", "1")
+    assert code == 0, stderr
+    changed = [row["name"] for row in json.loads(stdout)["numbers"] if row["verdict"] == "changed"]
+    assert changed == ["d"]

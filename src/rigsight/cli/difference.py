@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet, ResultsFolder
+from rigsight.cli.options import Debug, Jobs, Json, OwnEffects, OwnRigs, Quiet, ResultsFolder
 from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.errors import InputError
+from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 def difference(
     diagnoses: Annotated[
         list[Path],
-        typer.Argument(metavar="A B...", help="Folders that 'rigsight diagnose' wrote, in their order."),
+        typer.Argument(
+            metavar="A B...", help="Folders that 'rigsight diagnose' wrote, or campaigns, in their order."
+        ),
     ],
     out: ResultsFolder = Path("difference"),
     at: Annotated[
@@ -35,15 +38,16 @@ def difference(
     ] = None,
     effects: OwnEffects = None,
     rigs: OwnRigs = None,
+    jobs: Jobs = None,
     json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Show which numbers changed between diagnoses of units, dates or temperatures, and which only look changed.
+    """Show which numbers changed between units, dates or temperatures, and which only look changed.
 
-    Writes difference.json and a picture into DIR.
+    Each is the folder of a diagnosis, or a campaign, whose rig is then identified. Writes difference.json and a picture into DIR.
     """
-    with report_errors(debug):
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.difference import DIFFERENCE_FILE, PICTURE_FILE, run_difference
         from rigsight.workflow.own.own_effects import own_effects
         from rigsight.workflow.own.own_rigs import own_rigs
@@ -54,6 +58,8 @@ def difference(
             at=None if at is None else _values(at),
             own_effects=own_effects(effects or [], check=False),
             own_rigs=list(own_rigs(rigs or []).values()),
+            n_jobs=jobs,
+            listener=listener,
         )
     if json:
         show_json(out / DIFFERENCE_FILE)

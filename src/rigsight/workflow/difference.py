@@ -1,4 +1,4 @@
-"""The work of `rigsight difference`: two or more diagnoses -> `difference.json` and a picture; which numbers changed?"""
+"""The work of `rigsight difference`: diagnoses or campaigns -> `difference.json` and a picture; which numbers changed?"""
 
 from __future__ import annotations
 
@@ -13,12 +13,18 @@ import numpy as np
 from rigsight.diagnose.trust.patterns import Role
 from rigsight.effects import Effect, Family
 from rigsight.errors import InputError
+from rigsight.identify.record_identification import EstimationOptions
 from rigsight.json_data import json_data
 from rigsight.plot import GroupPanel, parameters_by_group, png_bytes
 from rigsight.rigs import Rig
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.differing.identified import unit_of_records
 from rigsight.workflow.differing.rows import FALSE_ALARMS, Row, Verdict, rows_of
-from rigsight.workflow.differing.units import Unit, read_units
-from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.differing.units import Unit, read_unit, refuse_other_rigs
+from rigsight.workflow.identification.rig import identify_rig
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress import Listener, silent
+from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, write_together
 
 SCHEMA_VERSION = 1
 DIFFERENCE_FILE, PICTURE_FILE = "difference.json", "difference.png"
@@ -113,17 +119,29 @@ def run_difference(
     at: Sequence[float] | None = None,
     own_effects: Sequence[Effect] = (),
     own_rigs: Sequence[Rig] = (),
+    n_jobs: int | None = None,
+    listener: Listener = silent,
 ) -> Difference:
-    """Compare the numbers of two or more diagnoses of one rig."""
+    """Compare the numbers of two or more diagnoses or campaigns of one rig; a campaign is identified first."""
+    jobs = checked_jobs(n_jobs)
     if len(folders) < 2:
-        raise InputError(f"A difference needs at least two diagnoses, got {len(folders)}.")
+        raise InputError(f"A difference needs at least two diagnoses or campaigns, got {len(folders)}.")
     if at is not None and len(at) != len(folders):
         raise InputError(f"--at gives {len(at)} values for {len(folders)} diagnoses; give one for each.")
     if at is not None and (len(folders) < 3 or not np.ptp(at) > 0.0):
         raise InputError("--at is the axis of a trend: it needs three or more diagnoses at different values.")
     if out is not None:
         check_writable(Path(out), DIFFERENCE_FILE, PICTURE_FILE)
-    units = read_units([Path(folder) for folder in folders], own_effects, own_rigs)
+
+    def unit(path: Path) -> Unit:
+        if not _is_campaign(path):
+            return read_unit(path, own_effects, own_rigs)
+        campaign = read_campaign(path, own_effects, own_rigs)
+        identification = identify_rig(campaign, EstimationOptions(), jobs, listener)
+        return unit_of_records(str(path), campaign, identification)
+
+    units = [unit(Path(folder)) for folder in folders]
+    refuse_other_rigs(units)
     along = tuple(at) if at is not None else tuple(map(float, range(len(units))))
     found = Difference(tuple(units), along, rows_of(units, along))
     if out is not None:
@@ -132,6 +150,11 @@ def run_difference(
             files[PICTURE_FILE] = png_bytes(parameters_by_group(panels), _DPI)
         write_together(Path(out), files)
     return found
+
+
+def _is_campaign(path: Path) -> bool:
+    """Return whether a path is a campaign and no folder of a diagnosis."""
+    return path.is_file() or ((path / "campaign.toml").is_file() and not (path / DIAGNOSIS_FILE).is_file())
 
 
 def _panels(found: Difference) -> list[GroupPanel]:

@@ -18,7 +18,7 @@ from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import json_object, read_model
 from rigsight.workflow.run.results import DIAGNOSIS_FILE
 
-_MEND = "Name folders that 'rigsight diagnose' wrote."
+_MEND = "Name folders that 'rigsight diagnose' wrote, or campaigns."
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -94,20 +94,18 @@ class _Diagnosis(BaseModel):
     trust: _Trust | None
 
 
-def read_units(folders: Sequence[Path], own_effects: Iterable[Effect], own_rigs: Iterable[Rig]) -> list[Unit]:
-    """Return what each diagnosis found, with names of their own, and refuse those of different rigs."""
-    effects, rigs = tuple(own_effects), tuple(own_rigs)
-    found = [_unit(folder, effects, rigs) for folder in folders]
-    for other in found[1:]:
-        if other.rig != found[0].rig:
+def refuse_other_rigs(units: Sequence[Unit]) -> None:
+    """Raise InputError for units of different rigs."""
+    for other in units[1:]:
+        if other.rig != units[0].rig:
             raise InputError(
-                f"{found[0].name} is of the rig '{found[0].rig}', {other.name} of '{other.rig}': only diagnoses of one rig "
-                "can be compared."
+                f"{units[0].name} is of the rig '{units[0].rig}', {other.name} of '{other.rig}': only those of one rig can be "
+                "compared."
             )
-    return found
 
 
-def _unit(folder: Path, own_effects: Iterable[Effect], own_rigs: Iterable[Rig]) -> Unit:
+def read_unit(folder: Path, own_effects: Iterable[Effect], own_rigs: Iterable[Rig]) -> Unit:
+    """Return what a diagnosis found, by its folder."""
     file = folder / DIAGNOSIS_FILE
     if not file.is_file():
         raise InputError(f"{folder} contains no {DIAGNOSIS_FILE}. {_MEND}")

@@ -1,0 +1,49 @@
+"""What do the records of a unit give? Numbers of an identification with their errors and their scatter between records."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigsight.campaign import Campaign
+from rigsight.compare.random_effects import Prediction
+from rigsight.diagnose.trust.patterns import roles
+from rigsight.identify.identification import Identification
+from rigsight.simulate import compose
+from rigsight.workflow.differing.units import Known, Unit
+
+
+def unit_of_records(name: str, campaign: Campaign, identification: Identification) -> Unit:
+    """Return what the records of a campaign give by an identification of its rig.
+
+    Parameters
+    ----------
+    name
+        Of the unit.
+    campaign
+        Its records and rig.
+    identification
+        One set for all records, and a fit of each alone.
+    """
+    structure = compose(campaign.rig, campaign.modelled)
+    families = {
+        structure.parameter_name(effect, p.name): effect.family
+        for effect in structure.effects
+        for p in effect.parameters
+    }
+    joint = identification.joint
+    return Unit(
+        name,
+        campaign.rig.name,
+        structure.effect_names,
+        {number: _known(number, identification) for number in joint.names},
+        {number: identification.units[number] for number in joint.names},
+        {**roles(structure.rig, []), **families},
+    )
+
+
+def _known(name: str, identification: Identification) -> Known:
+    fit = identification.joint.fit
+    alone = [(kind.fit.values[name], kind.fit.standard_errors.get(name, np.inf)) for kind in fit.kinds]
+    alone = [(value, error**2) for value, error in alone if 0.0 < error < np.inf]
+    between = Prediction.of(*map(np.array, zip(*alone, strict=True))).between if len(alone) > 1 else 0.0
+    return Known(fit.fit.values[name], fit.fit.standard_errors[name], between, len(alone), ())
