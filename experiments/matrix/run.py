@@ -27,7 +27,7 @@ from rigsight_bench.trials.trial import Trial
 
 PER_ANSWER = 3
 """Rivals of each trial for each answer of the matrix."""
-ANSWERS = ("apart", "by size", "other motion", "never")
+ANSWERS = ("apart", "by size", "other motion", "alike")
 
 
 def rivals(

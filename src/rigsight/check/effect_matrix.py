@@ -17,8 +17,8 @@ from rigsight.inverse.separability import Pushes
 from rigsight.records import Record
 from rigsight.simulate import compose, record_values, simulate
 
-Told = Literal["apart", "by size", "other motion", "never"]
-"""Whether two effects can be told apart: here, depending on their size, by another motion, or not with these sensors."""
+Told = Literal["apart", "by size", "other motion", "alike"]
+"""Whether two effects can be told apart: here, for some sizes, by another motion; or they push alike to what laws err."""
 Visible = Literal["yes", "at some sizes", "no"]
 """Whether an effect shows beside the parameters: for most of its parameter values, for some, or for none."""
 _VISIBLE: Mapping[bool | None, Visible] = {True: "yes", None: "at some sizes", False: "no"}
@@ -98,7 +98,7 @@ def effect_matrix(
         terms_of, _other_motions(campaign, records, terms_of.values), judged, alike
     )
     for i, j in alike:
-        answer: Told = "by size" if here.are_apart(i, j) is None else "never"
+        answer: Told = "by size" if here.are_apart(i, j) is None else "alike"
         told[i][j] = told[j][i] = "other motion" if (i, j) in motions else answer
     named = {effect.name for effect in judged}
     return EffectMatrix(

@@ -14,14 +14,14 @@ TOLD_WORDS: Mapping[Told, str] = {
     "apart": "told apart by these records",
     "by size": "depends on their size",
     "other motion": "only by another motion",
-    "never": "not with these sensors",
+    "alike": "alike to 5 %, what laws of real rigs err",
 }
 VISIBLE_WORDS: Mapping[Visible, str] = {
     "yes": "",
     "at some sizes": "shows beside the parameters at some sizes only",
     "no": "does not show beside the parameters",
 }
-_SIGNS: Mapping[Told, str] = {"apart": "", "by size": "~", "other motion": "+", "never": "="}
+_SIGNS: Mapping[Told, str] = {"apart": "", "by size": "~", "other motion": "+", "alike": "="}
 
 
 @dataclass(frozen=True)
