@@ -15,6 +15,7 @@ from rigsight.inverse.effect_terms import EffectTerms
 from rigsight.inverse.propose import along_motion
 from rigsight.inverse.separability import Pushes
 from rigsight.records import Record
+from rigsight.records.signals import is_constant
 from rigsight.simulate import compose, record_values, simulate
 
 Told = Literal["apart", "by size", "other motion", "alike"]
@@ -145,6 +146,8 @@ def _other_motions(
     liveliest = max(records, key=lambda r: float(np.var(r[sensor])) if sensor in r else 0.0)
     record = liveliest.slice(0, _LONGEST)
     inputs = [signal.name for signal in rig.inputs]
+    if all(is_constant(record[name]) for name in inputs):
+        return []  # A free motion has no other amplitude that an input would give it.
     mean = {name: float(np.mean(record[name])) for name in inputs}
 
     def scaled(factor: float, around: float = 1.0) -> dict[str, np.ndarray]:
