@@ -24,13 +24,15 @@ _WARNING = "Warning: "
 _NOISY_INPUT = 0.02
 """Noise of an input over its standard deviation from which estimates suffer, most at high frequencies (a convention)."""
 _LASTS = 0.995
-"""RMS of the last third of a free motion over that of the third before from which it does not decay."""
+"""RMS of the last third of a free motion over that of the third before from which it does not decay (an assumption): a rig that
+is damped so weakly is called the same."""
 _UNSTABLE = 1e-6
 """Real part of a pole over its size below which it is rounding."""
 _PAST = 12
-"""Samples of the past that predict an input."""
+"""Samples of the past that predict an input (an assumption): a controller of some rows reacts within them."""
 _BETTER = 0.8
-"""Share of the squared error of this prediction that is left with the past of the readings from which they act on the input."""
+"""Share of the squared error of this prediction that is left with the past of the readings, below which they act on the input (an
+assumption)."""
 
 
 @dataclass(frozen=True)

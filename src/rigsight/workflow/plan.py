@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -19,6 +17,7 @@ from rigsight.plot import planned_experiment, png_bytes, svg_text
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import json_object
 from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.campaign.without_records import is_rig_file
 from rigsight.workflow.own.effect_names import effect_on
 from rigsight.workflow.run.progress import Listener, Stage, silent
 from rigsight.workflow.run.record_csv import csv_text
@@ -84,7 +83,11 @@ def run_plan(
             "Give the rivals: either --diagnosis DIR, the results of 'rigsight diagnose', or --rivals NAME,NAME. "
             "'rigsight check' lists the effects that the records do not tell apart."
         )
-    _refuse_rig_file(Path(campaign))
+    if is_rig_file(Path(campaign)):
+        raise InputError(
+            f"{campaign} is the file of a rig. A plan needs a campaign with at least one record, which gives the rivals their "
+            "sizes. Before there is one, 'rigsight check' says of a rig file what its sensors could show."
+        )
     read = read_campaign(campaign, own_effects, own_rigs)
     known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
     asked = read_limits(read.rig, limits)
@@ -109,19 +112,6 @@ def run_plan(
             },
         )
     return plan
-
-
-def _refuse_rig_file(path: Path) -> None:
-    """Refuse the file of a rig without records: its rivals have no sizes yet."""
-    if not path.is_file():
-        return
-    with contextlib.suppress(OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        if "records" not in tables and {"name", "coordinates"} <= tables.keys():
-            raise InputError(
-                f"{path} is the file of a rig. A plan needs a campaign with at least one record, which gives the rivals their "
-                "sizes; what to record first is in docs/planning.md."
-            )
 
 
 def _listed(campaign: Campaign, text: str, known: Mapping[str, Effect]) -> list[Named]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ from rigsight.errors import InputError, SimulationError
 from rigsight.excitation import log_sweep
 from rigsight.records import Record
 from rigsight.rigs import Rig, read_rig_file
-from rigsight.rigs.reading.toml_places import toml_tables
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.linearization import linearize
 
@@ -27,10 +27,11 @@ _NOISE = 1e-3
 
 
 def is_rig_file(path: Path) -> bool:
-    """Return whether a file declares a rig and is no campaign."""
-    if not path.is_file() or path.suffix != ".toml":
+    """Return whether a file declares a rig and is no campaign; what cannot be read is left to who reads the campaign."""
+    try:
+        tables = tomllib.loads(path.read_text("utf-8-sig"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
         return False
-    tables = toml_tables(path.read_text("utf-8-sig"), str(path))
     return "sensors" in tables and not {"rig", "records"} & tables.keys()
 
 
