@@ -25,7 +25,7 @@ Visible = Literal["yes", "at some sizes", "no"]
 _VISIBLE: Mapping[bool | None, Visible] = {True: "yes", None: "at some sizes", False: "no"}
 _OTHER = 3.0
 """Factor of the amplitude and of the speed of other motions."""
-_LONGEST = 600
+_LONGEST = 1500
 """Samples of each other motion."""
 
 
@@ -146,23 +146,26 @@ def _other_motions(
     liveliest = max(records, key=lambda r: float(np.var(r[sensor])) if sensor in r else 0.0)
     record = liveliest.slice(0, _LONGEST)
     inputs = [signal.name for signal in rig.inputs]
-    if all(is_constant(record[name]) for name in inputs):
-        return []  # A free motion has no other amplitude that an input would give it.
     mean = {name: float(np.mean(record[name])) for name in inputs}
 
     def scaled(factor: float, around: float = 1.0) -> dict[str, np.ndarray]:
         return {name: around * mean[name] + factor * (record[name] - mean[name]) for name in inputs}
 
-    asked = {
+    both_ways = record.with_signals(**scaled(_OTHER, around=0.0))
+    # Where an input has one sign only, three times its amplitude reverses it as well.
+    has_one_sign = any(float(np.min(record[n]) * np.max(record[n])) >= 0.0 for n in inputs)
+    asked = ({"a motion in both directions": both_ways} if has_one_sign else {}) | {
         "a larger amplitude": record.with_signals(**scaled(_OTHER)),
         "a smaller amplitude": record.with_signals(**scaled(1.0 / _OTHER)),
         "a faster motion": replace(record, dt=record.dt / _OTHER),
-        "a motion in both directions": record.with_signals(**scaled(_OTHER, around=0.0)),
     }
     found = []
     for what, moved in asked.items():
         try:
-            found.append((what, simulate(structure, record_values(structure, values, moved), moved)))
+            run = simulate(structure, record_values(structure, values, moved), moved)
         except SimulationError:
             continue
+        # Where no input moves the rig, it rests.
+        if not all(is_constant(run[signal.name]) for signal in rig.outputs):
+            found.append((what, run))
     return found
