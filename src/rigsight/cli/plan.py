@@ -85,7 +85,7 @@ def _summary(found: Plan) -> Group:
     from rich.markup import escape
     from rich.table import Table
 
-    rivals = Table("Rival", "Probability now", "Left when fitted again", box=box.SIMPLE)
+    rivals = Table("Rival", "Probability now", "Residual when fitted again", box=box.SIMPLE)
     for one in found.rivals:
         rivals.add_row(escape(one.effects), f"{one.probability:.2f}", f"{one.rms_left:.3g} errors")
     limits = Table("Signal", "Limit", "Largest predicted", box=box.SIMPLE)

@@ -151,7 +151,7 @@ def _draw_groups(ax: Axes, panel: GroupPanel) -> None:
     ax.set_ylim(len(panel.groups) - 0.4, -0.6)
     ax.set_title(f"{with_unit(panel.name, scale.unit)} by {panel.by}")
     ax.margins(x=0.08)
-    ax.xaxis.set_major_locator(MaxNLocator(4))
+    ax.xaxis.set_major_locator(MaxNLocator(2))
     # The offset text would be away from the values it belongs to.
     ax.ticklabel_format(axis="x", useOffset=False)
     ax.tick_params(axis="y", length=0)

@@ -63,8 +63,8 @@ def planned_experiment(plan: Plan) -> Figure:
         left.axhspan(-2.0, 2.0, color=OTHER, alpha=0.3, lw=0.0)
         readings.set_ylabel(with_unit(name, unit))
         readings.set_title("Readings that each rival predicts with the numbers so far")
-        left.set_ylabel(f"left of {name} [errors]")
-        left.set_title("What the other rivals leave of them when fitted again; gray: 2 errors")
+        left.set_ylabel(f"residual of {name} [errors]")
+        left.set_title("Residual of the other rivals, fitted again; gray: 2 standard errors")
         if name == outputs[0]:
             readings.legend(ncols=len(plan.rivals), fontsize=8.0, loc="upper left")
             top = np.max(np.abs([factor * one.readings[name] for one in plan.rivals]))

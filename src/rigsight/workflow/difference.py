@@ -168,8 +168,10 @@ def _panels(found: Difference) -> list[GroupPanel]:
         weights = 1.0 / wide**2
         mean = float(weights @ np.array([own.value for own in known]) / np.sum(weights))
         error = 1.0 / math.sqrt(float(np.sum(weights)))
-        names = [unit.name for unit in found.units]
+        paths = [Path(unit.name) for unit in found.units]
+        short = [path.name for path in paths]
+        names = short if len(set(short)) == len(short) else [str(path) for path in paths]
         groups = tuple((name, own.value, own.with_scatter) for name, own in zip(names, known, strict=True))
         differs = row.verdict is Verdict.CHANGED
-        panels.append(GroupPanel(row.name, row.unit, "diagnosis", groups, (mean, error), differs))
+        panels.append(GroupPanel(row.name, row.unit, "unit", groups, (mean, error), differs))
     return panels
