@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.discover import RegressionData, known_terms
+from rigsight.discover import DiscoveryData, known_terms
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate
@@ -59,7 +59,7 @@ def _multisine(amplitude: float, seconds: float, rng: np.random.Generator) -> np
 
 
 @pytest.fixture(scope="session")
-def make_data() -> Callable[..., tuple[dict[str, float], RegressionData]]:
+def make_data() -> Callable[..., tuple[dict[str, float], DiscoveryData]]:
     """Return the true values and the data of an axis: sweeps of several amplitudes, and a multisine that is held out.
 
     Sweeps have the sample time `DT` unless another is given by their amplitude.
@@ -73,7 +73,7 @@ def make_data() -> Callable[..., tuple[dict[str, float], RegressionData]]:
         seed: int = 0,
         validation: bool = True,
         sample_times: Mapping[float, float] | None = None,
-    ) -> tuple[dict[str, float], RegressionData]:
+    ) -> tuple[dict[str, float], DiscoveryData]:
         rng = np.random.default_rng(seed)
         known = known_terms()
         structure = compose(AXIS, [known[name] for name in TRUTHS[truth].effects])
@@ -88,7 +88,7 @@ def make_data() -> Callable[..., tuple[dict[str, float], RegressionData]]:
                 structure, values, Record(name=name, dt=dt, signals={"u": u}, units={}, role=role)
             )
             records.append(record.with_signals(x=record["x"] + rng.normal(scale=noise, size=u.size)))
-        return values, RegressionData(Campaign("axis", AXIS, {"gain": 0.8}, {}, tuple(records)), {"x": noise})
+        return values, DiscoveryData(Campaign("axis", AXIS, {"gain": 0.8}, {}, tuple(records)), {"x": noise})
 
     return make
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.discover import Discovery, RegressionData, discover
+from rigsight.discover import Discovery, DiscoveryData, discover
 from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.selection import Selection, select
 from rigsight.effects import effect_named
@@ -20,8 +20,8 @@ from rigsight.records import Record
 from rigsight.rigs import ELEMENT, RUNNING_GEAR, Rig
 from rigsight.simulate import compose, simulate
 
-Make = Callable[..., tuple[dict[str, float], RegressionData]]
-Discovered = Callable[[str, float], tuple[dict[str, float], RegressionData, Discovery]]
+Make = Callable[..., tuple[dict[str, float], DiscoveryData]]
+Discovered = Callable[[str, float], tuple[dict[str, float], DiscoveryData, Discovery]]
 Z_MAX = 4.5
 """Standard errors by which an estimate may be off: one in 10^5 by chance."""
 
@@ -43,7 +43,7 @@ def discovered(make_data: Make) -> Discovered:
     """Return true values, data and discovery of an axis, discovered once for all tests of this file that look at it."""
 
     @cache
-    def found(truth: str, noise: float) -> tuple[dict[str, float], RegressionData, Discovery]:
+    def found(truth: str, noise: float) -> tuple[dict[str, float], DiscoveryData, Discovery]:
         values, data = make_data(truth, noise)
         return values, data, discover(data)
 
@@ -64,18 +64,12 @@ def test_support_and_coefficients_are_recovered(truth: str, noise: float, discov
     for term in found.kept:
         coefficients |= term.coefficients
         assert term.inclusion > 0.9
+        assert term.otherwise > found.held_out_error
     assert {"m", "d", "k"} <= set(coefficients)
     for name, coefficient in coefficients.items():
         assert abs(coefficient.value - values[name]) < Z_MAX * coefficient.std, name
         if noise <= 2e-5 and values[name] != 0.0:
             assert coefficient.value == pytest.approx(values[name], rel=tolerance), name
-    # Terms that are equally improbable stand in an order that does not change from run to run.
-    left_out = [(-term.inclusion, term.name) for term in found.terms if not term.kept]
-    assert left_out == sorted(left_out)
-    for term in found.terms:
-        if not term.kept:
-            assert term.inclusion < 0.5, term.name
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -91,7 +85,8 @@ def test_one_hysteresis_is_not_taken_for_the_other(
     found = discovered(truth, 2e-5)[2]
     assert [term.name for term in found.kept] == [there]
     assert found.held_out_error < 1.1
-    assert {term.name: term.inclusion for term in found.terms}.get(rival, 0.0) < 0.5
+    other = next(a for a in found.alternatives if a.terms == (rival,))
+    assert other.held_out > 1.5 * found.held_out_error
 
 
 @pytest.mark.slow
@@ -138,24 +133,6 @@ def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_data
 
 
 @pytest.mark.slow
-def test_the_full_form_finds_the_damper_among_the_terms(make_data: Make) -> None:
-    values, data = make_data("linear", 2e-5, seconds=5.0)
-    found = discover(data, "full")
-    inclusion = {term.name: term.inclusion for term in found.terms}
-    assert inclusion["d"] > 0.9
-    assert inclusion["k"] > 0.9
-    assert found.rig_parameters["d"].value == pytest.approx(values["d"], rel=1e-3)
-
-
-@pytest.mark.slow
-def test_points_give_the_same_equation_as_windows_where_noise_is_low(make_data: Make) -> None:
-    values, data = make_data("cubic", 2e-6, seconds=5.0)
-    found = discover(data, pointwise=True)
-    assert [term.name for term in found.kept] == ["cubic_stiffness"]
-    assert found.kept[0].coefficients["k_3"].value == pytest.approx(values["k_3"], rel=1e-3)
-
-
-@pytest.mark.slow
 def test_terms_that_the_records_cannot_tell_apart_are_named(discovered: Discovered) -> None:
     found = discovered("cubic", 2e-5)[2]
     assert any("gravity_pendulum" in warning for warning in found.warnings)
@@ -195,22 +172,22 @@ def test_equations_that_cannot_be_simulated_are_told(
 def test_a_chosen_equation_whose_score_stayed_rough_is_scored(
     make_data: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def rough(bench: Bench, progress: Callable[[str], None], about: Callable[..., Bench]) -> Selection:
-        selection = select(bench, progress, about)
+    def rough(*args: Any) -> Selection:
+        selection = select(*args)
         return replace(selection, best=replace(selection.best, residuals=np.zeros(0)))
 
     monkeypatch.setattr("rigsight.discover.discovery.select", rough)
     _, data = make_data("linear", 2e-5, seconds=5.0, validation=False)
     found = discover(data)
     assert found.held_out_error == pytest.approx(1.0, abs=0.1)
-    assert [run.record for run in found.runs] == list(found.held_out)
+    assert [run.record for run in found.runs] == [own.record for own in found.held_out]
 
 
 @pytest.mark.slow
 def test_without_validation_a_record_is_set_aside_and_this_is_said(make_data: Make) -> None:
     _, data = make_data("cubic", 2e-5, seconds=5.0, validation=False)
     found = discover(data)
-    assert found.held_out == ("sweep_0.6",)
+    assert [own.record for own in found.held_out] == ["sweep_0.6"]
     assert any("set aside" in warning for warning in found.warnings)
     assert [term.name for term in found.kept] == ["cubic_stiffness"]
 
@@ -261,7 +238,7 @@ def test_the_other_rigs_are_discovered_too(case: str, sweep: Callable[[float, fl
         record = simulate(structure, {**constants, **values}, driven)
         seen = {name: record[name] + rng.normal(scale=std, size=u.size) for name, std in noise.items()}
         records.append(record.with_signals(**seen))
-    found = discover(RegressionData(Campaign(case, rig, constants, {}, tuple(records)), noise))
+    found = discover(DiscoveryData(Campaign(case, rig, constants, {}, tuple(records)), noise))
     assert [term.name for term in found.kept] == [effect]
     coefficients = {**found.rig_parameters, **found.kept[0].coefficients}
     assert set(coefficients) == set(values) - {"A", "n"}

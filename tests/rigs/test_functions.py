@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rigsight.discover.linearized_motion import MotionEquations
 from rigsight.effects.symbols import derivative
 from rigsight.errors import InputError
 from rigsight.export.fixed_step import internal_step
@@ -97,7 +96,6 @@ def test_a_force_made_of_every_function_can_be_identified_discovered_and_exporte
     p = np.array([VALUES[name] for name in structure.names])
     assert np.all(np.isfinite(slope_functions(structure).at(np.zeros(2), np.zeros(1), p).states))
     assert not can_drift(own, VALUES)
-    MotionEquations(structure, FREE)
     assert 0.0 < internal_step(Model(structure, VALUES, "foh")) < 0.1
 
 

@@ -13,9 +13,8 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.cli import app
-from rigsight.discover import MONOMIALS, RegressionData
+from rigsight.discover import MONOMIALS, DiscoveryData
 from rigsight.effects import effect_named
-from rigsight.errors import InputError
 from rigsight.identify.fit.windows import cut
 from rigsight.records import Record
 from rigsight.records.record import Role
@@ -23,7 +22,7 @@ from rigsight.rigs import AXIS
 from rigsight.simulate import compose
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.discover import only, regression_data, run_discover
+from rigsight.workflow.discover import discover_campaign, only, run_discover
 from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
@@ -35,7 +34,7 @@ def test_a_discovery_is_written_whole_and_its_model_simulates(axis_campaign: Pat
     assert {path.name for path in out.iterdir()} == {"discovery.json", "model.json", "discovery.svg"}
     written = json.loads((out / "discovery.json").read_text())
     assert written == json.loads(json.dumps(found.to_json()))
-    assert written["schema_version"] == 1
+    assert written["schema_version"] == 2
     kept = [term for term in written["terms"] if term["kept"]]
     assert [term["name"] for term in kept] == ["cubic_stiffness"]
     k_3 = kept[0]["coefficients"]["k_3"]
@@ -68,23 +67,18 @@ def test_a_record_alone_is_not_joined_by_one_whose_name_begins_alike() -> None:
         return Record(name, 0.01, {"u": np.sin(t), "x": np.cos(t)}, {}, role=role)
 
     whole = (named("sine_1"), named("sine_10"), named("other", "validation"))
-    data = RegressionData(Campaign("axis", AXIS, {"gain": 1.0}, {}, whole), {"x": 1e-3})
+    data = DiscoveryData(Campaign("axis", AXIS, {"gain": 1.0}, {}, whole), {"x": 1e-3})
     assert [r.name for r in only(data, whole[0]).records] == ["sine_1", "other"]
     cut_up = replace(data, windows=cut(whole, 1.0))
     assert {r.origin for r in only(cut_up, whole[0]).records} == {"sine_1", "other"}
     assert len(only(cut_up, whole[0]).records) == 6
 
 
-def test_an_unknown_method_is_told_with_those_allowed(axis_campaign: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"'fulll'.*Did you mean 'full'.*'discrepancy'"):
-        run_discover(axis_campaign, tmp_path / "out", method="fulll")
-    assert not (tmp_path / "out").exists()
-
-
-def test_effects_that_are_modelled_already_are_refused(axis_campaign: Path) -> None:
-    campaign = replace(read_campaign(axis_campaign), modelled=(effect_named("sensor_delay"),))
-    with pytest.raises(InputError, match=r"declares sensor_delay\. Leave them out of its effects"):
-        regression_data(campaign)
+def test_effects_that_are_modelled_already_stay_in_every_equation(axis_campaign: Path) -> None:
+    campaign = replace(read_campaign(axis_campaign), modelled=(effect_named("cubic_stiffness"),))
+    found = discover_campaign(campaign, n_jobs=1)
+    assert found.kept == ()
+    assert found.model["effects"] == ["cubic_stiffness"]
 
 
 @pytest.mark.slow

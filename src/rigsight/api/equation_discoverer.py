@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rigsight.api.base import CampaignEstimator, Result
 from rigsight.campaign import Campaign
 from rigsight.discover import Discovery
+from rigsight.effects import Effect
 from rigsight.errors import check_option
 from rigsight.plot.discovery import discovery_figure
 from rigsight.report.notebook import discovery_html
@@ -32,11 +33,8 @@ class EquationDiscoverer(CampaignEstimator):
 
     Parameters
     ----------
-    method
-        ``"discrepancy"``: the rig's own terms are kept and their residual is regressed. ``"full"``: the whole acceleration is
-        regressed.
-    pointwise
-        Regress sample by sample instead of in the weak form.
+    effects
+        Effects of the user, which are terms beside those of the catalogue.
     one_by_one
         Also discover on each estimation record alone.
     seed
@@ -57,7 +55,7 @@ class EquationDiscoverer(CampaignEstimator):
 
     References
     ----------
-    D. A. Messenger and D. M. Bortz, "Weak SINDy", Multiscale Model. Simul. 19 (2021) 1474. L. Boninsegna, F. Nueske and C.
+    J. Swevers, W. Verdonck and J. De Schutter, IEEE Control Systems 27 (2007) 58, for inverse dynamics as a regression. L. Boninsegna, F. Nueske and C.
     Clementi, J. Chem. Phys. 148 (2018) 241723, for stepwise sparse regression. U. Fasel et al., Proc. R. Soc. A 478 (2022)
     20210904, for inclusion probabilities.
 
@@ -73,16 +71,14 @@ class EquationDiscoverer(CampaignEstimator):
 
     def __init__(
         self,
-        method: str = "discrepancy",
-        pointwise: bool = False,
+        effects: Sequence[Effect] = (),
         one_by_one: bool = False,
         seed: int = 0,
         n_jobs: int | None = None,
         verbose: bool = False,
         rig: str | Rig | None = None,
     ) -> None:
-        self.method = method
-        self.pointwise = pointwise
+        self.effects = effects
         self.one_by_one = one_by_one
         self.seed = seed
         self.n_jobs = n_jobs
@@ -92,8 +88,7 @@ class EquationDiscoverer(CampaignEstimator):
     def _fit(self, campaign: Campaign, n_jobs: int, listener: Listener) -> DiscoveryResult:
         found = discover_campaign(
             campaign,
-            self.method,
-            pointwise=self.pointwise,
+            effects=self.effects,
             one_by_one=self.one_by_one,
             seed=self.seed,
             n_jobs=n_jobs,

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Campaign, Debug, Jobs, Json, OwnRigs, Quiet, ResultsFolder, Seed, Simulators
+from rigsight.cli.options import Campaign, Debug, Jobs, Json, OwnEffects, OwnRigs, Quiet, ResultsFolder, Seed, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.workflow.run.progress import listening
 
@@ -16,20 +16,10 @@ from rigsight.workflow.run.progress import listening
 def discover(
     campaign: Campaign,
     out: ResultsFolder = Path("discovery"),
-    method: Annotated[
-        str,
-        typer.Option(
-            "--method",
-            metavar="NAME",
-            help="discrepancy: regress the residual of the rig's own terms; full: regress the whole acceleration.",
-        ),
-    ] = "discrepancy",
-    pointwise: Annotated[
-        bool, typer.Option("--pointwise", help="Regress sample by sample instead of in the weak form.")
-    ] = False,
     one_by_one: Annotated[
         bool, typer.Option("--one-by-one", help="Also discover on each estimation record alone.")
     ] = False,
+    effects: OwnEffects = None,
     rigs: OwnRigs = None,
     simulator: Simulators = None,
     seed: Seed = 0,
@@ -44,14 +34,14 @@ def discover(
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.discover import run_discover
+        from rigsight.workflow.own.own_effects import own_effects
         from rigsight.workflow.own.own_rigs import own_rigs, own_simulators
 
         own_simulators(simulator or [])
         found = run_discover(
             campaign,
             out,
-            method=method,
-            pointwise=pointwise,
+            effects=own_effects(effects or [], listener=listener),
             one_by_one=one_by_one,
             own_rigs=own_rigs(rigs or []).values(),
             seed=seed,

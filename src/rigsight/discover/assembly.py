@@ -9,15 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import sympy as sp
 
-from rigsight.discover.bench import Trial
-from rigsight.discover.ensembles import Examined
-from rigsight.discover.monomials import known_terms
-from rigsight.discover.regression import STRONG, RegressionData, strength
-from rigsight.discover.result import RULED_OUT, Alternative, Coefficient, Discovery, JointForce, Run, Term
-from rigsight.discover.selection import Selection, criterion, next_terms
+from rigsight.discover.along_motion import AlongMotion
+from rigsight.discover.bench import Bench, Trial
+from rigsight.discover.records import DiscoveryData, strength
+from rigsight.discover.result import Alternative, Coefficient, Discovery, HeldOut, JointForce, Run, Term
+from rigsight.discover.selection import STRONG, Selection, criterion
+from rigsight.discover.terms import POWERS
 from rigsight.effects import Effect
-from rigsight.effects.placed import AT, kind_of
+from rigsight.effects.placed import kind_of
 from rigsight.identify import FitResult
+from rigsight.metrics import rms
 from rigsight.records.record import Floats, Record
 from rigsight.records.signals import same_signal
 from rigsight.simulate import Structure
@@ -67,7 +68,6 @@ def _rounded(equation: ShownEquation) -> ShownEquation:
     return replace(equation, left=short(equation.left), terms=terms, limit=limit, inertia=inertia)
 
 
-_SURE = 0.9
 _ZERO = 3.0
 _VAGUE = 0.05
 _FLOOR = 1.5
@@ -88,16 +88,16 @@ class Found:
     estimation: tuple[Record, ...]
     held_out: tuple[Record, ...]
     how: str
+    bench: Bench
     selection: Selection
-    chosen: Trial
     judged: Trial
     final: FitResult
-    examined: Examined
-    same: Mapping[str, list[str]]
+    along: AlongMotion | None
+    inclusion: Mapping[str, float]
     held: str
 
 
-def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, same: Sequence[str]) -> str:
+def doubts(effect: Effect, own: Mapping[str, Coefficient]) -> str:
     """Return the reasons to doubt a kept term; empty if there are none."""
     found = []
     for name, coefficient in own.items():
@@ -110,18 +110,12 @@ def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, sam
             found.append(f"{name} is not significantly different from zero")
         elif coefficient.std > _VAGUE * size:
             found.append(f"{name} is known to {100.0 * coefficient.std / size:.0f} % only")
-    if inclusion < _SURE:
-        found.append(f"sparse regression selects it in {100.0 * inclusion:.0f} % of the draws")
-    if same:
-        found.append(f"{' and '.join(same)} would fit equally well on these records")
     return "; ".join(found)
 
 
-def warnings_of(
-    data: RegressionData, stages: Found, terms: Sequence[Term], floor: float, likeliest: str
-) -> tuple[str, ...]:
+def warnings_of(data: DiscoveryData, stages: Found, terms: Sequence[Term], floor: float) -> tuple[str, ...]:
     """Return the warnings for the user, one sentence each."""
-    selection, chosen, force = stages.selection, stages.chosen, stages.examined.force
+    selection, chosen = stages.selection, stages.selection.best
     found = [note for note in (stages.how, stages.held) if note]
     sizes = [strength(data.rig, record) for record in stages.estimation]
     if max(sizes) < 1.2 * min(sizes):
@@ -150,54 +144,32 @@ def warnings_of(
     extra = sorted({name for trial in richer for name in trial.support - chosen.support})
     if extra:
         found.append(f"In doubt: {', '.join(extra)}. It lowers the held-out error, but not significantly.")
-    if floor > _NOISY and likeliest:
+    if floor > _NOISY:
         found.append(
             f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change the motion by "
-            f"less: every omitted term is in doubt. Regression would select {likeliest} next, which proves nothing at this noise "
-            f"level."
+            f"less: every omitted term is in doubt."
         )
-    found += _still_missing(stages.judged.error_over_noise)
-    found += _ruled_out(stages.examined.joints, {effect.at for effect in stages.final.structure.effects})
+    found += _still_missing(stages)
     unknown = [name for name, c in coefficients_of(stages.final).items() if not math.isfinite(c.std)]
     if unknown and data.rig.mechanism.joints[1:]:
         found.append(f"These records do not determine {', '.join(unknown)}.")
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
-    if force is not None:
-        fitted = {p.name for p in force.law.effect.parameters if p.fitted}
-        blind = [
-            parameter
-            for term, parameter in force.law.parameters.items()
-            if parameter in fitted and force.inclusion.get(term, 0.0) < _SURE
-        ]
-        if blind:
-            found.append(
-                f"The regressed equation of the hysteretic force does not show {' and '.join(blind)} of "
-                f"{force.law.effect.name} for sure; "
-                f"{'its' if len(blind) == 1 else 'their'} value comes from the free-run fit alone."
-            )
     return tuple(found)
 
 
-def _ruled_out(joints: Sequence[JointForce], own_joints: Collection[str | None]) -> list[str]:
-    """Return a warning about joints at which a force alone cannot explain the sensors; empty if terms act at several."""
-    least = min((joint.error_over_noise for joint in joints), default=0.0)
-    found = [joint.joint for joint in joints if joint.error_over_noise > RULED_OUT * least]
-    if not found or len(own_joints) > 1:
-        return []
-    first = joints[0]
-    return [
-        f"No force at {' or '.join(found)} alone explains the readings of all sensors; a force at {first.joint} explains them up "
-        f"to {first.error_over_noise:.2g} noise floors."
-    ]
-
-
-def _still_missing(error_over_noise: float) -> list[str]:
+def _still_missing(stages: Found) -> list[str]:
     """Return a warning about an error that the noise does not explain; empty if it does."""
-    if error_over_noise <= _FLOOR:
+    error = stages.judged.error_over_noise
+    if error <= _FLOOR:
         return []
+    outside = (
+        "No further term lowers it: what is missing is outside the library, or disturbances are larger than the noise floor. The "
+        "figure shows the force missing at each joint over its motion; a law read from it can be offered with --effects."
+        if stages.along is not None
+        else "An effect is still missing, or disturbances are larger than the noise floor."
+    )
     return [
-        f"The equations leave {error_over_noise:.1f} times the noise floor in free run on the held-out records: "
-        "an effect is still missing, or disturbances are larger than the noise floor."
+        f"The equations leave {error:.1f} times the noise floor in free run on the held-out records. {outside}"
     ]
 
 
@@ -252,40 +224,59 @@ def _one_amplitude(selection: Selection, chosen: Trial) -> str:
     )
 
 
-def assembled(data: RegressionData, method: str, form: str, found: Found) -> Discovery:
+def assembled(data: DiscoveryData, found: Found) -> Discovery:
     """Return the result of a discovery: equations, terms with their doubts, alternatives, free runs, model."""
     rig, selection, final, judged = data.rig, found.selection, found.final, found.judged
-    terms, force = _terms(found), found.examined.force
+    terms = _terms(found)
     error, floor = _relative(data, found)
-    likeliest = next(iter(next_terms(selection.bench, found.chosen.support)), "")
     text, latex = equations(final.structure, held_numbers(final))
     own = {p.name for p in rig.parameters}
+    runs = _runs(data, found)
     return Discovery(
         title=data.campaign.title,
         rig=rig.name,
-        method=method,
-        form=form,
         equations=text,
         latex=latex,
         rig_parameters={name: c for name, c in coefficients_of(final).items() if name in own},
         terms=terms,
         alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
-        force_equation={} if force is None else dict(force.inclusion),
-        held_out=tuple(record.name for record in found.held_out),
+        held_out=tuple(_held_out(data, record, runs) for record in found.held_out),
         held_out_error=judged.error_over_noise,
         held_out_nrmse=error,
         noise_floor=floor,
         independent=selection.independent,
-        runs=_runs(data, found),
+        runs=runs,
         output=rig.outputs[0].name,
         unit=rig.outputs[0].unit,
         model=Model.of(final.structure, final.values, found.estimation[0].hold).to_json(),
-        warnings=warnings_of(data, found, terms, floor, likeliest),
-        joints=found.examined.joints,
+        warnings=warnings_of(data, found, terms, floor),
+        joints=_joints(found),
     )
 
 
-def _relative(data: RegressionData, found: Found) -> tuple[float, float]:
+def _held_out(data: DiscoveryData, record: Record, runs: Sequence[Run]) -> HeldOut:
+    """Return the error of the free run of one record, RMS over its outputs."""
+    own = [run for run in runs if run.record == record.name]
+    errors = [rms(run.measured - run.simulated) for run in own]
+    over_noise = [error / data.noise[run.output] for error, run in zip(errors, own, strict=True)]
+    relative = [error / (float(np.std(run.measured)) or 1.0) for error, run in zip(errors, own, strict=True)]
+    return HeldOut(record.name, rms(np.array(over_noise)), rms(np.array(relative)))
+
+
+def _joints(found: Found) -> tuple[JointForce, ...]:
+    """Return the missing force of each joint, those with terms first."""
+    along, effects = found.along, found.final.structure.effects
+    if along is None:
+        return ()
+    joints = []
+    for joint in along.rig.mechanism.joints:
+        missing, law = along.missing(found.final, joint.name)
+        here = (e for e in effects if e not in found.bench.modelled and along.rig.acts_at(e) == joint.name)
+        joints.append(JointForce(missing, law, tuple(kind_of(effect.name) for effect in here)))
+    return tuple(sorted(joints, key=lambda own: (not own.terms, -own.missing.share)))
+
+
+def _relative(data: DiscoveryData, found: Found) -> tuple[float, float]:
     """Return held-out error and noise floor relative to the standard deviation of each output, RMS over the scored outputs."""
     errors, floors = [], []
     for column, name, floor in _scored(data, found):
@@ -296,7 +287,7 @@ def _relative(data: RegressionData, found: Found) -> tuple[float, float]:
     return math.hypot(*errors) / math.sqrt(len(errors)), math.hypot(*floors) / math.sqrt(len(floors))
 
 
-def _scored(data: RegressionData, found: Found) -> list[tuple[Floats, str, float]]:
+def _scored(data: DiscoveryData, found: Found) -> list[tuple[Floats, str, float]]:
     """Return the outputs with held-out errors: these in units of the noise floor, the name and the noise floor."""
     columns = zip(found.judged.residuals.T, found.judged.fit.structure.rig.outputs, strict=True)
     return [
@@ -313,24 +304,36 @@ def coefficients_of(fit: FitResult) -> dict[str, Coefficient]:
 
 
 def _terms(found: Found) -> tuple[Term, ...]:
-    structure, coefficients = found.final.structure, coefficients_of(found.final)
-    inclusion, rigs_own = found.examined.inclusion, found.selection.bench.own_terms
+    structure, coefficients, inclusion = found.final.structure, coefficients_of(found.final), found.inclusion
     terms = []
-    for name in rigs_own:
-        stays = name in coefficients
-        own = {name: coefficients[name]} if stays else {}
-        terms.append(Term(name, "The rig's own.", stays, inclusion.get(name, 0.0), own))
     for effect in structure.effects:
+        if effect in found.bench.modelled:
+            continue
         names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
         own = {name: coefficients[name] for name in names if name in coefficients}
-        share = inclusion.get(effect.name, 0.0)
-        doubt = doubts(effect, own, share, found.same.get(effect.name, []))
-        terms.append(Term(kind_of(effect.name), effect.summary, True, share, own, doubt, effect.at or ""))
-    known, kept = known_terms(), {*structure.effect_names, *rigs_own}
-    for name in sorted(set(inclusion) - kept, key=lambda n: (-inclusion[n], n)):
-        kind, _, place = name.partition(AT)
-        terms.append(Term(kind, known[kind].summary, False, inclusion[name], {}, where=place))
+        terms.append(_term(found, effect, own))
+    there = set(structure.effect_names)
+    tried = {name for trial in found.selection.trials for name in trial.support}
+    others = {*inclusion, *tried} - there
+    for name in sorted(others, key=lambda n: (found.selection.otherwise(n), -inclusion.get(n, 0.0), n)):
+        terms.append(_term(found, found.bench.effects[name]))
     return tuple(terms)
+
+
+def _term(found: Found, effect: Effect, own: Mapping[str, Coefficient] | None = None) -> Term:
+    """Return a term: with its coefficients one of the equation, else one that was offered."""
+    kind = kind_of(effect.name)
+    return Term(
+        name=kind,
+        summary=effect.summary,
+        kept=own is not None,
+        inclusion=found.inclusion.get(effect.name),
+        coefficients=own or {},
+        doubt=doubts(effect, own or {}),
+        where=effect.at or "",
+        family="" if kind in POWERS else str(effect.family),
+        otherwise=found.selection.otherwise(effect.name),
+    )
 
 
 def _alternative(trial: Trial, selection: Selection) -> Alternative:
@@ -339,7 +342,7 @@ def _alternative(trial: Trial, selection: Selection) -> Alternative:
     return Alternative(tuple(sorted(trial.support)), trial.n_free, trial.error_over_noise, aic, bic)
 
 
-def _runs(data: RegressionData, found: Found) -> tuple[Run, ...]:
+def _runs(data: DiscoveryData, found: Found) -> tuple[Run, ...]:
     """Return the free runs of the chosen model on the held-out records, one for each scored output."""
     ends = np.cumsum([record.n_samples for record in found.held_out])[:-1]
     units = {signal.name: signal.unit for signal in data.rig.outputs}

@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigsight.discover.library import Candidate
-from rigsight.discover.regression import Projected
-from rigsight.discover.support_starts import PlaceRegression, SupportStarts
+from rigsight.effects import Effect
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, free_names
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
@@ -60,17 +58,13 @@ class Attempt:
     """A support and the start of its fit."""
 
     support: Support  # names of the effects
+    starts: Sequence[Mapping[str, float]]  # values from which its fit starts; the best after a few evaluations goes on
     release: Release = frozenset()  # parameters that are not held at their special values
-    start: Mapping[str, float] | None = None  # start values; None for those of the regression
-    left_out: Support = frozenset()  # rig parameters that are held at their start values
-    # Cost of the fit of the same terms, if they have been scored already; infinite if that equation has other parameters. A
-    # new fit whose cost is not lower, or much higher than the best, is not scored. None if they have not been scored.
-    to_beat: float | None = None
 
     @property
-    def key(self) -> tuple[Support, Release, Support]:
+    def key(self) -> tuple[Support, Release]:
         """Key under which the trial is stored."""
-        return self.support, self.release, self.left_out
+        return self.support, self.release
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +90,7 @@ class Bench:
     """Data and settings with which every support is polished and scored."""
 
     rig: Rig  # of one motion: the rig without what follows the motion
-    # Records to fit and records to score, of one motion with the first output alone.
+    # Records to fit and records to score; of one motion with the first output alone.
     estimation: tuple[Record, ...]
     held_out: tuple[Record, ...]
     values: Mapping[str, float]  # constants, and parameters without any term as start values
@@ -104,56 +98,28 @@ class Bench:
     scales: Mapping[str, float]
     noise: Mapping[str, float]
     held: frozenset[str]  # parameters of the rig that are not fitted
-    candidates: Mapping[str, Candidate] = field(default_factory=dict)  # the library, by name
-    places: Sequence[PlaceRegression] = ()  # the regression at each joint, or on the only motion
-    about: FitResult | None = None  # the equation whose residual is regressed; None for that without any term
-    # Columns of the rig's own terms that compete (full form), by parameter.
-    own_terms: Mapping[str, Floats] = field(default_factory=dict)
+    effects: Mapping[str, Effect] = field(default_factory=dict)  # those offered as terms, by name
+    modelled: tuple[Effect, ...] = ()  # effects of the given simulation, in every equation
     # Threads that fit supports, and the records of a fit, in parallel.
     threads: IdleThreads = field(default_factory=IdleThreads)
     # The supports polished so far.
-    trials: dict[tuple[Support, Release, Support], Trial] = field(default_factory=dict)
-
-    @property
-    def starts(self) -> SupportStarts:
-        """Start values of the fit of a support."""
-        return SupportStarts(self.rig, self.values, self.candidates, self.places, self.about)
-
-    def sparse(self, projected: Projected) -> Projected:
-        """Return a regression without the competing terms among the columns that are projected out."""
-        if not self.own_terms:
-            return projected
-        kept = [
-            i
-            for i in range(projected.base.shape[1])
-            if not any(np.array_equal(projected.base[:, i], column) for column in self.own_terms.values())
-        ]
-        return replace(projected, base=projected.base[:, kept])
-
-    def column(self, name: str) -> Floats:
-        """Return the column of a term, one of the library or of the rig's own."""
-        return self.own_terms[name] if name in self.own_terms else self.candidates[name].column
+    trials: dict[tuple[Support, Release], Trial] = field(default_factory=dict)
 
     def structure(self, support: Support, release: Release = frozenset()) -> Structure:
         """Return the equations of a support; special values of its effects are inserted unless released."""
-        effects = [self.candidates[name].effect for name in sorted(support)]
-        names = unique_names(self.rig, tuple(effects))
+        effects = (*self.modelled, *(self.effects[name] for name in sorted(support)))
+        names = unique_names(self.rig, effects)
         fixed = {
             names[effect.name, own]: value
             for effect in effects
             for own, value in effect.special_cases.items()
             if (effect.name, own) not in release
-            and self.candidates[effect.name].inner.get(own, value) == value
         }
         return compose(self.rig, effects, fixed)
 
-    def free_parameters(self, structure: Structure, held: frozenset[str] = frozenset()) -> list[str]:
+    def free_parameters(self, structure: Structure) -> list[str]:
         """Return the parameters that a fit of a structure varies."""
-        return free_names(structure, {p.name for p in self.rig.parameters} - self.held - held)
-
-    def trial(self, attempt: Attempt) -> Trial:
-        """Polish a support and score it; an attempt that was made before is not repeated."""
-        return self.trials_of([attempt])[0]
+        return free_names(structure, {p.name for p in self.rig.parameters} - self.held)
 
     def trials_of(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
         """Polish supports in parallel and score them; an attempt that was made before is not repeated."""
@@ -163,29 +129,34 @@ class Bench:
         return [self.trials[attempt.key] for attempt in attempts]
 
     def shortened(self, supports: Sequence[Support], longer: Trial) -> list[Trial]:
-        """Polish supports once more, starting from the fitted values of a longer one, and keep the better of both fits.
+        """Polish supports from the fitted values of a longer one; of two fits of the same terms the better one is kept.
 
         Parameters that the longer one released from their special values are released here, too; those of terms that it lacks
         keep them.
         """
         moved = {(e.name, own) for e in longer.fit.structure.effects for own in e.special_cases}
         moved -= longer.fit.structure.special_cases
-        before = self.trials_of([Attempt(support) for support in supports])
         attempts = []
-        for support, first in zip(supports, before, strict=True):
-            special = {(n, own) for n in support for own in self.candidates[n].effect.special_cases}
-            release = frozenset(special & moved)
+        for support in supports:
+            release = frozenset((name, own) for name, own in moved if name in support)
             structure = self.structure(support, release)
-            start = {
-                **self.starts.regressed(structure, support),
-                **carried_over(longer.fit.values, longer.fit.structure, structure),
-            }
-            same = first.fit.structure.fixed == structure.fixed
-            attempts.append(
-                Attempt(support, release, start, to_beat=first.fit.cost if same else float("inf"))
-            )
-        pairs = zip(before, self._polished(attempts), strict=True)
-        return [again if again.error_over_noise < first.error_over_noise else first for first, again in pairs]
+            attempts.append(Attempt(support, [self.carried(longer.fit, structure)], release))
+        found = self._polished(attempts)
+        for attempt, trial in zip(attempts, found, strict=True):
+            known = self.trials.get(attempt.key)
+            if known is None or trial.error_over_noise < known.error_over_noise:
+                self.trials[attempt.key] = trial
+        return [self.trials[attempt.key] for attempt in attempts]
+
+    def carried(self, fit: FitResult, structure: Structure) -> dict[str, float]:
+        """Return the values of a fit for another structure; what it does not know is as at first, linear terms are zero."""
+        known = carried_over({**dict(fit.structure.fixed), **fit.values}, fit.structure, structure)
+        values = {**self.values, **known}
+        for effect in structure.effects:
+            for p in effect.linear_parameters:
+                if p.null is not None:
+                    values.setdefault(structure.parameter_name(effect, p.name), p.null)
+        return values
 
     def scored(self, support: Support, fit: FitResult) -> Trial:
         """Simulate the held-out records with a fit; only their initial states are estimated, to full precision."""
@@ -213,8 +184,7 @@ class Bench:
                     finish=False,
                     substeps=fit.substeps,
                 )
-            worth = float("inf") if attempt.to_beat is None else min(attempt.to_beat, hopeless)
-            return self._roughly_scored(attempt.support, fit, worth)
+            return self._roughly_scored(attempt.support, fit)
 
         rough = []
         for trial in self.threads.side_by_side(further, begun):
@@ -236,8 +206,9 @@ class Bench:
             GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
             for structure in structures
         ]
+        held = {name: self.values[name] for name in self.held if name in self.values}
         starts = [
-            [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
+            [_within_bounds(structure, {**start, **held}) for start in attempt.starts]
             for attempt, structure in zip(attempts, structures, strict=True)
         ]
         # Second starts come last: run together with the first one, they would only wait for the same kernel to be compiled.
@@ -250,7 +221,7 @@ class Bench:
 
         def looked(begin: tuple[int, Mapping[str, float]]) -> FitResult:
             number, start = begin
-            free = self.free_parameters(structures[number], attempts[number].left_out)
+            free = self.free_parameters(structures[number])
             return problems[number].fit(
                 start, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
             )
@@ -261,26 +232,9 @@ class Bench:
                 best[number] = fit
         return [(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
 
-    def _own_starts(self, attempt: Attempt, structure: Structure) -> list[dict[str, float]]:
-        """Return the start values from the regression, and those from the best fit of a support contained in this one.
-
-        Columns of a smoothed motion can be inaccurate: a fit that starts from them may end with a higher cost than one with
-        fewer terms.
-        """
-        starts = [self.starts.regressed(structure, attempt.support)]
-        contained = [
-            trial.fit
-            for (support, release, left_out), trial in self.trials.items()
-            if support < attempt.support and release == attempt.release and left_out == attempt.left_out
-        ]
-        best = min(contained, key=lambda fit: fit.cost, default=None)
-        if best is not None and np.isfinite(best.cost):
-            starts.append(self.starts.extended(structure, attempt.support, best))
-        return starts
-
-    def _roughly_scored(self, support: Support, fit: FitResult, to_beat: float = float("inf")) -> _RoughTrial:
+    def _roughly_scored(self, support: Support, fit: FitResult) -> _RoughTrial:
         problem = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise, threads=self.threads)
-        if not fit.cost < to_beat:
+        if not np.isfinite(fit.cost):
             return _RoughTrial(support, fit, problem, None)
         score = problem.fit(
             fit.values, [], max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
@@ -297,3 +251,13 @@ class Bench:
         errors = np.concatenate(score.residuals) / floors
         shown = errors[np.isfinite(errors)]
         return Trial(trial.support, trial.fit, float(np.sqrt(np.mean(shown**2))), errors)
+
+
+def _within_bounds(structure: Structure, values: Mapping[str, float]) -> dict[str, float]:
+    """Return start values of all parameters of a structure, within their bounds."""
+    known = {p.name: p.default for p in structure.parameters if p.default is not None} | dict(values)
+    return {
+        p.name: float(np.clip(known[p.name], p.lower, p.upper))
+        for p in structure.parameters
+        if p.name in known
+    }

@@ -1,21 +1,21 @@
-"""The whole discovery: records and a rig -> library, sparse regression, held-out selection, refitted equations."""
+"""The whole discovery: records and a rig -> regression along the motion, held-out selection, refitted equations."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
+from rigsight.discover.along_motion import AlongMotion
 from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
-from rigsight.discover.each_joint import EachJoint
-from rigsight.discover.one_motion import OneMotion
-from rigsight.discover.regression import STRONG, RegressionData, split
+from rigsight.discover.records import DiscoveryData, split
 from rigsight.discover.result import Discovery
-from rigsight.discover.selection import Selection, criterion, select
+from rigsight.discover.selection import select
+from rigsight.discover.terms import offered_terms
+from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import (
     FitResult,
@@ -24,51 +24,42 @@ from rigsight.identify import (
     characteristic_scales,
     linear_start,
     swallowed_by_offsets,
+    without_offsets,
 )
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, special_values
 
-Method = Literal["full", "discrepancy"]
-METHODS: tuple[Method, ...] = ("discrepancy", "full")
 _FINAL_EVALUATIONS = 150
 _CLEARLY_OFF = 3.0
 """Standard errors from its special value at which an exponent is released."""
 
 
 def discover(
-    data: RegressionData,
-    method: Method = "discrepancy",
-    pointwise: bool = False,
+    data: DiscoveryData,
+    own_effects: Sequence[Effect] = (),
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
     n_jobs: int = 1,
 ) -> Discovery:
     """Discover the governing equations of a rig from records.
 
-    The method ``"full"`` regresses the whole acceleration, where the rig's damper competes with every other term;
-    ``"discrepancy"`` keeps the rig's own terms and regresses their residual, the only form for a rig of several joints.
-    Point-wise rows, instead of the weak form, are not for such a rig either. The seed is that of the ensembles; the result is
-    the same with any number of jobs.
+    The rig's own terms are kept; what they leave of the force along the motion is regressed on the terms of all effects. The seed
+    is that of the ensembles; the result is the same with any number of jobs.
     """
     if not data.rig.mechanism.joints:
         raise InputError(
             f"The rig '{data.rig.name}' has no joint, so no force is missing in it. Use 'rigsight diagnose', which tries effects "
             "of its sensors."
         )
-    one_motion = data.rig.has_one_motion
-    if not one_motion and (method != "discrepancy" or pointwise):
-        raise InputError(
-            f"The rig '{data.rig.name}' has several joints: missing forces are found by regression on its responses, in the "
-            f"discrepancy form. The full form and point-wise rows are available only for rigs with one motion."
-        )
     say = progress or (lambda _: None)
-    threads = IdleThreads(n_jobs)
-    rng = np.random.default_rng(seed)
     estimation, held_out, how = split(data)
     values = _linear_values(data, estimation)
+    rig = data.rig.motion_alone() if data.rig.has_one_motion else data.rig
+    modelled = data.campaign.modelled
+    offered = [e for e in offered_terms(rig, own_effects) if e.name not in {m.name for m in modelled}]
     bench = Bench(
-        rig=data.rig.motion_alone() if one_motion else data.rig,
+        rig=rig,
         # Outputs that do not affect the motion would otherwise be simulated in every fit.
         estimation=tuple(_without_downstream(data.rig, record) for record in estimation),
         held_out=tuple(_without_downstream(data.rig, record) for record in held_out),
@@ -76,15 +67,19 @@ def discover(
         scales=characteristic_scales(data.rig, estimation, values),
         noise=data.noise,
         held=_held(data),
-        threads=threads,
+        effects={effect.name: effect for effect in offered},
+        modelled=modelled,
+        threads=IdleThreads(n_jobs),
     )
-    front = (
-        OneMotion.of(data, bench, method == "full", pointwise) if one_motion else EachJoint.of(data, bench)
-    )
-    say("library")
-    selection = select(front.begun, say, front.about)
-    bench = selection.bench
-    chosen = _without_damper(bench, selection, say)
+    bench = replace(bench, held=bench.held | _swallowed(bench))
+    along = _along(data, bench, bench.estimation, bench.values)
+    starts = [bench.values] if along is None else [bench.values, {**bench.values, **along.numbers}]
+    (linear,) = bench.trials_of([Attempt(frozenset(), starts)])
+    if math.isfinite(linear.fit.cost) and any(record.free_offsets for record in estimation):
+        along = _along(data, bench, without_offsets(bench.estimation, linear.fit), linear.fit.values)
+    say("regression along the motion")
+    selection = select(bench, linear, along, say)
+    chosen = selection.best
     final, held = _polished(data, bench, chosen)
     # A record that was set aside is used in the final fit too: it is unseen only for the selection of the equation.
     judged = chosen if how else bench.scored(chosen.support, final)
@@ -94,13 +89,34 @@ def discover(
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     say("polished")
-    examined = front.examined(bench, selection, final, rng)
+    inclusion = {} if along is None else along.inclusion(final, np.random.default_rng(seed))
     say("ensembles")
-    found = Found(estimation, held_out, how, selection, chosen, judged, final, examined, front.same, held)
-    return assembled(data, method, "pointwise" if pointwise else front.form, found)
+    return assembled(
+        data, Found(estimation, held_out, how, bench, selection, judged, final, along, inclusion, held)
+    )
 
 
-def _linear_values(data: RegressionData, estimation: Sequence[Record]) -> dict[str, float]:
+def _along(
+    data: DiscoveryData, bench: Bench, records: Sequence[Record], known: Mapping[str, float]
+) -> AlongMotion | None:
+    """Return the regression along the motion of the estimation records."""
+    campaign = replace(data.campaign, rig=bench.rig, records=tuple(records))
+    return AlongMotion.of(campaign, known, list(bench.effects.values()))
+
+
+def _swallowed(bench: Bench) -> frozenset[str]:
+    """Return the parameters that the records' offsets can replace."""
+    if not any(record.free_offsets for record in bench.estimation):
+        return frozenset()
+    structure = bench.structure(frozenset())
+    known = {name: bench.values[name] for name in structure.names if name in bench.values}
+    asked = [name for name in bench.free_parameters(structure) if name in known]
+    return frozenset(
+        swallowed_by_offsets(structure, bench.estimation, bench.scales, bench.noise, known, asked)
+    )
+
+
+def _linear_values(data: DiscoveryData, estimation: Sequence[Record]) -> dict[str, float]:
     known = {} if data.has_stiffness else {"k": 0.0}
     return {
         **data.campaign.constants,
@@ -108,7 +124,7 @@ def _linear_values(data: RegressionData, estimation: Sequence[Record]) -> dict[s
     }
 
 
-def _held(data: RegressionData) -> frozenset[str]:
+def _held(data: DiscoveryData) -> frozenset[str]:
     """Return parameters held during selection: those without effect on the motion, and constant force or rest position."""
     if not data.rig.has_one_motion:
         return frozenset({p.name for p in data.rig.parameters if not p.fitted} | {*data.held})
@@ -117,7 +133,10 @@ def _held(data: RegressionData) -> frozenset[str]:
     if data.rig.is_driven:
         # With a linear spring, a constant force and a shifted rest position cannot be distinguished.
         rest, bias = motion.rest.free_symbols, motion.bias.free_symbols
-        held |= {symbol.name for symbol in (bias if data.has_stiffness else rest)}
+        if not data.has_stiffness:
+            held |= {symbol.name for symbol in rest}
+        elif rest:
+            held |= {symbol.name for symbol in bias}
     if not data.has_stiffness:
         held.add(motion.stiffness.name)
     return frozenset(held)
@@ -127,31 +146,11 @@ def _without_downstream(rig: Rig, record: Record) -> Record:
     """Return a record without the outputs that do not affect the motion."""
     if not rig.has_one_motion:
         return record
-    keep = {rig.inputs[0].name, rig.outputs[0].name}
+    keep = {signal.name for signal in (*rig.inputs, *rig.motion_alone().outputs)}
     return replace(record, signals={name: s for name, s in record.signals.items() if name in keep})
 
 
-def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], None]) -> Trial:
-    """In the full form, leave out the rig's own damper if the held-out error does not rise significantly without it."""
-    chosen = selection.best
-    if not bench.own_terms:
-        return chosen
-    damping = bench.rig.motion.damping.name
-    special = {(e.name, own) for e in chosen.fit.structure.effects for own in e.special_cases}
-    without = bench.trial(
-        Attempt(
-            chosen.support,
-            release=frozenset(special - chosen.fit.structure.special_cases),
-            start={**chosen.fit.all_values, damping: 0.0},
-            left_out=frozenset({damping}),
-        )
-    )
-    say(f"without {damping}")
-    worse = criterion(without, selection.independent) - criterion(chosen, selection.independent)
-    return without if worse < STRONG else chosen
-
-
-def _polished(data: RegressionData, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
+def _polished(data: DiscoveryData, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
     """Fit the chosen structure once more to full precision, with all outputs and all estimation records.
 
     Special values (an exponent of 1) are released as well: if the fitted value clearly differs, the intervals of all other

@@ -7,15 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from rigsight.effects import Effect, kind_of
+import numpy as np
+
+from rigsight.inverse import MissingForce
 from rigsight.json_data import json_data
 from rigsight.records import Record
 from rigsight.records.record import Floats
 
-SCHEMA_VERSION = 1
-RULED_OUT = 3.0
-"""Factor over the smallest sensor residual (RMS) of all joints above which a force at a joint alone is not the cause."""
-
+SCHEMA_VERSION = 2
 
 @dataclass(frozen=True)
 class Coefficient:
@@ -39,10 +38,13 @@ class Term:
     name: str  # name of the effect
     summary: str  # its description in one sentence
     kept: bool  # true if it is part of the equation
-    inclusion: float  # share of resampled data sets in which sparse regression selects the term
+    inclusion: float | None  # share of resampled records in which sparse regression selects it; None if it did not compete
     coefficients: Mapping[str, Coefficient]  # its parameters; empty if it is not kept
     doubt: str = ""  # reasons to doubt the term; empty if there are none
     where: str = ""  # joint at which it acts; empty for a rig with one joint
+    family: str = ""  # as of a diagnosis; empty for a power of the motion
+    # Held-out error, in noise floors, of the equation without the term if it is kept, else with it; NaN if that was not tried.
+    otherwise: float = math.nan
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry of ``discovery.json``."""
@@ -53,6 +55,10 @@ class Term:
             "inclusion_probability": self.inclusion,
             "coefficients": {name: c.to_json() for name, c in self.coefficients.items()},
             "doubt": self.doubt,
+            "family": self.family or None,
+            "error_without_it" if self.kept else "error_with_it": self.otherwise
+            if math.isfinite(self.otherwise)
+            else None,
             **({"where": self.where} if self.where else {}),
         }
 
@@ -82,93 +88,57 @@ class Run:
     unit: str
 
 
-@dataclass(frozen=True, eq=False)
-class ForceTrace:
-    """The missing force of a joint along one record, shape (n_samples,) each."""
+@dataclass(frozen=True)
+class HeldOut:
+    """The free-run error on one held-out record, all outputs together."""
 
     record: str
-    t: Floats  # time [s]
-    displacement: Floats  # of the joint from its rest, as its velocity
-    velocity: Floats
-    force: Floats  # resists the joint
-    standard_error: Floats
-    law: Floats  # the force according to the law
-
-
-@dataclass(frozen=True, eq=False)
-class JointTerm:
-    """A term of the law of a missing force."""
-
-    effect: Effect  # at its joint
-    coefficients: Mapping[str, Coefficient]  # its parameters by their own names
-    inclusion: float | None  # as of `Term`; None if the term did not compete
-
-    @property
-    def text(self) -> str:
-        """The term in words, with its parameter values."""
-        kind = kind_of(self.effect.name).replace("_", " ")
-        numbers = ", ".join(f"{name} = {c.value:.3g} {c.unit}" for name, c in self.coefficients.items())
-        if self.effect.torque is None:
-            return f"that of {kind} ({numbers})"
-        shape = str(self.effect.torque).replace("**", "^").replace("*", " ")
-        return f"{shape} ({kind}: {numbers})"
+    error_over_noise: float  # in units of the noise floors
+    nrmse: float  # relative to the standard deviation of the measured outputs
 
     def to_json(self) -> dict[str, Any]:
-        """Return the entry of a file."""
+        """Return an entry of ``held_out.by_record``."""
         return {
-            "name": kind_of(self.effect.name),
-            "where": self.effect.at,
-            "coefficients": {
-                name: {"value": c.value, "std": c.std if math.isfinite(c.std) else None, "unit": c.unit}
-                for name, c in self.coefficients.items()
-            },
-            "inclusion_probability": self.inclusion,
+            "record": self.record,
+            "error_in_noise_floors": self.error_over_noise,
+            "nrmse": self.nrmse,
         }
 
 
 @dataclass(frozen=True, eq=False)
 class JointForce:
-    """The force missing at one joint.
+    """The force missing at one joint along the measured motion, beside the terms that the equation has elsewhere."""
 
-    At a joint with terms of the equation that beside its other terms, at any other joint the force if all that is missing acted
-    there alone.
-    """
+    missing: MissingForce
+    law: Floats  # what the terms of the equation at this joint give, at the samples of the force
+    terms: tuple[str, ...]  # their names
 
-    joint: str  # its name
-    x_unit: str  # of its motion
-    unit: str  # of the force
-    traces: tuple[ForceTrace, ...]  # force and motion, per record
-    # Share of the weighted square of the free-run errors without any term that the force explains; all sensors together.
-    share: float
-    # Remaining sensor residual, RMS in units of the noise floors; far above 1, a force at this joint alone is not the cause.
-    error_over_noise: float
-    standard_error: float  # RMS of that of the force
-    terms: tuple[JointTerm, ...]  # its law: the terms of the equation that act there
-    share_of_force: float  # of the force's mean square that they explain
-    # Of the best equation with terms at this joint alone, as the BIC of an alternative; None if there is none.
-    criterion: float | None
+    @property
+    def joint(self) -> str:
+        """Name of the joint."""
+        return self.missing.where
+
+    @property
+    def share_of_force(self) -> float:
+        """Share of the force's mean square that the law explains."""
+        whole = float(np.sum(self.missing.force**2))
+        left = float(np.sum((self.missing.force - self.law) ** 2))
+        return max(0.0, 1.0 - left / whole) if self.terms and whole > 0.0 else 0.0
 
     @property
     def sentence(self) -> str:
         """The finding in words."""
+        size = f"{self.missing.rms:.3g} {self.missing.unit}"
         if not self.terms:
-            remainder = f"{self.error_over_noise:.3g} times the noise floor"
-            return f"No term acts at {self.joint}: a force there alone would leave {remainder}."
-        reported = " and ".join(term.text for term in self.terms)
-        return (
-            f"The force missing at {self.joint} is best described by {reported}, which explains {self.share_of_force:.0%} (x and "
-            f"v of the joint)."
-        )
+            return f"No term acts at {self.joint}. What the equation leaves there: {size}, RMS."
+        law = " and ".join(name.replace("_", " ") for name in self.terms)
+        return f"Of the {size} (RMS) missing at {self.joint}, {law} explains {self.share_of_force:.0%}."
 
     def to_json(self) -> dict[str, Any]:
-        """Return the entry of a file, without the traces."""
+        """Return the entry of a file."""
         return {
-            "where": self.joint,
-            "share": self.share,
-            "error_in_noise_floors": self.error_over_noise,
-            "standard_error": {"value": self.standard_error, "unit": self.unit},
-            "criterion": self.criterion,
-            "terms": [term.to_json() for term in self.terms],
+            **self.missing.to_json(),
+            "terms": self.terms,
             "share_of_force": self.share_of_force,
             "sentence": self.sentence,
         }
@@ -180,10 +150,8 @@ class Discovery:
 
     Attributes
     ----------
-    title, rig, method
-        Title of the campaign, name of the rig, and method (``"full"`` or ``"discrepancy"``).
-    form
-        ``"weak"`` or ``"pointwise"``; ``"linearized responses"`` for a rig of several joints.
+    title, rig
+        Title of the campaign and name of the rig.
     equations, latex
         The equations as plain text and as LaTeX, one per state.
     rig_parameters
@@ -192,10 +160,8 @@ class Discovery:
         Terms of the equation first, then those that were offered.
     alternatives
         All supports that were polished, best first.
-    force_equation
-        Inclusion probability of each term in the equation of the hysteretic force; empty if there is no such force.
     held_out
-        Names of the records by which supports were selected.
+        Error on each record by which supports were selected.
     held_out_error
         Free-run error on these records in units of the noise floor.
     held_out_nrmse, noise_floor
@@ -211,7 +177,7 @@ class Discovery:
     warnings
         Warnings before the equations are used, one sentence each.
     joints
-        Missing force per joint, with the joint of the equation first; empty for a rig with one joint.
+        Missing force per joint, those with terms first; empty where the sensors do not show the motion.
     by_record
         Result for each record alone, or the reason why there is none; empty unless requested.
     given
@@ -222,15 +188,12 @@ class Discovery:
 
     title: str
     rig: str
-    method: str
-    form: str
     equations: tuple[str, ...]
     latex: tuple[str, ...]
     rig_parameters: Mapping[str, Coefficient]
     terms: tuple[Term, ...]
     alternatives: tuple[Alternative, ...]
-    force_equation: Mapping[str, float]
-    held_out: tuple[str, ...]
+    held_out: tuple[HeldOut, ...]
     held_out_error: float
     held_out_nrmse: float
     noise_floor: float
@@ -256,8 +219,6 @@ class Discovery:
             "schema_version": SCHEMA_VERSION,
             "title": self.title,
             "rig": self.rig,
-            "method": self.method,
-            "form": self.form,
             "equations": self.equations,
             "latex": self.latex,
             "rig_parameters": {
@@ -266,9 +227,9 @@ class Discovery:
             },
             "terms": [term.to_json() for term in self.terms],
             "alternatives": self.alternatives,
-            "force_equation": self.force_equation,
             "held_out": {
-                "records": self.held_out,
+                "records": [own.record for own in self.held_out],
+                "by_record": [own.to_json() for own in self.held_out],
                 "error_in_noise_floors": self.held_out_error,
                 "nrmse": self.held_out_nrmse,
                 "noise_floor": self.noise_floor,
@@ -279,7 +240,7 @@ class Discovery:
                 {"record": r.name, "role": r.role, "kind": r.kind, "amplitude": r.amplitude}
                 for r in self.records
             ],
-            **({"joints": [joint.to_json() for joint in self.joints]} if self.joints else {}),
+            "joints": [joint.to_json() for joint in self.joints],
             "by_record": {
                 name: {"error": found} if isinstance(found, str) else found.to_json()
                 for name, found in self.by_record

@@ -1,32 +1,29 @@
 """Selection of terms: every support is fitted by output error and judged by free-run simulation of held-out records.
 
-Regression proposes terms; this module selects them. A term must improve the fit to the held-out records by more than the penalty
-of the Bayesian information criterion for their independent samples; of two indistinguishable models the one with fewer terms is
-kept.
+Regression along the motion proposes terms; this module selects them. A term must improve the fit to the held-out records by more
+than the penalty of the Bayesian information criterion for their independent samples; of two indistinguishable models the one with
+fewer terms is kept.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from rigsight.discover.along_motion import AlongMotion, Proposed
 from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
-from rigsight.discover.regression import STRONG, information_criterion, sparse_path
-from rigsight.discover.support_starts import PlaceRegression
-from rigsight.effects.placed import kind_of
+from rigsight.discover.stability import information_criterion
 from rigsight.errors import SimulationError
-from rigsight.identify import FitResult
 from rigsight.records.record import Floats
 
-_SEEDS = 5
+STRONG = 10.0
+"""Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
+_BARE = 2.0
+"""Difference that is not worth more than a bare mention (the same)."""
 _MOST_TERMS = 5
-_GROWTH = 3
-_WORTH = 0.02
-"""Share of the regression's residual power that a term must explain to be polished, unless it is the best candidate."""
 _ROUNDS = 4
 """Rounds in which terms are added; rounds in which terms are only removed end by themselves."""
 _BESIDE = 2
@@ -84,79 +81,108 @@ class Selection:
     best: Trial  # the chosen support
     trials: tuple[Trial, ...]  # all polished supports, best first
     independent: float  # number of independent samples of the held-out errors
-    bench: Bench  # with the last regressions
+
+    def otherwise(self, term: str) -> float:
+        """Return the held-out error, in noise floors, of the equation without a term of its own or with another one.
+
+        NaN where this equation was not tried.
+        """
+        changed = self.best.support ^ {term}
+        return next((t.error_over_noise for t in self.trials if t.support == changed), math.nan)
 
 
 def select(
-    bench: Bench,
-    progress: Callable[[str], None],
-    about: Callable[[Bench, FitResult], Bench] = lambda bench, _: bench,
+    bench: Bench, linear: Trial, along: AlongMotion | None, progress: Callable[[str], None]
 ) -> Selection:
-    """Search for the support with the lowest held-out criterion: seeds from the regression, then steps of one term.
+    """Search for the support with the lowest held-out criterion, from the equation without any term on.
 
-    Before terms are added to an equation, also to that without any, `about` may return a bench with the regression of what this
-    equation lacks.
+    Where the sensors do not show the motion, every term is tried by a fit.
     """
-
-    def tried(supports: Sequence[Support]) -> list[Trial]:
-        trials = bench.trials_of(
-            [Attempt(support) for support in supports],
-            lambda support: progress(", ".join(sorted(support)) or "linear"),
+    search = _Search(bench, along, progress)
+    pool = [linear]
+    if not at_floor(linear):
+        pool += search.tried([search.attempt(p, linear) for p in along.at_once()] if along else [])
+    best = linear
+    # A term that another one has made unnecessary is removed, even if that one was added later.
+    for number in range(_ROUNDS + _MOST_TERMS):
+        shorter = [best.support - {name} for name in sorted(best.support)]
+        longer: list[Attempt] = []
+        if number < _ROUNDS and len(best.support) < _MOST_TERMS and not any(map(at_floor, pool)):
+            for trial in _to_extend(bench, pool, best):
+                longer += search.longer(trial)
+        pool += search.tried(longer)
+        pool += bench.shortened(shorter, best) + search.tried(search.special_cases(best))
+        found = _fewest(bench, pool)
+        if found is best and number > 0:
+            break
+        best = found
+    if not math.isfinite(best.error_over_noise):
+        raise SimulationError(
+            f"The equations of {bench.rig.name} cannot be simulated near these records: {best.fit.message}"
         )
-        enough = HOPELESS * min(trial.error_over_noise for trial in bench.trials.values())
+    independent = _independent_of(pool)
+    by_support: dict[Support, Trial] = {}
+    for trial in sorted(pool, key=lambda t: criterion(t, independent)):
+        by_support.setdefault(trial.support, trial)
+    return Selection(best, tuple(by_support.values()), independent)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Attempts beside an equation, and their trials."""
+
+    bench: Bench
+    along: AlongMotion | None
+    progress: Callable[[str], None]
+
+    def longer(self, trial: Trial) -> list[Attempt]:
+        """Return the attempts with one term more than an equation."""
+        if self.along is not None:
+            return [self.attempt(proposed, trial) for proposed in self.along.beside(trial.fit)]
+        supports = [trial.support | {name} for name in self.bench.effects if name not in trial.support]
+        return [
+            Attempt(support, [self.bench.carried(trial.fit, self.bench.structure(support))])
+            for support in supports
+        ]
+
+    def attempt(self, proposed: Proposed, shorter: Trial) -> Attempt:
+        """Return an attempt that starts from the regression, and from the fit of a shorter equation.
+
+        Columns of a smoothed motion can be inaccurate: a fit that starts from them alone may end with a higher cost than one with
+        fewer terms.
+        """
+        support = frozenset(effect.name for effect in proposed.effects)
+        structure = self.bench.structure(support)
+        regressed = [start.values(structure) for start in proposed.starts]
+        carried = self.bench.carried(shorter.fit, structure)
+        starts = [{**carried, **start} for start in regressed]
+        return Attempt(support, [*starts, {**regressed[0], **carried}])
+
+    def special_cases(self, trial: Trial) -> list[Attempt]:
+        """Return the attempts with a special case in place of a term: the regression may prefer a complex term to a simple one."""
+        effects = self.bench.effects
+        found = []
+        for name in sorted(trial.support):
+            for parent in effects[name].parents:
+                if self.along is None or parent not in effects or parent in trial.support:
+                    continue
+                proposed = self.along.instead(trial.fit, effects[name], effects[parent])
+                if proposed is not None:
+                    found.append(self.attempt(proposed, trial))
+        return found
+
+    def tried(self, attempts: Sequence[Attempt]) -> list[Trial]:
+        """Return the trials of attempts, with special values released where that lowers the error."""
+        bench = self.bench
+        trials = bench.trials_of(attempts, lambda support: self.progress(", ".join(sorted(support)) or "linear"))
+        enough = HOPELESS * min((t.error_over_noise for t in bench.trials.values()), default=math.inf)
         releases = [
-            Attempt(t.support, special, {**t.fit.values, **dict(t.fit.structure.fixed)})
+            Attempt(t.support, [{**dict(t.fit.structure.fixed), **t.fit.values}], special)
             for t in trials
             if (special := t.fit.structure.special_cases) and t.error_over_noise < enough and not at_floor(t)
         ]
         released = {trial.support: trial for trial in bench.trials_of(releases)}
         return [_better(trial, released.get(trial.support)) for trial in trials]
-
-    pool = tried([frozenset()])
-    if not at_floor(pool[0]):
-        bench = about(bench, pool[0].fit)
-    for _, as_long in itertools.groupby(proposals(bench), key=len):
-        if any(at_floor(trial) for trial in pool):
-            break
-        pool += tried(list(as_long))
-    if not any(at_floor(trial) for trial in pool):
-        # The regression may prefer a complex term to a simple one, although only the fit of the complex one gets stuck.
-        pool += tried(_special_cases(bench, [trial.support for trial in pool]))
-    finest = min(pool, key=lambda t: t.error_over_noise)
-    if not math.isfinite(finest.error_over_noise):
-        raise SimulationError(
-            f"The equations of {bench.rig.name} cannot be simulated near these records: {finest.fit.message}"
-        )
-    independent = independent_samples(finest)
-
-    def cost(trial: Trial) -> float:
-        return criterion(trial, independent)
-
-    best = _fewest(pool, cost)
-    # A term that another one has made unnecessary is removed, even if that one was added later.
-    for number in range(_ROUNDS + _MOST_TERMS):
-        shorter, longer = _simpler(bench, best.support), list[Support]()
-        if number < _ROUNDS and len(best.support) < _MOST_TERMS and not at_floor(best):
-            *others, own = _to_extend(bench, pool, best)
-            for trial in others:
-                bench = about(bench, trial.fit)
-                pool += tried([trial.support | {name} for name in next_terms(bench, trial.support)])
-            bench = about(bench, own.fit)
-            longer = [best.support | {name} for name in next_terms(bench, best.support)]
-        pool += tried([*shorter, *longer])
-        # A fit that stopped too early from the values of the regression may continue from those of the longer equation.
-        pool += bench.shortened([support for support in shorter if support], best)
-        finest = min(pool, key=lambda t: t.error_over_noise)
-        independent = independent_samples(finest)
-        found = _fewest(pool, cost)
-        if found is best:
-            break
-        best = found
-    by_support: dict[Support, Trial] = {}
-    for trial in sorted(pool, key=cost):
-        by_support.setdefault(trial.support, trial)
-    ordered = list(by_support.values())
-    return Selection(best, tuple(ordered), independent, bench)
 
 
 def _better(held: Trial, released: Trial | None) -> Trial:
@@ -168,99 +194,36 @@ def _better(held: Trial, released: Trial | None) -> Trial:
     )
 
 
-def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float]) -> Trial:
-    """Return the trial with the fewest parameters of those that the held-out records do not distinguish from the best."""
-    lowest = min(cost(trial) for trial in trials)
-    close = [trial for trial in trials if cost(trial) <= lowest + STRONG or cost(trial) == lowest]
-    # With equal numbers of parameters, fewer states are preferred: a loop with one state to a series of sliders with six.
-    return min(close, key=lambda t: (t.n_free, len(t.fit.structure.states), cost(t)))
+def _independent_of(trials: Sequence[Trial]) -> float:
+    return independent_samples(min(trials, key=lambda t: t.error_over_noise))
+
+
+def _fewest(bench: Bench, trials: Sequence[Trial]) -> Trial:
+    """Return the trial with the fewest parameters of those that the held-out records do not distinguish from the best.
+
+    With equal numbers of parameters, fewer states are preferred, then what was offered first: a loop with one state to a series
+    of sliders with six, a cubic spring to a pendulum.
+    """
+    independent = _independent_of(trials)
+    costs = {id(trial): criterion(trial, independent) for trial in trials}
+    lowest = min(costs.values())
+    close = [t for t in trials if costs[id(t)] <= lowest + STRONG or costs[id(t)] == lowest]
+    size = min((t.n_free, len(t.fit.structure.states)) for t in close)
+    alike = [t for t in close if (t.n_free, len(t.fit.structure.states)) == size]
+    best = min(costs[id(t)] for t in alike)
+    order = {name: number for number, name in enumerate(bench.effects)}
+    near = [t for t in alike if costs[id(t)] <= best + _BARE or costs[id(t)] == best]
+    return min(near, key=lambda t: (sorted(order[name] for name in t.support), costs[id(t)]))
 
 
 def _to_extend(bench: Bench, pool: Sequence[Trial], best: Trial) -> list[Trial]:
-    """Return the trials whose equations get a further term, the best last.
+    """Return the trials whose equations get a further term, the best first.
 
     With terms at several joints, a wrong term that imitates two right ones at once can be better than either of them alone.
     """
-    if len(bench.places) < 2:
+    if len(bench.rig.mechanism.joints) < 2:
         return [best]
     as_long = {trial.support: trial for trial in pool if len(trial.support) == len(best.support)}
-    ordered = sorted(as_long.values(), key=lambda trial: -trial.error_over_noise)
+    ordered = sorted(as_long.values(), key=lambda trial: trial.error_over_noise)
     near = [t for t in ordered if t.error_over_noise < _NEAR * best.error_over_noise and t is not best]
-    return [*near[-_BESIDE:], best]
-
-
-def proposals(bench: Bench) -> list[Support]:
-    """Return the supports that the regressions propose for polishing, short ones first."""
-    costs = {support: cost for place in bench.places for support, cost in _proposed_at(bench, place).items()}
-    # Short ones first: if one term reaches the noise floor, two need not be tried.
-    found = sorted(costs, key=lambda support: costs[support])[:_SEEDS]
-    # The same terms at the other joints: a force at one joint moves those beside it in nearly the same way.
-    kinds = {kind_of(name) for support in found for name in support}
-    offered = [name for place in bench.places[1:] and bench.places for name in place.offered]
-    further = [frozenset({name}) for name in offered if kind_of(name) in kinds]
-    found += [support for support in further if support not in found]
-    return sorted(found, key=lambda support: (len(support), costs.get(support, math.inf)))
-
-
-def _proposed_at(bench: Bench, place: PlaceRegression) -> dict[Support, float]:
-    """Return the supports that the regression at a place proposes, with a criterion that is comparable between places."""
-    names, projected = place.offered, place.projected
-    if not names:
-        return {}
-    columns = np.column_stack([bench.candidates[name].column for name in names])
-    together = np.column_stack([columns, *bench.own_terms.values()])
-    paths = sparse_path(bench.sparse(projected), together)
-    supports = {tuple(i for i in path if i < len(names)) for path in paths}
-    shares = [projected.explained(columns[:, [i]])[1] for i in range(len(names))]
-    supports |= {(int(i),) for i in np.argsort(shares)[::-1][:_GROWTH]}
-    # Forces of different joints differ in size: what counts is the share that is left.
-    whole = projected.solved(columns[:, :0])[1] ** 2 or 1.0
-
-    def remainder(support: tuple[int, ...]) -> float:
-        return projected.solved(columns[:, list(support)])[1] ** 2 / whole
-
-    def worth(support: tuple[int, ...]) -> bool:
-        shorter = [tuple(i for i in support if i != out) for out in support]
-        return len(support) == 1 or all(
-            remainder(support) < (1.0 - _WORTH) * remainder(less) for less in shorter
-        )
-
-    return {
-        frozenset(names[i] for i in support): information_criterion(
-            remainder(support), len(support), projected.independent
-        )
-        for support in supports
-        if 0 < len(support) <= place.longest and worth(support)
-    }
-
-
-def _simpler(bench: Bench, support: Support) -> list[Support]:
-    """Return the supports with one term less, or with a special case in place of a term."""
-    found = [support - {name} for name in sorted(support)]
-    return found + _special_cases(bench, [support])
-
-
-def _special_cases(bench: Bench, supports: Sequence[Support]) -> list[Support]:
-    """Return the supports with a special case in place of a term, each once, without the given ones."""
-    found = {
-        support - {name} | {parent}: None
-        for support in supports
-        for name in sorted(support)
-        for parent in bench.candidates[name].effect.parents
-        if parent in bench.candidates and parent not in support
-    }
-    return [support for support in found if support not in supports]
-
-
-def next_terms(bench: Bench, support: Support) -> list[str]:
-    """Return the terms that explain most of the regression residuals of a support, the best first."""
-    shares: dict[str, float] = {}
-    for place in bench.places:
-        inside = [bench.candidates[name].column for name in sorted(support & {*place.offered})]
-        beside = replace(place.projected, base=np.column_stack([place.projected.base, *inside]))
-        for name in place.offered:
-            if name not in support:
-                shares[name] = beside.explained(bench.candidates[name].column[:, None])[1]
-    unused = list(shares)
-    ranked = np.argsort(list(shares.values()))[::-1][:_GROWTH]
-    return [unused[i] for rank, i in enumerate(ranked) if rank == 0 or shares[unused[i]] > _WORTH]
+    return [best, *near[:_BESIDE]]

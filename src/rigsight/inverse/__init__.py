@@ -14,7 +14,11 @@ from rigsight.inverse.joint_force import effect_force as effect_force
 from rigsight.inverse.joint_force import joint_motion as joint_motion
 from rigsight.inverse.measured_motion import RecordMotion as RecordMotion
 from rigsight.inverse.measured_motion import record_motion as record_motion
+from rigsight.inverse.missing_force import ForceAlong as ForceAlong
 from rigsight.inverse.missing_force import MissingForce as MissingForce
+from rigsight.inverse.missing_force import forces_along as forces_along
+from rigsight.inverse.missing_force import missing_forces as missing_forces
+from rigsight.inverse.missing_force import noise_of_rows as noise_of_rows
 from rigsight.inverse.numbers_beside import NumbersBeside as NumbersBeside
 from rigsight.inverse.power import NAMED_IN as NAMED_IN
 from rigsight.inverse.power import NamedSize as NamedSize
@@ -26,3 +30,4 @@ from rigsight.inverse.proposal import ProposedStart as ProposedStart
 from rigsight.inverse.propose import along_motion as along_motion
 from rigsight.inverse.propose import numbers_along_motion as numbers_along_motion
 from rigsight.inverse.propose import propose as propose
+from rigsight.inverse.propose import selection_of as selection_of

@@ -91,6 +91,16 @@ class EffectTerms:
         else:
             yield from self._at(effect, None)
 
+    def at(self, effect: Effect, own: Mapping[str, float]) -> Iterator[Term]:
+        """Yield an effect at its own parameters; what is linear in some of them keeps these open."""
+        if is_late(effect):
+            yield from self._of_late(effect, [lateness(effect, own)])
+            return
+        linear = {p.name for p in effect.linear_parameters}
+        ratio = effect.post_yield_stiffness_ratio
+        inner = {name: 0.0 if name == ratio else value for name, value in own.items() if name not in linear}
+        yield from self._at(effect, [inner])
+
     def beside(self, term: Term, halvings: int) -> Iterator[Term]:
         """Yield the effect of a term on both sides of its nonlinear parameters, at a step of the grid halved so often."""
         if not is_late(term.effect):

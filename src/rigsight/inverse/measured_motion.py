@@ -228,8 +228,11 @@ class RecordMotion:
 
     def inner(self, rows: Floats) -> Floats:
         """Return filtered rows without the ends of the record, where neither acceleration nor filter has both sides."""
+        return self._inside(self.filtered(rows))
+
+    def _inside(self, rows: Floats) -> Floats:
         n_end = min(max(1, int(_END / self.band)), rows.shape[-1] // 10)
-        return self.filtered(rows)[..., n_end : rows.shape[-1] - n_end]
+        return rows[..., n_end : rows.shape[-1] - n_end]
 
     @cached_property
     def row_weights(self) -> Floats:
@@ -251,7 +254,11 @@ class RecordMotion:
 
     def thinned(self, rows: Floats) -> Floats:
         """Return inner filtered rows at those samples only that are nearly independent."""
-        return self.inner(rows)[..., :: self.stride]
+        return self.some(self.filtered(rows))
+
+    def some(self, filtered: Floats) -> Floats:
+        """Return these samples of rows that are filtered already."""
+        return self._inside(filtered)[..., :: self.stride]
 
     @property
     def stride(self) -> int:

@@ -18,6 +18,7 @@ from rigsight.inverse.equation_fit import EquationFit, per_force, record_motions
 from rigsight.inverse.joint_force import joint_motion
 from rigsight.inverse.measured_motion import WIDER, RecordMotion
 from rigsight.records import Record
+from rigsight.rigs import Joint
 
 Floats = NDArray[np.float64]
 
@@ -94,10 +95,32 @@ class MissingForce:
         }
 
 
+@dataclass(frozen=True, eq=False)
+class ForceAlong:
+    """A force at one joint that makes the equations hold as well as one there can.
+
+    Attributes
+    ----------
+    joint
+        Its name.
+    force
+        Along each motion, in the band in which forces are compared, shape (n_samples,); positive where it resists the motion.
+    std
+        RMS of its standard error.
+    share
+        Of the squared residual of the equations above the noise of the sensors that it explains.
+    """
+
+    joint: str
+    force: tuple[Floats, ...]
+    std: float
+    share: float
+
+
 def missing_forces(
     fit: EquationFit, values: Mapping[str, float], covariance: Floats | None
 ) -> tuple[MissingForce, ...]:
-    """Return the missing force at each joint, the one that explains most first.
+    """Return the missing force at each joint at nearly independent samples, the one that explains most first.
 
     Parameters
     ----------
@@ -108,6 +131,16 @@ def missing_forces(
     covariance
         Of the rows by noise of the sensors, see `noise_of_rows`; None: every equation counts in units of its own residual.
     """
+    joints = {joint.name: joint for joint in fit.rig.mechanism.joints}
+    return tuple(
+        _missing(fit, values, along, joints[along.joint]) for along in forces_along(fit, values, covariance)
+    )
+
+
+def forces_along(
+    fit: EquationFit, values: Mapping[str, float], covariance: Floats | None
+) -> list[ForceAlong]:
+    """Return the missing force at each joint, the one that explains most first; parameters as of `missing_forces`."""
     rows = [motion.thinned(fit.residual(motion, values)) for motion in fit.motions]
     if covariance is None:
         weight = np.diag([1.0 / max(float(np.mean(own**2)), 1e-300) for own in np.concatenate(rows, axis=1)])
@@ -117,40 +150,38 @@ def missing_forces(
     whole = sum(float(np.einsum("it,ij,jt->", own, weight, own)) for own in rows) - n_equations * n_rows
     found = []
     for joint in fit.rig.mechanism.joints:
-        forces, explained = [], -float(n_rows)
-        for motion, own in zip(fit.motions, rows, strict=True):
-            along = motion.thinned(per_force(motion, joint, values))
-            size = np.einsum("it,ij,jt->t", along, weight, along)
+        forces, sizes, explained = [], [], -float(n_rows)
+        for motion in fit.motions:
+            along = motion.filtered(per_force(motion, joint, values))
+            own = motion.filtered(fit.residual(motion, values))
+            size = np.maximum(np.einsum("it,ij,jt->t", along, weight, along), np.finfo(np.float64).tiny)
             pushed = np.einsum("it,ij,jt->t", along, weight, own)
-            explained += float(np.sum(pushed**2 / np.maximum(size, np.finfo(np.float64).tiny)))
-            forces.append(-pushed / np.maximum(size, np.finfo(np.float64).tiny))
-        moved = [joint_motion(motion, joint, values) for motion in fit.motions]
-        units = fit.rig.units_at(joint.name)
-        force = np.concatenate(forces)
-        found.append(
-            MissingForce(
-                joint.name,
-                units["x"],
-                units["force"],
-                float(np.clip(explained / whole, 0.0, 1.0)) if whole > 0.0 else 0.0,
-                float(np.sqrt(np.mean(force**2))),
-                tuple(
-                    m.record.name
-                    for m, own in zip(fit.motions, rows, strict=True)
-                    for _ in range(own.shape[1])
-                ),
-                np.concatenate(
-                    [
-                        m.thinned(np.arange(m.record.n_samples, dtype=np.float64) * m.record.dt)
-                        for m in fit.motions
-                    ]
-                ),
-                np.concatenate([m.thinned(own.x) for m, own in zip(fit.motions, moved, strict=True)]),
-                np.concatenate([m.thinned(own.v) for m, own in zip(fit.motions, moved, strict=True)]),
-                force,
-            )
-        )
-    return tuple(sorted(found, key=lambda own: -own.share))
+            explained += float(np.sum(motion.some(pushed**2 / size)))
+            forces.append(-pushed / size)
+            sizes.append(size)
+        share = float(np.clip(explained / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
+        std = float(np.sqrt(np.mean(1.0 / np.concatenate(sizes))))
+        found.append(ForceAlong(joint.name, tuple(forces), std, share))
+    return sorted(found, key=lambda own: -own.share)
+
+
+def _missing(
+    fit: EquationFit, values: Mapping[str, float], along: ForceAlong, joint: Joint
+) -> MissingForce:
+    motions, units = fit.motions, fit.rig.units_at(joint.name)
+    moved = [joint_motion(motion, joint, values) for motion in motions]
+    parts = [motion.some(own) for motion, own in zip(motions, along.force, strict=True)]
+    force = np.concatenate(parts)
+    times = [m.record.dt * np.arange(m.record.n_samples, dtype=np.float64) for m in motions]
+    signals = [
+        np.concatenate([m.thinned(signal) for m, signal in zip(motions, own, strict=True)])
+        for own in (times, [j.x for j in moved], [j.v for j in moved])
+    ]
+    names = [m.record.name for m, own in zip(motions, parts, strict=True) for _ in own]
+    rms = float(np.sqrt(np.mean(force**2)))
+    return MissingForce(
+        joint.name, units["x"], units["force"], along.share, rms, tuple(names), *signals, force
+    )
 
 
 def noise_of_rows(fit: EquationFit, values: Mapping[str, float], noise: Mapping[str, float]) -> Floats | None:

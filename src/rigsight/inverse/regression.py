@@ -180,6 +180,11 @@ class Regression:
         parts = np.split(left, np.cumsum([np.prod(shape) for shape in self.shapes])[:-1])
         return [part.reshape(shape) * self.unit for part, shape in zip(parts, self.shapes, strict=True)]
 
+    def misfit(self, chosen: Sequence[int]) -> float:
+        """Return the sum of squares that further columns leave beside those of the equations, all fitted to all stretches."""
+        products = self.sums(self.whole).system(chosen)
+        return float(max(_squares(products, _numbers(products, self.n_rows)), _LEAST))
+
     @property
     def predicts_accelerations(self) -> bool:
         """Whether the likeliest numbers of the equations alone have positive masses on all stretches."""

@@ -94,7 +94,7 @@ class Selection:
         """Return the terms that a finer grid may lift: the best of every effect alone, and those selected."""
         begun = self.regression.remainder([])
         alone: dict[str, tuple[float, int]] = {}
-        for i, remainder in self._remainders([]):
+        for i, remainder in self.remainders([]):
             name = self.terms[i].effect.name
             alone[name] = min(alone.get(name, (remainder, i)), (remainder, i))
         least = min((remainder for remainder, _ in alone.values()), default=begun)
@@ -105,12 +105,12 @@ class Selection:
         """Return the other forms of a selected family, beside the columns of the other families."""
         own = [i for i, term in enumerate(self.terms) if (term.effect.family, rig.where(term.effect)) == key]
         best: dict[str, tuple[float, int]] = {}
-        for i, remainder in self._remainders(chosen, own):
+        for i, remainder in self.remainders(chosen, own):
             name = self.terms[i].effect.name
             best[name] = min(best.get(name, (remainder, i)), (remainder, i))
         whole = self.regression.remainder([*chosen, *self.places[taken]])
         return tuple(
-            ProposedForm(self.terms[i].effect, self._values(i, chosen), remainder / whole)
+            ProposedForm(self.terms[i].effect, self.parameters(i, chosen), remainder / whole)
             for name, (remainder, i) in best.items()
             if name != self.terms[taken].effect.name
         )
@@ -118,21 +118,24 @@ class Selection:
     def best(self, rig: Rig, chosen: Sequence[int], taken: Sequence[Key]) -> dict[Key, tuple[float, int]]:
         """Return the best term of each family at each place beside columns that were chosen, with what it leaves."""
         best: dict[Key, tuple[float, int]] = {}
-        for i, remainder in self._remainders(chosen):
+        for i, remainder in self.remainders(chosen):
             key = (self.terms[i].effect.family, rig.where(self.terms[i].effect))
             if key not in taken and (key not in best or remainder < best[key][0]):
                 best[key] = (remainder, i)
         return best
 
-    def _remainders(
+    def remainders(
         self, chosen: Sequence[int], asked: Sequence[int] | None = None
     ) -> Iterator[tuple[int, float]]:
         """Yield each (asked) term that can have the sign and order that it needs beside chosen columns, and what it leaves."""
         for i in range(len(self.terms)) if asked is None else asked:
-            term = self.terms[i]
-            columns = [*chosen, *self.places[i]]
-            if term.allows(self.regression.solved(columns)[-len(self.places[i]) :]):
-                yield i, self.regression.remainder(columns)
+            if self.allows(i, chosen):
+                yield i, self.regression.remainder([*chosen, *self.places[i]])
+
+    def allows(self, i: int, chosen: Sequence[int]) -> bool:
+        """Return whether a term has the sign and order that it needs beside chosen columns."""
+        own = self.places[i]
+        return self.terms[i].allows(self.regression.solved([*chosen, *own])[-len(own) :])
 
     def selected(self, rig: Rig) -> list[tuple[Key, int, float]]:
         """Take families until none removes enough: each with its term and what it leaves beside those before it."""
@@ -160,7 +163,7 @@ class Selection:
             own = [
                 t for t, term in enumerate(self.terms) if (term.effect.family, rig.where(term.effect)) == key
             ]
-            forms = [(remainder, t) for t, remainder in self._remainders(chosen, own) if remainder <= enough]
+            forms = [(remainder, t) for t, remainder in self.remainders(chosen, own) if remainder <= enough]
             terms[n] = min(
                 forms, key=lambda form: (_n_fitted(self.terms[form[1]].effect), form[0]), default=(whole, i)
             )[1]
@@ -209,10 +212,10 @@ class Selection:
         judged = frozenset(term.effect.name for term in self.terms)
         explained = 1.0 - remainders[-1] / begun if begun > 0.0 else 0.0
         starts: dict[str, tuple[float, int]] = {}
-        for i, remainder in self._remainders([]):
+        for i, remainder in self.remainders([]):
             name = self.terms[i].effect.name
             starts[name] = min(starts.get(name, (remainder, i)), (remainder, i))
-        numbers = self._numbers_beside(begun, {name: i for name, (_, i) in starts.items()})
+        numbers = self.numbers_beside(begun, {name: i for name, (_, i) in starts.items()})
         return Proposal(
             taken,
             alone,
@@ -223,7 +226,7 @@ class Selection:
             numbers_beside=numbers,
             starts={
                 name: ProposedStart(
-                    _rounded(self._values(i, [])),
+                    _rounded(self.parameters(i, [])),
                     _rounded(numbers.values(self.places[i])),
                     remainder / begun if begun > 0.0 else 1.0,
                 )
@@ -239,7 +242,7 @@ class Selection:
         shares = [1.0 - self.regression.remainders(counts, self.places[i]) / begun for i in terms]
         return [(float(np.quantile(own, _LIMITS[0])), float(np.quantile(own, _LIMITS[1]))) for own in shares]
 
-    def _numbers_beside(self, missing: float, terms: Mapping[str, int]) -> NumbersBeside:
+    def numbers_beside(self, missing: float, terms: Mapping[str, int]) -> NumbersBeside:
         """Return the numbers of the equations beside effects, of which each has a term."""
         of_rig = {p.name for p in self.fit.rig.parameters}
         return NumbersBeside(
@@ -254,9 +257,9 @@ class Selection:
         )
 
     def _cause(self, key: Key, i: int, share: float, chosen: Sequence[int]) -> ProposedCause:
-        return ProposedCause(self.terms[i].effect, *key, share, self._values(i, chosen))
+        return ProposedCause(self.terms[i].effect, *key, share, self.parameters(i, chosen))
 
-    def _values(self, i: int, chosen: Sequence[int]) -> dict[str, float]:
+    def parameters(self, i: int, chosen: Sequence[int]) -> dict[str, float]:
         """Return the parameters of the effect of a term beside chosen columns."""
         term, solved = self.terms[i], self.regression.solved([*chosen, *self.places[i]])
         numbers = solved[-len(self.places[i]) :]

@@ -1,12 +1,10 @@
-"""Figures of a discovery: the terms with their intervals and inclusion probabilities, and the free run against the records."""
+"""Figures of a discovery: the terms with the error without each and their intervals, and the free run against the records."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from rigsight.discover import JointForce
 from rigsight.discover.result import Discovery, Run, Term
@@ -30,13 +28,12 @@ _MOST_RUNS = 3
 _MOST_JOINTS = 4
 _POINTS = 4000
 """Samples of a missing force that are drawn."""
-_SURE = 0.9
 
 
 @in_style
 def discovery_figure(found: Discovery) -> Figure:
     """Draw the terms and the free runs of a discovery."""
-    terms = found.terms[:_MOST_TERMS]
+    terms = [term for term in found.terms if math.isfinite(term.otherwise)][:_MOST_TERMS]
     runs = found.runs[:_MOST_RUNS]
     numbers = _numbers(found)
     joints = found.joints[:_MOST_JOINTS]
@@ -45,7 +42,7 @@ def discovery_figure(found: Discovery) -> Figure:
     figure = new_figure(8.4, sum(heights))
     parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
     left, right = parts[0].subplots(1, 2)
-    _draw_inclusion(left, terms)
+    _draw_terms(left, terms, found.held_out_error)
     _draw_coefficients(right, numbers)
     axes = parts[1].subplots(2 * len(runs), 1, squeeze=False, height_ratios=[3, 1.3] * len(runs))[:, 0]
     for index, run in enumerate(runs):
@@ -57,45 +54,38 @@ def discovery_figure(found: Discovery) -> Figure:
 
 def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
     """Draw the missing force of a joint over its displacement and its velocity, with the identified law."""
-    x, v, force, law = (
-        np.concatenate([getattr(trace, name) for trace in joint.traces])
-        for name in ("displacement", "velocity", "force", "law")
-    )
-    some = slice(None, None, max(1, x.size // _POINTS))
-    factor, unit = shown_in(joint.unit, force)
-    motions = ((x, joint.x_unit, "x"), (v, "1/s" if joint.x_unit == "1" else f"{joint.x_unit}/s", "v"))
+    missing = joint.missing
+    some = slice(None, None, max(1, missing.force.size // _POINTS))
+    factor, unit = shown_in(missing.unit, missing.force)
+    motions = ((missing.displacement, missing.motion_unit, "x"), (missing.velocity, f"{missing.motion_unit}/s", "v"))
+    drawn = [(missing.force, MEASURED, "missing"), (joint.law, WITH_EFFECT, "law")][: 2 if joint.terms else 1]
     for ax, (motion, motion_unit, symbol) in zip(axes, motions, strict=True):
         scale, shown_unit = shown_in(motion_unit, motion)
-        drawn = [(force, MEASURED, "missing"), (law, WITH_EFFECT, "law")][: 2 if joint.terms else 1]
         for values, color, label in drawn:
-            ax.plot(
-                scale * motion[some], factor * values[some], ".", color=color, markersize=1.0, label=label
-            )
+            ax.plot(scale * motion[some], factor * values[some], ".", color=color, markersize=1.0, label=label)
         ax.set_xlabel(f"{symbol} of {_spoken(joint.joint)} [{shown_unit}]")
         ax.grid()
     axes[0].set_ylabel(f"force [{unit}]")
     axes[0].legend(loc="upper left", fontsize=8, markerscale=6.0)
-    axes[0].set_title(
-        f"Missing at {_spoken(joint.joint)}: explains {100.0 * joint.share:.4g} % of the sensor errors"
-    )
+    explained = f": the law explains {joint.share_of_force:.0%}" if joint.terms else ""
+    axes[0].set_title(f"Missing at {_spoken(joint.joint)}{explained}")
 
 
-def _draw_inclusion(ax: Axes, terms: tuple[Term, ...]) -> None:
+def _draw_terms(ax: Axes, terms: Sequence[Term], error: float) -> None:
+    """Draw the held-out error without each term of the equation, and with each other one, beside that of the equation."""
     names = [_spoken(f"{term.name} at {term.where}" if term.where else term.name) for term in terms]
-    places = list(range(len(names)))
-    colors = [WITH_EFFECT if term.kept else OTHER for term in terms]
-    ax.barh(places, [term.inclusion for term in terms], color=colors, height=0.6)
-    for place, term in zip(places, terms, strict=True):
-        ax.text(
-            min(term.inclusion, 1.0) + 0.02, place, f"{100 * term.inclusion:.0f} %", va="center", fontsize=8
-        )
-    ax.axvline(_SURE, color=MEASURED, linewidth=0.8, linestyle=":")
-    ax.set_yticks(places, names)
+    for place, term in enumerate(terms):
+        word, color = ("without", WITH_EFFECT) if term.kept else ("with", OTHER)
+        ax.plot([error, term.otherwise], [place, place], color=color, linewidth=2.0)
+        ax.plot(term.otherwise, place, "o", color=color, markersize=4)
+        ax.text(1.1 * max(term.otherwise, error), place, f"{word} {term.otherwise:.3g}", va="center", fontsize=8)
+    ax.axvline(error, color=MEASURED, linewidth=0.8, linestyle=":")
+    ax.set_yticks(range(len(names)), names)
     ax.set_ylim(max(len(names), 1) - 0.4, -0.6)
-    ax.set_xlim(0.0, 1.18)
-    ax.set_xticks([0.0, 0.5, 1.0])
-    ax.set_xlabel("inclusion probability (blue: in the equation)")
-    ax.set_title("Terms offered by the regression" if names else "No term beside the rig's own")
+    ax.set_xscale("log")
+    ax.set_xlim(0.8 * error, 4.0 * max([error, *(term.otherwise for term in terms)]))
+    ax.set_xlabel("held-out error [noise floors]")
+    ax.set_title("Terms: error without it, or with it" if names else "No term beside the rig's own")
 
 
 def _numbers(found: Discovery) -> list[tuple[str, float]]:

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate
-from rigsight.discover import Discovery, JointForce
+from rigsight.discover import Discovery
 from rigsight.discover.result import Term
 from rigsight.report import labels, wording
 from rigsight.report.quantities import estimate_text, gap_percent
@@ -159,15 +159,11 @@ def discovery_rows(found: Discovery) -> Iterator[tuple[str, str]]:
     for name, c in found.rig_parameters.items():
         yield name, estimate_text(Estimate(c.value, c.std, c.unit))
     for term in found.kept:
-        if term.name not in found.rig_parameters:
-            yield f"{term.name} at {term.where}" if term.where else term.name, _term(term)
+        yield f"{term.name} at {term.where}" if term.where else term.name, _term(term)
     for joint in found.joints:
-        yield f"missing at {joint.joint}", _joint(joint)
-    where = ", ".join(found.held_out)
-    yield (
-        "held-out error",
-        f"{gap_percent(found.held_out_nrmse)} on {where} (noise floor {gap_percent(found.noise_floor)})",
-    )
+        yield f"missing at {joint.joint}", joint.sentence
+    for own in found.held_out:
+        yield f"{own.record}, held out", f"{gap_percent(own.nrmse)}, {own.error_over_noise:.3g} x floor"
     for rival in found.alternatives[:_RANKED]:
         error = (
             f"{rival.held_out:.3g} x floor, BIC {rival.bic:.1f}"
@@ -178,20 +174,17 @@ def discovery_rows(found: Discovery) -> Iterator[tuple[str, str]]:
 
 
 def _term(term: Term) -> str:
-    numbers = "; ".join(
+    numbers = [
         f"{name} = {estimate_text(Estimate(c.value, c.std, c.unit))}" for name, c in term.coefficients.items()
-    )
-    return f"{numbers} (selected in {100 * term.inclusion:.0f} % of the draws)"
-
-
-def _joint(joint: JointForce) -> str:
-    law = " and ".join(term.text for term in joint.terms) or "no term acts there"
-    explained = f"explains {100 * joint.share:.4g} % of the sensor errors"
-    return f"{explained}, leaves {joint.error_over_noise:.3g} x floor: {law}"
+    ]
+    family = [term.family] if term.family else []
+    without = [f"without it {term.otherwise:.3g} x floor"] if math.isfinite(term.otherwise) else []
+    selected = [] if term.inclusion is None else [f"selected in {100 * term.inclusion:.0f} % of the draws"]
+    return f"{'; '.join(numbers)} ({'; '.join([*family, *without, *selected])})"
 
 
 def _alone(found: Discovery | str) -> str:
     if isinstance(found, str):
         return found
-    terms = ", ".join(term.name for term in found.kept if term.name not in found.rig_parameters)
+    terms = ", ".join(term.name for term in found.kept)
     return f"{terms or 'no further term'}, held-out error {gap_percent(found.held_out_nrmse)}"

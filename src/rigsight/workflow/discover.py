@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.discover import METHODS, Discovery, RegressionData, discover
-from rigsight.discover.discovery import Method
-from rigsight.errors import InputError, RigsightError, check_option
+from rigsight.discover import Discovery, DiscoveryData, discover
+from rigsight.effects import Effect
+from rigsight.errors import RigsightError
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.fit.windows import cut, window_length
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record
-from rigsight.rigs import RIGS, Rig, is_built_in_motion
+from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.run.kernels import checked_jobs
@@ -38,23 +37,20 @@ def run_discover(
     campaign: str | Path,
     out: str | Path | None = None,
     *,
-    method: str = "discrepancy",
-    pointwise: bool = False,
+    effects: Sequence[Effect] = (),
     one_by_one: bool = False,
     own_rigs: Iterable[Rig] = (),
     seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
 ) -> Discovery:
-    """Discover the governing equations behind the records of a campaign."""
-    check_option("The method", method, METHODS)
+    """Discover the governing equations behind the records of a campaign, with effects of the user among the terms."""
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
     found = discover_campaign(
-        read_campaign(campaign, own_rigs=own_rigs),
-        method,
-        pointwise=pointwise,
+        read_campaign(campaign, effects, own_rigs),
+        effects=effects,
         one_by_one=one_by_one,
         seed=seed,
         n_jobs=jobs,
@@ -67,22 +63,20 @@ def run_discover(
 
 def discover_campaign(
     campaign: Campaign,
-    method: str = "discrepancy",
     *,
-    pointwise: bool = False,
+    effects: Sequence[Effect] = (),
     one_by_one: bool = False,
     seed: int = 0,
     n_jobs: int = 1,
     listener: Listener = silent,
 ) -> Discovery:
     """Discover the governing equations behind the records of a campaign that was read or made of records."""
-    chosen = cast("Method", check_option("The method", method, METHODS))
-    data = regression_data(campaign)
+    data = discovery_data(campaign)
     report_notes(campaign.notes, listener)
     stage = Stage(DISCOVERING, _STEPS, listener)
     # Supports are fitted in parallel; multithreaded matrix products would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = discover(data, chosen, pointwise, seed, stage.finished, n_jobs)
+        found = discover(data, effects, seed, stage.finished, n_jobs)
         notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
         notes += tuple(closed_loop_notes(campaign.records, campaign.rig, "It is not used in a discovery."))
         factor = campaign.open_factor
@@ -95,22 +89,21 @@ def discover_campaign(
         )
         if not one_by_one:
             return found
-        alone = _one_by_one(campaign, data, chosen, pointwise, seed, n_jobs, stage.finished)
+        alone = _one_by_one(campaign, data, effects, seed, n_jobs, stage.finished)
         return replace(found, by_record=alone)
 
 
-def regression_data(campaign: Campaign) -> RegressionData:
-    """Return the data of a campaign for the regression; records of a rig that drifts are cut into windows."""
-    _check_can_be_discovered(campaign)
+def discovery_data(campaign: Campaign) -> DiscoveryData:
+    """Return the data of a campaign for a discovery; records of a rig that drifts are cut into windows."""
     drifts = campaign.absent_spring is not None
     floors = noise_floors(campaign.rig, campaign.records, drifts=drifts)
     length = window_length(campaign.rig, campaign.estimation) if drifts else None
-    return RegressionData(
+    return DiscoveryData(
         campaign, {floor.output: floor.std for floor in floors}, cut(campaign.records, length)
     )
 
 
-def only(data: RegressionData, record: Record) -> RegressionData:
+def only(data: DiscoveryData, record: Record) -> DiscoveryData:
     """Return the data with one estimation record alone, whole or in windows, and with all validation records."""
     own = tuple(r for r in data.records if r.role == "validation" or r.origin == record.name)
     return replace(data, windows=own)
@@ -128,36 +121,10 @@ def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
     )
 
 
-def _check_can_be_discovered(campaign: Campaign) -> None:
-    """Refuse what a discovery does not support: symbols that no built-in rig has, effects modelled already, own constants."""
-    rig = campaign.rig
-    if rig.has_one_motion and not is_built_in_motion(rig):
-        listed = ", ".join(name for name, built_in in RIGS.items() if built_in.has_one_motion)
-        raise InputError(
-            f"'rigsight discover' does not support your rig '{rig.name}': for rigs of one motion it supports only {listed}. "
-            "If yours has the same equation, use one of these."
-        )
-    if campaign.modelled:
-        listed = ", ".join(effect.name for effect in campaign.modelled)
-        raise InputError(
-            "'rigsight discover' does not support effects that are modelled already, and the campaign declares "
-            f"{listed}. Leave them out of its effects, so that they are searched for like any other, or use 'rigsight diagnose', "
-            "which keeps them."
-        )
-    for record in campaign.records:
-        if record.constants:
-            listed = ", ".join(record.constants)
-            raise InputError(
-                "'rigsight discover' does not support constants that differ between records, and record "
-                f"'{record.name}' gives {listed}. Give them under [rig.constants], or leave the record out."
-            )
-
-
 def _one_by_one(
     campaign: Campaign,
-    data: RegressionData,
-    method: Method,
-    pointwise: bool,
+    data: DiscoveryData,
+    effects: Sequence[Effect],
     seed: int,
     n_jobs: int,
     finished: Callable[[str], None],
@@ -166,7 +133,7 @@ def _one_by_one(
 
     def alone(record: Record) -> tuple[str, Discovery | str]:
         try:
-            return record.name, discover(only(data, record), method, pointwise, seed)
+            return record.name, discover(only(data, record), effects, seed)
         except RigsightError as error:
             return record.name, str(error)
 

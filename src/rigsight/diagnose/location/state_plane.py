@@ -6,7 +6,7 @@ shows the shape of the missing force but not its exact size. The residual is use
 noise.
 
 On a rig of several joints the planes are those of each joint, with the force that would act there if everything missing acted at
-this joint: the motion follows the sensors, with a force of any shape over time, and the re-identified parameters.
+this joint: what the re-identified equations leave along the measured motion (`rigsight.inverse`).
 """
 
 from __future__ import annotations
@@ -23,8 +23,17 @@ from rigsight.diagnose.location.bands import spectrum
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.trace import STAGES, Trace
 from rigsight.diagnose.policy import MAPS, VERDICT
-from rigsight.discover import JointMotion, joint_motions
 from rigsight.errors import SimulationError
+from rigsight.inverse import (
+    EquationFit,
+    ForceAlong,
+    RecordMotion,
+    forces_along,
+    joint_motion,
+    noise_of_rows,
+    record_motions,
+    with_all_inputs,
+)
 from rigsight.metrics import rms
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import evaluated
@@ -211,18 +220,22 @@ def joint_parts(
     share = max(1, MAPS.mapped_samples // len(scored))
     stretches = [_stretch(context, trace, share) for trace in scored]
     records = [_record(context, trace) for trace in stretches]
+    values = reidentified.fit.values
     try:
-        motions = joint_motions(context.rig, records, reidentified.fit.values, context.noise)
+        motions = record_motions(
+            context.rig, [with_all_inputs(context.rig, record) for record in records], values
+        )
+        fit = EquationFit(context.rig, motions, (), (), values)
+        forces = forces_along(fit, values, noise_of_rows(fit, values, context.noise))
     except (SimulationError, np.linalg.LinAlgError):
         # A diagnosis is still useful without this map.
         return ()
-    motions = tuple(motion for motion in motions if np.isfinite(motion.remainder))
-    parts: list[StatePart] = []
-    for motion in sorted(motions, key=lambda motion: motion.remainder):
-        parts += plane_parts(
-            context, _plane(context, motion, reidentified.error_over_noise > VERDICT.at_floor), stretches
-        )
-    return tuple(parts)
+    lacks = reidentified.error_over_noise > VERDICT.at_floor
+    return tuple(
+        part
+        for force in forces
+        for part in plane_parts(context, _plane(context, motions, values, force, lacks=lacks), stretches)
+    )
 
 
 def _stretch(context: FitContext, trace: Trace, n_samples: int) -> Trace:
@@ -255,15 +268,24 @@ def _record(context: FitContext, trace: Trace) -> Record:
     return replace(origin, name=trace.record, window_of="", signals={**trace.inputs, **trace.measured})
 
 
-def _plane(context: FitContext, motion: JointMotion, lacks: bool) -> Plane:
-    force = -np.concatenate(motion.force)
+def _plane(
+    context: FitContext,
+    motions: Sequence[RecordMotion],
+    values: Mapping[str, float],
+    missing: ForceAlong,
+    *,
+    lacks: bool,
+) -> Plane:
+    (joint,) = (own for own in context.rig.mechanism.joints if own.name == missing.joint)
+    moved = [joint_motion(motion, joint, values) for motion in motions]
+    force = -np.concatenate(missing.force)
     return Plane(
-        x=np.concatenate(motion.displacement),
-        v=np.concatenate(motion.velocity),
+        x=np.concatenate([own.x for own in moved]),
+        v=np.concatenate([own.v for own in moved]),
         # The resisting force is the missing force with the opposite sign.
         force=force if lacks else np.full(force.size, NOTHING),
-        force_noise=rms(np.concatenate(motion.error)) if lacks else NOTHING,
+        force_noise=missing.std if lacks else NOTHING,
         forced=tuple(signal.name for signal in context.rig.outputs),
-        units=plane_units(context.rig.units_at(motion.joint.name)),
-        joint=motion.joint.name,
+        units=plane_units(context.rig.units_at(joint.name)),
+        joint=joint.name,
     )

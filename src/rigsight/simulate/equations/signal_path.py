@@ -222,11 +222,9 @@ class _Path:
             if effect.reads(canonical.load):
                 # Effects on the springs of other joints are left out, because the loads of two joints may depend on each other.
                 load = sp.Add(self._defined.bound(self._rig.mechanism.carried_by(joint)), *carried)
-                driven = self._defined.bound(self._rig.mechanism.driven_by(joint))
                 signals = {
                     **signals,
                     "load": self._defined.define(Kind.LOAD, effect, load),
-                    "driven": driven,
                     "damped": self._defined.bound(joint.damping) * signals["v"],
                 }
             torque = self._defined.define(
@@ -250,6 +248,7 @@ class _Path:
             "v": self._defined.bound(rate),
             "k": self._defined.bound(joint.stiffness),
             "position": self._defined.bound(joint.motion),
+            "driven": self._defined.bound(mechanism.driven_by(joint)),
         }
         if not any(derivative(joint.motion, c.symbol) != 0 for c in mechanism.free):
             signals["acceleration"] = self._defined.bound(mechanism.prescribed_rate(rate))

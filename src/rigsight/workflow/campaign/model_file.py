@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rigsight.campaign import Campaign
-from rigsight.discover.monomials import known_terms
+from rigsight.discover.terms import known_terms
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold

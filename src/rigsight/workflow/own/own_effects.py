@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigsight.discover.monomials import known_terms
+from rigsight.discover.terms import known_terms
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.effect import PARTS
 from rigsight.errors import InputError
