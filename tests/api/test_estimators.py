@@ -23,7 +23,7 @@ from rigsight.workflow.identify import run_identify
 
 ESTIMATORS = (rs.Diagnoser, rs.EquationDiscoverer, rs.LinearIdentifier)
 OTHER: dict[str, Any] = {
-    "effects": ["end_stop"], "seed": 7, "n_jobs": 3, "verbose": True, "method": "full", "pointwise": True,
+    "effects": ["end_stop"], "seed": 7, "n_jobs": 3, "verbose": True, "method": "thesis",
     "one_by_one": True, "resolution": 0.5, "rig": "axis",
     "objective": "free-run", "initial_samples": 30,
 }  # fmt: skip
@@ -126,8 +126,8 @@ def test_a_folder_gives_what_the_commands_give(axis_campaign: Path) -> None:
 
 @pytest.mark.slow
 def test_a_discovery_of_a_folder_is_that_of_the_command(axis_campaign: Path) -> None:
-    discovered = rs.EquationDiscoverer("full", seed=3, n_jobs=1).fit(str(axis_campaign)).discovery_
-    assert discovered.to_json() == run_discover(axis_campaign, method="full", seed=3, n_jobs=1).to_json()
+    discovered = rs.EquationDiscoverer(seed=3, n_jobs=1).fit(str(axis_campaign)).discovery_
+    assert discovered.to_json() == run_discover(axis_campaign, seed=3, n_jobs=1).to_json()
 
 
 @pytest.mark.slow
@@ -169,7 +169,6 @@ def test_none_is_the_whole_catalogue(campaign: rs.Campaign, monkeypatch: pytest.
         (rs.Diagnoser(n_jobs=0), "number of jobs"),
         (rs.LinearIdentifier(method="local"), "The method is 'local'"),
         (rs.LinearIdentifier(resolution=-1.0), "resolution must be a positive number"),
-        (rs.EquationDiscoverer(method="fulll"), "Did you mean 'full'"),
     ],
     ids=lambda value: type(value).__name__,
 )

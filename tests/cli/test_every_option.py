@@ -81,7 +81,6 @@ GIVEN: dict[str, list[str]] = {
     "--resolution": ["0.5"],
     "--objective": ["free-run"],
     "--initial-samples": ["50"],
-    "--pointwise": [],
     "--one-by-one": [],
     "--step-seconds": ["2.0"],
     "--column": ["u=2"],
@@ -129,7 +128,6 @@ VALUES_OF = {
     ("gate", "--limit"): ["x=1 mm"],
     ("vary", "--to"): ["9.0"],
     ("export", "--out"): ["elsewhere.py"],
-    ("discover", "--method"): ["full"],
 }
 NOT_PASSED_ON = ("--simulator", "--markdown", "--picture", "--no-browser")
 """Used by the command itself: tests below and in `test_own_simulators`."""

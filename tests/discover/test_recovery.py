@@ -71,6 +71,7 @@ def test_support_and_coefficients_are_recovered(truth: str, noise: float, discov
         if noise <= 2e-5 and values[name] != 0.0:
             assert coefficient.value == pytest.approx(values[name], rel=tolerance), name
 
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "there", "rival"),

@@ -55,9 +55,9 @@ class EquationDiscoverer(CampaignEstimator):
 
     References
     ----------
-    J. Swevers, W. Verdonck and J. De Schutter, IEEE Control Systems 27 (2007) 58, for inverse dynamics as a regression. L. Boninsegna, F. Nueske and C.
-    Clementi, J. Chem. Phys. 148 (2018) 241723, for stepwise sparse regression. U. Fasel et al., Proc. R. Soc. A 478 (2022)
-    20210904, for inclusion probabilities.
+    J. Swevers, W. Verdonck and J. De Schutter, IEEE Control Systems 27 (2007) 58, for inverse dynamics as a regression. L.
+    Boninsegna, F. Nueske and C. Clementi, J. Chem. Phys. 148 (2018) 241723, for stepwise sparse regression. U. Fasel et al.,
+    Proc. R. Soc. A 478 (2022) 20210904, for inclusion probabilities.
 
     Examples
     --------

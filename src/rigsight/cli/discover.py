@@ -8,7 +8,18 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Campaign, Debug, Jobs, Json, OwnEffects, OwnRigs, Quiet, ResultsFolder, Seed, Simulators
+from rigsight.cli.options import (
+    Campaign,
+    Debug,
+    Jobs,
+    Json,
+    OwnEffects,
+    OwnRigs,
+    Quiet,
+    ResultsFolder,
+    Seed,
+    Simulators,
+)
 from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.workflow.run.progress import listening
 

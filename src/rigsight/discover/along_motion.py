@@ -239,7 +239,9 @@ class AlongMotion:
         effect = selection.terms[best].effect
         if not any(state.limit is not None for state in effect.states):
             return found
-        own = [i for i, term in enumerate(selection.terms[: len(self._selection.terms)]) if term.effect is effect]
+        own = [
+            i for i, term in enumerate(selection.terms[: len(self._selection.terms)]) if term.effect is effect
+        ]
         allowed = [i for i in own if selection.allows(i, chosen.columns)]
         for i in sorted(allowed, key=lambda i: self._left(chosen, selection.places[i])):
             inner = selection.terms[i].inner
@@ -259,4 +261,7 @@ class AlongMotion:
 
 def _differ(first: Values, second: Values) -> bool:
     """Return whether parameters differ by a factor of two."""
-    return any(abs(value) > 2.0 * abs(second[name]) or 2.0 * abs(value) < abs(second[name]) for name, value in first.items())
+    return any(
+        abs(value) > 2.0 * abs(second[name]) or 2.0 * abs(value) < abs(second[name])
+        for name, value in first.items()
+    )

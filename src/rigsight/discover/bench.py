@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -58,7 +58,9 @@ class Attempt:
     """A support and the start of its fit."""
 
     support: Support  # names of the effects
-    starts: Sequence[Mapping[str, float]]  # values from which its fit starts; the best after a few evaluations goes on
+    starts: Sequence[
+        Mapping[str, float]
+    ]  # values from which its fit starts; the best after a few evaluations goes on
     release: Release = frozenset()  # parameters that are not held at their special values
 
     @property

@@ -16,6 +16,7 @@ from rigsight.records.record import Floats
 
 SCHEMA_VERSION = 2
 
+
 @dataclass(frozen=True)
 class Coefficient:
     """A coefficient of the equation with its standard error and unit."""
@@ -38,7 +39,9 @@ class Term:
     name: str  # name of the effect
     summary: str  # its description in one sentence
     kept: bool  # true if it is part of the equation
-    inclusion: float | None  # share of resampled records in which sparse regression selects it; None if it did not compete
+    inclusion: (
+        float | None
+    )  # share of resampled records in which sparse regression selects it; None if it did not compete
     coefficients: Mapping[str, Coefficient]  # its parameters; empty if it is not kept
     doubt: str = ""  # reasons to doubt the term; empty if there are none
     where: str = ""  # joint at which it acts; empty for a rig with one joint

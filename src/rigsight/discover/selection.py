@@ -159,7 +159,7 @@ class _Search:
         return Attempt(support, [*starts, {**regressed[0], **carried}])
 
     def special_cases(self, trial: Trial) -> list[Attempt]:
-        """Return the attempts with a special case in place of a term: the regression may prefer a complex term to a simple one."""
+        """Return the attempts with a special case in place of a term: a regression may prefer a complex term to a simple one."""
         effects = self.bench.effects
         found = []
         for name in sorted(trial.support):
@@ -174,7 +174,9 @@ class _Search:
     def tried(self, attempts: Sequence[Attempt]) -> list[Trial]:
         """Return the trials of attempts, with special values released where that lowers the error."""
         bench = self.bench
-        trials = bench.trials_of(attempts, lambda support: self.progress(", ".join(sorted(support)) or "linear"))
+        trials = bench.trials_of(
+            attempts, lambda support: self.progress(", ".join(sorted(support)) or "linear")
+        )
         enough = HOPELESS * min((t.error_over_noise for t in bench.trials.values()), default=math.inf)
         releases = [
             Attempt(t.support, [{**dict(t.fit.structure.fixed), **t.fit.values}], special)

@@ -28,7 +28,9 @@ def _monomial(i: int, j: int) -> Effect:
     return Effect(
         name=f"{_PREFIX}_x{i}_v{j}",
         place=Place.DYNAMICS,
-        summary="A constant resisting torque." if i == j == 0 else f"A resisting torque proportional to {_power(i, j)}.",
+        summary="A constant resisting torque."
+        if i == j == 0
+        else f"A resisting torque proportional to {_power(i, j)}.",
         parameters=(_coefficient(name, _dimension("force", i, j)),),
         energy=Energy.DISSIPATIVE if damps else Energy.ACTIVE,
         signature=Signature(gain_trend=GainTrend.STEADY, even_harmonics=(i + j) % 2 == 0),

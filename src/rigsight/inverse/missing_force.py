@@ -165,22 +165,20 @@ def forces_along(
     return sorted(found, key=lambda own: -own.share)
 
 
-def _missing(
-    fit: EquationFit, values: Mapping[str, float], along: ForceAlong, joint: Joint
-) -> MissingForce:
+def _missing(fit: EquationFit, values: Mapping[str, float], along: ForceAlong, joint: Joint) -> MissingForce:
     motions, units = fit.motions, fit.rig.units_at(joint.name)
     moved = [joint_motion(motion, joint, values) for motion in motions]
     parts = [motion.some(own) for motion, own in zip(motions, along.force, strict=True)]
     force = np.concatenate(parts)
     times = [m.record.dt * np.arange(m.record.n_samples, dtype=np.float64) for m in motions]
-    signals = [
+    time, x, v = (
         np.concatenate([m.thinned(signal) for m, signal in zip(motions, own, strict=True)])
         for own in (times, [j.x for j in moved], [j.v for j in moved])
-    ]
+    )
     names = [m.record.name for m, own in zip(motions, parts, strict=True) for _ in own]
     rms = float(np.sqrt(np.mean(force**2)))
     return MissingForce(
-        joint.name, units["x"], units["force"], along.share, rms, tuple(names), *signals, force
+        joint.name, units["x"], units["force"], along.share, rms, tuple(names), time, x, v, force
     )
 
 

@@ -183,7 +183,7 @@ class Regression:
     def misfit(self, chosen: Sequence[int]) -> float:
         """Return the sum of squares that further columns leave beside those of the equations, all fitted to all stretches."""
         products = self.sums(self.whole).system(chosen)
-        return float(max(_squares(products, _numbers(products, self.n_rows)), _LEAST))
+        return max(float(_squares(products, _numbers(products, self.n_rows))), _LEAST)
 
     @property
     def predicts_accelerations(self) -> bool:

@@ -57,12 +57,17 @@ def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
     missing = joint.missing
     some = slice(None, None, max(1, missing.force.size // _POINTS))
     factor, unit = shown_in(missing.unit, missing.force)
-    motions = ((missing.displacement, missing.motion_unit, "x"), (missing.velocity, f"{missing.motion_unit}/s", "v"))
+    motions = (
+        (missing.displacement, missing.motion_unit, "x"),
+        (missing.velocity, f"{missing.motion_unit}/s", "v"),
+    )
     drawn = [(missing.force, MEASURED, "missing"), (joint.law, WITH_EFFECT, "law")][: 2 if joint.terms else 1]
     for ax, (motion, motion_unit, symbol) in zip(axes, motions, strict=True):
         scale, shown_unit = shown_in(motion_unit, motion)
         for values, color, label in drawn:
-            ax.plot(scale * motion[some], factor * values[some], ".", color=color, markersize=1.0, label=label)
+            ax.plot(
+                scale * motion[some], factor * values[some], ".", color=color, markersize=1.0, label=label
+            )
         ax.set_xlabel(f"{symbol} of {_spoken(joint.joint)} [{shown_unit}]")
         ax.grid()
     axes[0].set_ylabel(f"force [{unit}]")
@@ -78,7 +83,9 @@ def _draw_terms(ax: Axes, terms: Sequence[Term], error: float) -> None:
         word, color = ("without", WITH_EFFECT) if term.kept else ("with", OTHER)
         ax.plot([error, term.otherwise], [place, place], color=color, linewidth=2.0)
         ax.plot(term.otherwise, place, "o", color=color, markersize=4)
-        ax.text(1.1 * max(term.otherwise, error), place, f"{word} {term.otherwise:.3g}", va="center", fontsize=8)
+        ax.text(
+            1.1 * max(term.otherwise, error), place, f"{word} {term.otherwise:.3g}", va="center", fontsize=8
+        )
     ax.axvline(error, color=MEASURED, linewidth=0.8, linestyle=":")
     ax.set_yticks(range(len(names)), names)
     ax.set_ylim(max(len(names), 1) - 0.4, -0.6)

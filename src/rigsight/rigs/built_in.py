@@ -104,9 +104,3 @@ def _rotational(name: str) -> Rig:
 
     text = re.sub(r'(?<=unit = ")[^"]*', turned, rig_file_text(name))
     return rig_of_text(text, f"{name}.toml", check_units=False)
-
-
-def is_built_in_motion(rig: Rig) -> bool:
-    """Return True if a rig has the equations of a built-in one of one motion, in the same words, whatever it is called itself."""
-    built_in = (AXIS, ELEMENT, RUNNING_GEAR, _rotational("axis"), _rotational("element"))
-    return any(rig.mechanism == own.mechanism for own in built_in)

@@ -13,7 +13,6 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.records import Record, Role
-from rigsight.rigs import is_built_in_motion
 from rigsight.workflow.campaign.in_memory import make_campaign, make_model
 from rigsight.workflow.campaign.model_file import model_of, of_this_rig, read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
@@ -90,7 +89,6 @@ def test_a_record_of_angles_turns_the_axis() -> None:
     assert made.rig.signal_units == {"u": "input", "x": "rad"}
     assert [p.unit for p in made.rig.parameters] == ["kg m^2", "N m s/rad", "N m/rad", "rad", "N m"]
     np.testing.assert_allclose(made.records[0]["x"], np.radians(given["x"]), rtol=1e-14)
-    assert is_built_in_motion(made.rig)
 
 
 def test_effects_are_named_or_declared() -> None:
