@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Self
 from rigsight.api.base import Result, campaign_of
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor
-from rigsight.report.comparison import overall_figure, record_figures
-from rigsight.report.notebook import comparison_html
+from rigsight.report.comparison import comparison_html, overall_figure, record_figures
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import of_this_rig
 from rigsight.workflow.compare import compare_campaign, named_competitors, write_comparison

@@ -13,9 +13,9 @@ from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.location.trace import STAGES
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import check_option
-from rigsight.report.notebook import diagnosis_html
 from rigsight.report.record_views import record_drawing
 from rigsight.report.sections import TRUST_COLUMNS, budget_drawing, ranking_drawing, trust_drawing, trust_rows
+from rigsight.report.terminal import diagnosis_html
 from rigsight.report.wording import named_candidate
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of

@@ -11,7 +11,7 @@ from rigsight.campaign import Campaign
 from rigsight.discover import Discovery
 from rigsight.errors import check_option
 from rigsight.plot.discovery import discovery_figure
-from rigsight.report.notebook import discovery_html
+from rigsight.report.terminal import discovery_html
 from rigsight.rigs import Rig
 from rigsight.workflow.discover import discover_campaign, write_discovery
 from rigsight.workflow.run.progress import Listener

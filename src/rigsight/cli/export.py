@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, Model, OwnEffects, OwnRigs, Quiet
 from rigsight.cli.terminal import show_as_json
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def export(
-    model: Model,
+    model: options.Model,
     to: Annotated[
         str,
         typer.Option(
@@ -84,11 +84,11 @@ def export(
             help="For mjcf: simulate the validation records of this campaign in MuJoCo with the written model.",
         ),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Write a model for other tools, such as C, MATLAB, an FMU or MuJoCo.
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, Model, OwnEffects, OwnRigs, Quiet, ResultsFolder, Simulators
-from rigsight.cli.terminal import show, show_files, show_json
+from rigsight.cli.terminal import show, show_files, show_json, table
 from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from rigsight.compare import NumberCheck
     from rigsight.workflow.gate import Gate
-    from rigsight.workflow.gating.limits import Check
+    from rigsight.workflow.gating import Check
 
 CLOSED = 1
 """Exit code of a closed gate."""
 
 
 def gate(
-    model: Model,
+    model: options.Model,
     records: Annotated[
         list[Path],
         typer.Argument(
@@ -33,7 +33,7 @@ def gate(
             help="New records: a campaign.toml, the folder that contains it, or measured files.",
         ),
     ],
-    out: ResultsFolder = Path("gate"),
+    out: options.ResultsFolder = Path("gate"),
     campaign: Annotated[
         Path | None,
         typer.Option(
@@ -65,12 +65,12 @@ def gate(
         Path | None,
         typer.Option("--junit", metavar="FILE", show_default="none", help="Write the checks as JUnit XML."),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Check whether a model still holds for new records; exit code 1 where a gap exceeds its limit.
 
@@ -104,25 +104,23 @@ def gate(
 
 
 def _summary(found: Gate) -> RenderableType:
-    from rich import box
     from rich.console import Group
     from rich.markup import escape
-    from rich.table import Table
 
     from rigsight.workflow.gate import suspect_text
 
-    table = Table("Record", "Sensor", "Gap", "In floors", "Usual", "Limit", "", box=box.SIMPLE)
-    for own in found.checks:
-        usual = "" if own.usual is None else f"{own.usual:.3g}"
-        table.add_row(
-            escape(own.record),
-            escape(own.output),
+    rows = [
+        (
+            own.record,
+            own.output,
             f"{own.gap:.3g} {own.unit}",
             f"{own.gap / own.floor:.3g}",
-            usual,
+            "" if own.usual is None else f"{own.usual:.3g}",
             f"{own.limit:.3g}",
             "closed" if own.closed else "",
         )
+        for own in found.checks
+    ]
     lines = [
         f"The gate is {'closed' if found.closed else 'open'}: {_share(found.checks)} gaps exceed their limits"
         + (
@@ -134,7 +132,8 @@ def _summary(found: Gate) -> RenderableType:
         suspect_text(found),
         *(f"Note: {note}" for note in found.notes),
     ]
-    return Group(table, *(escape(line) for line in lines if line))
+    heads = ("Record", "Sensor", "Gap", "In floors", "Usual", "Limit", "")
+    return Group(table(heads, rows), *(escape(line) for line in lines if line))
 
 
 def _share(checks: Sequence[Check | NumberCheck]) -> str:

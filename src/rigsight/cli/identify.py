@@ -7,27 +7,15 @@ from typing import Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import (
-    Campaign,
-    Debug,
-    Jobs,
-    Json,
-    OwnEffects,
-    OwnRigs,
-    Quiet,
-    ResultsFolder,
-    Seed,
-    Simulators,
-    effect_names,
-)
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.run.progress import listening
 
 
 def identify(
-    campaign: Campaign,
-    out: ResultsFolder = Path("identification"),
+    campaign: options.Campaign,
+    out: options.ResultsFolder = Path("identification"),
     method: Annotated[
         str,
         typer.Option(
@@ -66,21 +54,19 @@ def identify(
     ] = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            show_default="the rig's own equations",
-            help="Calibrate the rig with this effect as well; one with memory, such as bouc_wen_hysteresis. May be repeated.",
-            autocompletion=effect_names,
+        options.effect(
+            "Calibrate the rig with this effect as well; one with memory, such as bouc_wen_hysteresis. May be repeated.",
+            "the rig's own equations",
         ),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    seed: Seed = 0,
-    jobs: Jobs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    seed: options.Seed = 0,
+    jobs: options.Jobs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Identify the parameters of the rig from frequency responses and steps, for each record and for all together.
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.workflow.run.progress import listening
 
@@ -71,11 +71,11 @@ def init(
             "longer.",
         ),
     ] = False,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Write a commented campaign.toml for the measured files of a folder.
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnRigs, Quiet
 from rigsight.cli.terminal import show, show_as_json
 
 if TYPE_CHECKING:
@@ -38,17 +38,17 @@ def inspect(
             help="Plot the channels into a PNG or SVG file as well.",
         ),
     ] = None,
-    rigs: OwnRigs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    rigs: options.OwnRigs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Show the channels of a measured file with units, sample rates, ranges and gaps, and propose its entry in a campaign."""
     with report_errors(debug):
         from rigsight.plot import channel_plots, encoded
         from rigsight.workflow.inspect import plotted_channels, run_inspect
         from rigsight.workflow.own.own_rigs import own_rigs
-        from rigsight.workflow.run.picture import write_picture
+        from rigsight.workflow.run.results import write_picture
 
         found = run_inspect(file, own_rigs(rigs or []).values())
         if picture is not None:

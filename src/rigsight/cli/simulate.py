@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, Model, OwnEffects, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError
 from rigsight.workflow.run.progress import listening
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    model: Model,
+    model: options.Model,
     record: Annotated[
         Path,
         typer.Argument(
@@ -70,12 +70,12 @@ def simulate(
             help="A constant of the rig with a different value in this record: m_load=1.2. May be repeated.",
         ),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Predict the outputs of a model for the inputs of a record.
 

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import show_json
 from rigsight.errors import InputError
 from rigsight.workflow.run.progress import listening
@@ -66,13 +66,13 @@ def vary(
             "--output", metavar="NAME", show_default="the first", help="Output whose response is shown."
         ),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    out: ResultsFolder = Path("vary"),
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    out: options.ResultsFolder = Path("vary"),
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Show how the frequency response of a model changes with a parameter.
 

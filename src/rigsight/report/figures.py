@@ -20,8 +20,7 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import Place, kind_of
 from rigsight.records.record import Floats
 from rigsight.records.stamps import written_span
-from rigsight.report.labels import effect_label, listed, sentence_case
-from rigsight.report.quantities import gap_percent, rig_of
+from rigsight.report.labels import effect_label, gap_percent, listed, rig_of, sentence_case
 from rigsight.report.wording import stage_names
 from rigsight.rigs import Rig, reading_symbol
 from rigsight.simulate.prescribed_motion import smooth_motion

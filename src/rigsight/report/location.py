@@ -16,12 +16,13 @@ from rigsight.report.labels import (
     TIMES,
     effect_label,
     family_label,
+    gap_percent,
     listed,
     percent,
+    rig_of,
     sentence_case,
     unit_text,
 )
-from rigsight.report.quantities import gap_percent, rig_of
 from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names, stages_reported
 

@@ -26,8 +26,7 @@ from rigsight.report.figures import (
     page_figure,
     points_per_curve,
 )
-from rigsight.report.labels import sentence_case, unit_text
-from rigsight.report.quantities import gap_percent
+from rigsight.report.labels import gap_percent, sentence_case, unit_text
 from rigsight.report.responses import PathResponse, response_chart
 from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names

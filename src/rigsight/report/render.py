@@ -20,8 +20,17 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import labels, location, sections, wording
 from rigsight.report.figures import loop_figures, rig_figure
-from rigsight.report.labels import TIMES, effect_label, effects_label, percent, sentence_case
-from rigsight.report.quantities import Written, effect_of, gap_percent, rig_of
+from rigsight.report.labels import (
+    TIMES,
+    Written,
+    effect_label,
+    effect_of,
+    effects_label,
+    gap_percent,
+    percent,
+    rig_of,
+    sentence_case,
+)
 from rigsight.report.record_views import record_views
 from rigsight.report.responses import amplitude_figures, record_responses
 from rigsight.report.wording import advice_sentences, stage_names
@@ -31,6 +40,8 @@ from rigsight.simulate.printing.notation import mathml_equation
 from rigsight.simulate.printing.shown import shown_equations
 
 _TEMPLATES = files("rigsight.report") / "templates"
+NotebookTable = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Heads, which may be none, and rows of texts; the first cell of a row is its label."""
 
 
 def render_report(
@@ -41,7 +52,7 @@ def render_report(
     own_effects: Iterable[Effect] = (),
     origin: Mapping[str, Any] | None = None,
 ) -> str:
-    """Return the report as one HTML page; `origin` is what repeats it, see `workflow.run.origin`."""
+    """Return the report as one HTML page; `origin` is what repeats it, see `workflow.reproduce`."""
     known = known_effects(own_effects)
     responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
     script = _script()
@@ -90,6 +101,17 @@ def rendered(
     """Return a page that ends with how it was made."""
     page = environment().get_template(template)
     return page.render(command=command, versions=versions, seed=seed, made=datetime.now(UTC), **content)
+
+
+def notebook_html(
+    title: str, sentences: Iterable[str], tables: Sequence[NotebookTable], warnings: Sequence[str] = ()
+) -> str:
+    """Return a small self-contained piece of a page, for a notebook."""
+    return (
+        environment()
+        .get_template("notebook.html.jinja")
+        .render(title=title, sentences=[s for s in sentences if s], tables=tables, warnings=warnings)
+    )
 
 
 def _script() -> str:

@@ -27,8 +27,7 @@ from rigsight.plot.frequency_responses import decibel, thinned
 from rigsight.records import Record
 from rigsight.records.record import Floats, Hold, Kind
 from rigsight.report.figures import Chart, ChartPanel, Curve, PageFigure, chart_data, curve_names, page_figure
-from rigsight.report.labels import sentence_case, unit_text
-from rigsight.report.quantities import rig_of
+from rigsight.report.labels import rig_of, sentence_case, unit_text
 from rigsight.report.wording import stage_names
 
 _METHOD: Method = "local_rational"

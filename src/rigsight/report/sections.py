@@ -18,13 +18,16 @@ from rigsight.effects import Effect
 from rigsight.errors import InputError
 from rigsight.parameters import Parameter
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.labels import effect_label, effects_label, percent, sentence_case
-from rigsight.report.quantities import (
+from rigsight.report.labels import (
     ParameterRow,
+    effect_label,
     effect_of,
+    effects_label,
     gap_percent,
     parameter_row,
+    percent,
     rig_of,
+    sentence_case,
     written,
 )
 from rigsight.report.wording import given_text, is_given, named_candidate, stages_reported

@@ -17,12 +17,12 @@ from rigsight.report.labels import (
     effect_label,
     effects_label,
     family_label,
+    gap_percent,
     listed,
     percent,
     place_label,
     unit_text,
 )
-from rigsight.report.quantities import gap_percent
 
 _SEPARATES = 1.0
 """RMS difference in standard deviations of the noise below which an experiment does not help."""
@@ -34,8 +34,6 @@ _VERDICT_NAMES = {
     "none": "No gap",
     "unknown": "Unknown cause",
 }
-
-
 _STATED = {
     "parameters": "no missing effect",
     "none": "no missing effect",

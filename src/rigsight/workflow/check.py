@@ -13,7 +13,7 @@ from rigsight.report.check_page import render_check
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.campaign.without_records import campaign_of_rig, is_rig_file
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
 from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 

@@ -28,8 +28,6 @@ from rigsight.workflow.run.results import check_writable, write_together
 VIRTUAL_RIG_SET = "iwan_tables"
 DT = 5e-3
 """Sample time of the thesis's rig [s]."""
-
-
 CAMPAIGN_FOLDER = "campaign"
 HIDDEN_EFFECT = "iwan_hysteresis"
 MEASURING = "Measuring on the virtual rig"

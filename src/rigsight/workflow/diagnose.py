@@ -27,9 +27,9 @@ from rigsight.simulate import cache_folder
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.check import CHECK_FILE, CHECK_PAGE, check_files, check_of
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
+from rigsight.workflow.reproduce import origin
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
-from rigsight.workflow.run.origin import origin
 from rigsight.workflow.run.progress import Listener, Stage, Step, report_notes, silent
 from rigsight.workflow.run.results import (
     DIAGNOSIS_FILE,

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 from rigsight.compare import NumberCheck, Suspect, free_run, own_numbers, suspects
 from rigsight.compare.on_one_record import FreeRun
@@ -18,10 +19,19 @@ from rigsight.rigs import Rig
 from rigsight.simulate import structure_of_fit
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import named_model
-from rigsight.workflow.gating.junit import Case, junit_xml
-from rigsight.workflow.gating.limits import FALSE_ALARMS, Check, Judge, Limits, judge
-from rigsight.workflow.gating.new_records import Reader
-from rigsight.workflow.gating.reference import Reference, beside, known_gaps, of_diagnosis, of_records
+from rigsight.workflow.gating import (
+    FALSE_ALARMS,
+    Check,
+    Judge,
+    Limits,
+    Reader,
+    Reference,
+    beside,
+    judge,
+    known_gaps,
+    of_diagnosis,
+    of_records,
+)
 from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent
 from rigsight.workflow.run.results import check_target, check_writable, json_text, write_together
@@ -269,3 +279,34 @@ def _notes(record: Record, run: FreeRun, found: Sequence[Check | None]) -> list[
             "usual gap is extrapolated."
         )
     return notes
+
+
+@dataclass(frozen=True)
+class Case:
+    """One check."""
+
+    name: str
+    text: str  # what was found
+    failed: bool
+
+
+def junit_xml(suite: str, cases: Sequence[Case], text: str) -> str:
+    """Return a test suite as XML; the text says what was found as a whole."""
+    failures = str(sum(case.failed for case in cases))
+    counts = {"name": suite, "tests": str(len(cases)), "failures": failures, "errors": "0", "skipped": "0"}
+    root = ET.Element("testsuites", {key: counts[key] for key in ("tests", "failures")})
+    element = ET.SubElement(root, "testsuite", counts)
+    for case in cases:
+        own = ET.SubElement(element, "testcase", classname=suite, name=_printed(case.name), time="0")
+        if case.failed:
+            ET.SubElement(own, "failure", message=_printed(case.text), type="gap")
+        else:
+            ET.SubElement(own, "system-out").text = _printed(case.text)
+    ET.SubElement(element, "system-out").text = _printed(text)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _printed(text: str) -> str:
+    """Return a text with a sign for each character that XML does not allow."""
+    return "".join(sign if sign.isprintable() else "\ufffd" for sign in text)

@@ -18,7 +18,7 @@ from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import json_object
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.campaign.without_records import is_rig_file
-from rigsight.workflow.own.effect_names import effect_on
+from rigsight.workflow.own.own_effects import effect_on
 from rigsight.workflow.run.progress import Listener, Stage, silent
 from rigsight.workflow.run.record_csv import csv_text
 from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, write_together

@@ -15,7 +15,7 @@ from rigsight.inverse import NAMED_IN, NamedSize, along_motion, named_sizes
 from rigsight.json_data import json_data
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
 from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, write_together
 

@@ -20,8 +20,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.campaign_file import Where
-from rigsight.workflow.campaign.given_simulation import checked_numbers
+from rigsight.workflow.campaign.campaign_file import Where, checked_numbers
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import options_of
 from rigsight.workflow.campaign.record_notes import in_units_of

@@ -14,11 +14,10 @@ from rigsight.records.signals import is_constant
 from rigsight.rigs import RIGS, Rig, rig_of_tables
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.campaign_file import Offsets, Where
-from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation
+from rigsight.workflow.campaign.campaign_file import Offsets, Where, checked_numbers, checked_simulation
 from rigsight.workflow.campaign.read_campaign import of_first_record
 from rigsight.workflow.campaign.record_notes import in_units_of, record_notes, rig_in_units_of
-from rigsight.workflow.own.effect_names import effects_on
+from rigsight.workflow.own.own_effects import effects_on
 
 
 def make_campaign(

@@ -14,20 +14,17 @@ from rigsight.discover.monomials import known_terms
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold
-from rigsight.records.formats.known import file_size
 from rigsight.rigs import Rig, declared_rig
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
-from rigsight.workflow.campaign.campaign_file import value_message
-from rigsight.workflow.own.effect_names import effect_on
-from rigsight.workflow.own.own_rigs import known_rigs
+from rigsight.workflow.campaign.campaign_file import LARGEST_FILE, Number, first_errors, value_message
+from rigsight.workflow.own.own_effects import effect_on
+from rigsight.workflow.own.own_rigs import known_rigs, text_of
 
 MODEL_FILE = "model.json"
 _MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
 
-_LARGEST_FILE = 10_000_000
-Number = Annotated[float, Field(allow_inf_nan=False)]
 _GROUPS = ("constants", "parameters", "effect_parameters")
 
 
@@ -87,8 +84,7 @@ def _model(
         table = ModelTable.model_validate(content)
     except ValidationError as error:
         reported = [_message(path, problem) for problem in map(dict, error.errors(include_url=False))]
-        more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
-        raise InputError("\n".join(reported[:5]) + more) from None
+        raise first_errors(reported) from None
     structure = _structure(path, table, _rig(path, table, own_rigs), own_effects)
     return Model(structure, _values(path, structure, table), table.hold)
 
@@ -243,16 +239,7 @@ def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
 
 def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
     """Return the object that a file holds."""
-    try:
-        if file_size(path) > _LARGEST_FILE:
-            raise InputError(f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB, so it is not a {what}.")
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path.name} is not UTF-8 text (byte {error.start}), so it is not a {what}."
-        ) from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    text = text_of(path, f"a {what}", LARGEST_FILE, f", so it is not a {what}", "the file")
     try:
         data = json.loads(text, object_pairs_hook=_without_repeated_keys, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:

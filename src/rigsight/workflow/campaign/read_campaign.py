@@ -20,12 +20,14 @@ from rigsight.workflow.campaign.campaign_file import (
     RecordTable,
     RigTable,
     Where,
+    checked_numbers,
+    checked_simulation,
     locate,
     read_campaign_table,
+    rig_named,
 )
-from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation, rig_named
 from rigsight.workflow.campaign.record_notes import is_in_units_of, record_notes
-from rigsight.workflow.own.effect_names import effect_on
+from rigsight.workflow.own.own_effects import effect_on
 from rigsight.workflow.own.own_rigs import known_rigs
 
 
@@ -176,16 +178,20 @@ def of_first_record(
 def _with_distinct_names(read: Sequence[tuple[RecordTable, Record]]) -> tuple[Record, ...]:
     """Give every record a unique name, which is its key in results."""
     taken = {asked.name for asked, _ in read if asked.name is not None}
-    named: list[Record] = []
-    used: set[str] = set()
+    named: dict[str, Record] = {}
     for asked, record in read:
-        name, count = record.name, 1
-        while name in used or (asked.name is None and name in taken):
-            count += 1
-            name = f"{record.name}_{count}"
-        used.add(name)
-        named.append(replace(record, name=name))
-    return tuple(named)
+        name = free_name(record.name, {*named, *(taken if asked.name is None else ())})
+        named[name] = replace(record, name=name)
+    return tuple(named.values())
+
+
+def free_name(name: str, taken: Collection[str]) -> str:
+    """Return a name, with a number behind it where others have it."""
+    free, count = name, 1
+    while free in taken:
+        count += 1
+        free = f"{name}_{count}"
+    return free
 
 
 def inside(path: Path, where: str, asked: str) -> Path:

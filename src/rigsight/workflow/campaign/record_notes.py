@@ -23,8 +23,6 @@ _LEAST_RATIO = 30.0
 assumption; on nine campaigns, and 24 drawn ones of development seeds, ratios reached 6."""
 _Gain = tuple[Floats, Floats]
 """Frequencies at which an input drives, and the gains there."""
-
-
 _SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
 """Factors by which a stated amplitude may lie below and above half the input's range (one line of many; a step from rest)."""
 _RATES_APART = 100.0

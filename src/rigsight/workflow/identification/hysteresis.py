@@ -16,11 +16,11 @@ from rigsight.identify.hysteresis.calibration import free_parameters, special_st
 from rigsight.identify.identification import EffectScore, HysteresisIdentification, Identification
 from rigsight.metrics import nrmse, rms
 from rigsight.records import Record
-from rigsight.report.quantities import gap_percent
+from rigsight.report.labels import gap_percent
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.own.effect_names import effects_on
+from rigsight.workflow.own.own_effects import effects_on
 from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, Step
 

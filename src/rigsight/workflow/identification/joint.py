@@ -20,8 +20,7 @@ from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.record import Floats
 from rigsight.records.signals import roughness
-from rigsight.report.labels import sentence_case
-from rigsight.report.quantities import gap_percent
+from rigsight.report.labels import gap_percent, sentence_case
 from rigsight.simulate import Structure
 
 _DIFFERENT = 0.01

@@ -60,8 +60,6 @@ _WANTED = {
     },
 }
 """Annotation of a field -> what to give."""
-
-
 _KINKS = (sp.Abs, sp.sign, canonical.positive_part)
 _SMOOTH = (
     sp.exp, sp.log, sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.sinh, sp.cosh, sp.tanh, sp.asinh,

@@ -9,13 +9,13 @@ import platform
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from rigsight.errors import InputError, MachineError
+from rigsight.errors import InputError, MachineError, check_option
 
 _REASONS = {
     errno.EACCES: "no permission to write there",
@@ -170,3 +170,10 @@ def _reported(folder: Path, error: OSError, remedy: str = ELSEWHERE) -> InputErr
         return InputError(f"Cannot write results to {folder}: a file is in the way. Name another folder.")
     reason = _REASONS.get(error.errno or 0, error.strerror or str(error))
     return MachineError(f"Cannot write results to {folder}: {reason}. {remedy}")
+
+
+def write_picture(file: Path, draw: Callable[[str], str | bytes]) -> Path:
+    """Write what is drawn for the suffix of a file, once it is clear that the file can be written."""
+    suffix = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
+    check_target(file)
+    return write_together(file.parent, {file.name: draw(suffix)})[0]

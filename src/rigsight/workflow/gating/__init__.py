@@ -1,1 +1,0 @@
-"""What a gate knows of a model and asks of records."""
