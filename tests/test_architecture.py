@@ -18,7 +18,7 @@ PACKAGES = (ROOT / "src/rigsight", ROOT / "bench/src/rigsight_bench")
 MODULES = sorted(module for package in PACKAGES for module in package.rglob("*.py"))
 LONGEST_FILE = 600
 NAME_A_RIG = {
-    "api/example.py": "the records of the ten lines of the README come from a virtual axis",
+    "workflow/campaign/in_memory.py": "the records of the ten lines of the README come from a virtual axis",
     "discover/hysteresis.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/transfer/conicity.py": "API: equation (2.12) of the thesis, of the running gear",

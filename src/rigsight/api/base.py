@@ -178,6 +178,12 @@ class Result:
                 f"{' and '.join(chosen)} can be chosen only for the picture '{needed}', not for '{picture}'. Leave it out."
             )
 
+    @classmethod
+    def _estimates(cls, what: str, found: Mapping[str, Any]) -> pd.DataFrame:
+        """Return estimates by name as a table."""
+        rows = ({what: name, "value": n.value, "std": n.std, "unit": n.unit} for name, n in found.items())
+        return cls._frame(rows, (what, "value", "std", "unit"))
+
     @staticmethod
     def _frame(rows: Iterable[Mapping[str, Any]], columns: Iterable[str]) -> pd.DataFrame:
         """Return rows as a table with these columns first; columns that only some rows have follow."""

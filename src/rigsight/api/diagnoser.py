@@ -202,39 +202,28 @@ class DiagnosisResult(Result, Diagnosis):
             If there is no such table, or pandas is not installed.
         """
         check_option("The table", table, get_args(Table))
-        if table == "gap":
-            columns = (*STAGES, "noise_floor", "closed")
-            return self._frame(
-                (
-                    {"output": output, **{column: getattr(gap, column) for column in columns}}
-                    for output, gap in self.gap.items()
-                ),
-                ("output", *columns),
-            )
         if table == "trust":
-            return self._frame(trust_rows(self), tuple(TRUST_COLUMNS))
+            return self._frame(trust_rows(self), TRUST_COLUMNS)
+        if table == "gap":
+            stages = (*STAGES, "noise_floor", "closed")
+            gaps = [
+                {"output": name, **{s: getattr(gap, s) for s in stages}} for name, gap in self.gap.items()
+            ]
+            return self._frame(gaps, ("output", *stages))
         if table == "parameters":
             best = named_candidate(self)
-            return self._frame(
-                (
-                    {"parameter": name, "value": number.value, "std": number.std, "unit": number.unit}
-                    for name, number in (best.parameters if best is not None else {}).items()
-                ),
-                ("parameter", "value", "std", "unit"),
-            )
-        return self._frame(
-            (
-                {
-                    "effects": ", ".join(candidate.effects),
-                    "probability": candidate.probability,
-                    "error_over_noise": candidate.error_over_noise,
-                    **{f"nrmse_{output}": error for output, error in candidate.validation_nrmse.items()},
-                    "converged": candidate.success,
-                }
-                for candidate in self.candidates
-            ),
-            ("effects", "probability", "error_over_noise"),
-        )
+            return self._estimates("parameter", {} if best is None else best.parameters)
+        rows = [
+            {
+                "effects": ", ".join(candidate.effects),
+                "probability": candidate.probability,
+                "error_over_noise": candidate.error_over_noise,
+                **{f"nrmse_{output}": error for output, error in candidate.validation_nrmse.items()},
+                "converged": candidate.success,
+            }
+            for candidate in self.candidates
+        ]
+        return self._frame(rows, ("effects", "probability", "error_over_noise"))
 
     def _write(self, folder: Path) -> tuple[Path, ...]:
         return write_diagnosis(self, folder, self.made_by, self.seed, self.own_effects)

@@ -111,7 +111,7 @@ def read_record(
             start=start,
             end=end,
             constants=checked_numbers(
-                Where(Path(path).name), ("constants",), found, found.constants, constants or {}
+                Where(Path(path).name), ("constants",), found.name, found.constants, constants or {}
             ),
         ),
     )

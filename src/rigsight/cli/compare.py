@@ -27,7 +27,6 @@ def compare(
     method: Annotated[
         str,
         typer.Option(
-            "--method",
             metavar="NAME",
             help="Estimator of the frequency responses: local_rational, local_polynomial, h1 or thesis.",
         ),

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from rigsight.cli import options
 from rigsight.cli.exit_codes import GOES_ON, report_errors
 from rigsight.cli.terminal import command_line, show, show_files, show_json
@@ -22,7 +20,7 @@ def diagnose(
     simulator: options.Simulators = None,
     by: Annotated[
         str,
-        typer.Option(metavar="NAME", show_default="nobody", help="Who made it, for the foot of the report."),
+        options.optional("NAME", "nobody", "Who made it, for the foot of the report."),
     ] = "",
     seed: options.Seed = 0,
     jobs: options.Jobs = None,

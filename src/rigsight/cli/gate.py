@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rigsight.compare import NumberCheck
     from rigsight.workflow.gate import Gate
-    from rigsight.workflow.gating import Check
+    from rigsight.workflow.gating.limits import Check
 
 CLOSED = 1
 """Exit code of a closed gate."""
@@ -36,34 +36,29 @@ def gate(
     out: options.ResultsFolder = Path("gate"),
     campaign: Annotated[
         Path | None,
-        typer.Option(
-            "--campaign",
-            metavar="CAMPAIGN",
-            show_default="the diagnosis beside the model",
-            help="Records for which the model is known to hold; its first record says how measured files are read.",
+        options.optional(
+            "CAMPAIGN",
+            "the diagnosis beside the model",
+            "Records for which the model is known to hold; its first record says how measured files are read.",
         ),
     ] = None,
     floors: Annotated[
         float | None,
-        typer.Option(
-            "--floors",
-            metavar="X",
-            show_default="what a true record rarely exceeds",
-            help="Limit of every gap in noise floors of its sensor.",
+        options.optional(
+            "X", "what a true record rarely exceeds", "Limit of every gap in noise floors of its sensor."
         ),
     ] = None,
     limit: Annotated[
         list[str] | None,
-        typer.Option(
-            "--limit",
-            metavar="SENSOR=VALUE UNIT",
-            show_default="as --floors",
-            help="Limit of the gap of a sensor: 'psi=0.1 deg'. May be repeated.",
+        options.optional(
+            "SENSOR=VALUE UNIT",
+            "as --floors",
+            "Limit of the gap of a sensor: 'psi=0.1 deg'. May be repeated.",
         ),
     ] = None,
     junit: Annotated[
         Path | None,
-        typer.Option("--junit", metavar="FILE", show_default="none", help="Write the checks as JUnit XML."),
+        options.optional("FILE", "none", "Write the checks as JUnit XML."),
     ] = None,
     effects: options.OwnEffects = None,
     rigs: options.OwnRigs = None,

@@ -19,7 +19,6 @@ def identify(
     method: Annotated[
         str,
         typer.Option(
-            "--method",
             metavar="NAME",
             help="Estimator of the frequency responses: local_rational or local_polynomial; for built-in rigs of one motion also "
             "h1 or thesis.",
@@ -27,17 +26,15 @@ def identify(
     ] = "local_rational",
     resolution: Annotated[
         float | None,
-        typer.Option(
-            "--resolution",
-            metavar="RAD_S",
-            show_default="chosen for each record",
-            help="Frequency resolution: width of the local bands, or spacing of the averaged frequencies.",
+        options.optional(
+            "RAD_S",
+            "chosen for each record",
+            "Frequency resolution: width of the local bands, or spacing of the averaged frequencies.",
         ),
     ] = None,
     objective: Annotated[
         str,
         typer.Option(
-            "--objective",
             metavar="NAME",
             help="What fits over time minimize: windows, the error with fitted initial states, over windows if the rig drifts; "
             "or free-run, the error of each whole record, from the state that its first samples give.",
@@ -45,12 +42,7 @@ def identify(
     ] = "windows",
     initial_samples: Annotated[
         int | None,
-        typer.Option(
-            "--initial-samples",
-            metavar="N",
-            show_default="20",
-            help="Number of first samples that give the initial state of a free run.",
-        ),
+        options.optional("N", "20", "Number of first samples that give the initial state of a free run."),
     ] = None,
     effect: Annotated[
         list[str] | None,

@@ -15,6 +15,11 @@ def effect_names(begun: str) -> list[str]:
     return [effect.name for effect in CATALOGUE if effect.name.startswith(begun)]
 
 
+def optional(metavar: str, otherwise: str, about: str, *names: str) -> Any:
+    """Return an option, and what is taken where it is not given; its name is that of the parameter where none is stated."""
+    return typer.Option(*names, metavar=metavar, show_default=otherwise, help=about)
+
+
 def effect(about: str, by_default: str = "the catalogue and your own") -> Any:
     """Return the option for the names of the effects with which a command does this."""
     return typer.Option(metavar="NAME", show_default=by_default, help=about, autocompletion=effect_names)

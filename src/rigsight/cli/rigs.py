@@ -21,7 +21,7 @@ def list_rigs(
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option("--picture", metavar="FILE", help="Draw the rig NAME into a PNG or SVG file instead."),
+        typer.Option(metavar="FILE", help="Draw the rig NAME into a PNG or SVG file instead."),
     ] = None,
     rigs: options.OwnRigs = None,
     simulator: options.Simulators = None,

@@ -15,10 +15,10 @@ from rigsight.plot.drawing import (
     OTHER,
     TWO_SIDED,
     WITH_EFFECT,
-    in_style,
     line,
     new_figure,
     shown_in,
+    style,
 )
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _POINTS = 4000
 _SURE = 0.9
 
 
-@in_style
+@style()
 def discovery_figure(found: Discovery) -> Figure:
     """Draw the terms and the free runs of a discovery."""
     terms = found.terms[:_MOST_TERMS]

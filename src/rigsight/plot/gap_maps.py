@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigsight.diagnose.location.gap_parts import (
-    AmplitudePart,
-    BandPart,
-    GapPart,
-    RecordPart,
-    StatePart,
-    TimePart,
-)
+from rigsight.diagnose.location.gap_parts import GapPart, StatePart, TimePart
 from rigsight.diagnose.location.trace import Stage
 from rigsight.inverse import MissingForce
 from rigsight.plot.drawing import (
@@ -23,10 +16,10 @@ from rigsight.plot.drawing import (
     PAGE_WIDTH,
     STAGE_STYLES,
     WITH_EFFECT,
-    in_style,
     new_figure,
     set_margins,
     shown_in,
+    style,
     with_unit,
 )
 
@@ -50,8 +43,13 @@ _USUAL, _ROOM = (1.0, 99.0), 0.3
 _FLOOR_LABEL = "noise floor"
 
 
-def _bars(
-    parts: Sequence[GapPart], stages: Mapping[Stage, str], labels: Sequence[str], xlabel: str, ylabel: str
+@style()
+def gap_bars(
+    parts: Sequence[GapPart],
+    labels: Sequence[str],
+    stages: Mapping[Stage, str],
+    xlabel: str,
+    ylabel: str = "gap [%]",
 ) -> Figure:
     """Draw the stages of each part beside each other on a logarithmic axis, the noise floor as a line over each group."""
     figure = new_figure(PAGE_WIDTH, 2.9, layout=None)
@@ -109,36 +107,7 @@ def _legend(figure: Figure, ax: Axes) -> None:
     )  # fmt: skip
 
 
-@in_style
-def gap_bands(parts: Sequence[BandPart], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage in each frequency band; squares add up to that of the whole gap."""
-    return _bars(
-        parts, stages, [_band_label(part) for part in parts], "frequency [rad/s]", "gap in the band [%]"
-    )
-
-
-def _band_label(part: BandPart) -> str:
-    if not part.excited:
-        return f"above\n{part.omega_low:.3g}"
-    low = "up" if part.omega_low == 0.0 else f"{part.omega_low:.3g}"
-    return f"{low}\nto {part.omega_high:.3g}"
-
-
-@in_style
-def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage on each record, relative to the record's own motion."""
-    return _bars(parts, stages, labels, "record", "gap [%]")
-
-
-@in_style
-def gap_amplitudes(
-    parts: Sequence[AmplitudePart], labels: Sequence[str], stages: Mapping[Stage, str]
-) -> Figure:
-    """Draw the error of each stage at each amplitude of the input, ascending, relative to the motion there."""
-    return _bars(parts, stages, labels, "amplitude of the input", "gap [%]")
-
-
-@in_style
+@style()
 def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
     """Draw the error of each stage over time, one panel per scored record, with the noise floor."""
     records = list(dict.fromkeys(part.record for part in parts))
@@ -165,7 +134,7 @@ def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
     return figure
 
 
-@in_style
+@style()
 def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
     """Draw the error over the plane of displacement and velocity and, where it is known, the missing force."""
     with_force = any(np.isfinite(part.force_mean) for part in parts)
@@ -223,7 +192,7 @@ def _plane(
     bar.ax.tick_params(color=MEASURED)
 
 
-@in_style
+@style()
 def missing_force(force: MissingForce) -> Figure:
     """Draw a missing force over velocity and displacement, each with its mean and two standard errors, and over time."""
     figure = new_figure(PAGE_WIDTH, 3.9)

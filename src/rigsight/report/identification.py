@@ -93,8 +93,7 @@ def identification_summary(found: Identification) -> Summary:
 
 def _amplitude_tables(found: Identification, text: Writer, width: int) -> Iterator[Table]:
     """Yield a column per record in the order of amplitudes, in as many tables as the terminal's width asks for."""
-    records = sorted(found.records, key=lambda r: r.amplitude)
-    names = dict.fromkeys(name for record in records for name in record.estimates)
+    records = _by_amplitude(found)
     at_once = max(1, (width - _NAME_WIDTH) // _RECORD_WIDTH)
     for first in range(0, len(records), at_once):
         part = records[first : first + at_once]
@@ -102,35 +101,34 @@ def _amplitude_tables(found: Identification, text: Writer, width: int) -> Iterat
         table.add_column(text("record"))
         for record in part:
             table.add_column(text(record.record.name), justify="right", overflow="fold")
-        table.add_row(*map(text, amplitude_row(found, part)))
-        for name in names:
-            head = text(with_unit(name, found.units.get(name, "")))
-            table.add_row(head, *(text(estimate_cell(record, name)) for record in part))
+        for row in record_rows(found, part):
+            table.add_row(*map(text, row))
         if any(record.resonance is not None for record in records):
             seen = ("-" if r.resonance is None else f"{r.resonance:.3g}" for r in part)
             table.add_row(text("resonance [rad/s]"), *map(text, seen))
         yield table
 
 
-def amplitude_row(found: Identification, records: Sequence[RecordIdentification]) -> list[str]:
-    """Return head and cells of the amplitudes of records; the unit is in the head, or in each cell where sources differ."""
+def record_rows(found: Identification, records: Sequence[RecordIdentification]) -> Iterator[list[str]]:
+    """Yield head and cells of the amplitudes of records, and of each parameter with its standard error."""
+    # The unit of amplitudes is in the head, or in each cell where sources differ.
     units = [found.units.get(record.source, "") for record in records]
     if len({found.units.get(record.source, "") for record in found.records}) == 1:
-        return [with_unit("amplitude", units[0]), *(f"{record.amplitude:.4g}" for record in records)]
-    return [
-        "amplitude",
-        *(f"{record.amplitude:.4g} {unit}".rstrip() for record, unit in zip(records, units, strict=True)),
-    ]
+        yield [with_unit("amplitude", units[0]), *(f"{record.amplitude:.4g}" for record in records)]
+    else:
+        sizes = zip(records, units, strict=True)
+        yield ["amplitude", *(f"{record.amplitude:.4g} {unit}".rstrip() for record, unit in sizes)]
+    for name in dict.fromkeys(name for record in _by_amplitude(found) for name in record.estimates):
+        cells = []
+        for record in records:
+            value, std = record.estimates.get(name, (math.nan, math.nan))
+            text = plain(written(value, std)) if math.isfinite(std) else f"{value:.3g}"
+            cells.append(text if name in record.estimates else "-")
+        yield [with_unit(name, found.units.get(name, "")), *cells]
 
 
-def estimate_cell(record: RecordIdentification, name: str) -> str:
-    """Return a parameter of one record with its standard error, a dash where the record does not show it."""
-    if name not in record.estimates:
-        return "-"
-    value, std = record.estimates[name]
-    if not math.isfinite(std):
-        return f"{value:.3g}"
-    return plain(written(value, std))
+def _by_amplitude(found: Identification) -> list[RecordIdentification]:
+    return sorted(found.records, key=lambda record: record.amplitude)
 
 
 def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
@@ -371,22 +369,14 @@ def _polynomial(coefficients: Floats) -> str:
 
 def identification_html(identification: Identification) -> str:
     """Return the parameters of each record in the order of amplitudes, and those of all records together."""
-    records = sorted(identification.records, key=lambda record: record.amplitude)
-    names = dict.fromkeys(name for record in records for name in record.estimates)
-    alone = (
-        ("record", *(record.record.name for record in records)),
-        [
-            tuple(amplitude_row(identification, records)),
-            *(
-                (
-                    with_unit(name, identification.units.get(name, "")),
-                    *(estimate_cell(r, name) for r in records),
-                )
-                for name in names
-            ),
-        ],
-    )
-    tables: list[NotebookTable] = [alone, (("all records", ""), list(joint_rows(identification)))]
+    records = _by_amplitude(identification)
+    tables: list[NotebookTable] = [
+        (
+            ("record", *(record.record.name for record in records)),
+            list(record_rows(identification, records)),
+        ),
+        (("all records", ""), list(joint_rows(identification))),
+    ]
     reported = identification.identifiability
     sentences = [
         identification.amplitude_statement,

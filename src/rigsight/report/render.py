@@ -31,8 +31,7 @@ from rigsight.report.labels import (
     rig_of,
     sentence_case,
 )
-from rigsight.report.record_views import record_views
-from rigsight.report.responses import amplitude_figures, record_responses
+from rigsight.report.record_views import amplitude_figures, record_responses, record_views
 from rigsight.report.wording import advice_sentences, stage_names
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
@@ -56,6 +55,8 @@ def render_report(
     known = known_effects(own_effects)
     responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
     script = _script()
+    # The name by which the page's policy allows this one script and no other.
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     return rendered(
         "report.html.jinja",
         command,
@@ -91,7 +92,7 @@ def render_report(
         advice=advice_sentences(diagnosis),
         floors=sections.floor_rows(diagnosis),
         script=Markup(script),
-        script_hash=_content_hash(script),
+        script_hash=f"sha256-{digest}",
     )
 
 
@@ -121,11 +122,6 @@ def _script() -> str:
         for name in ("uplot/LICENSE", "uplot/uPlot.iife.min.js", "charts.js")
     )
     return f"\n/* {terms}*/\n{library}{charts}"
-
-
-def _content_hash(script: str) -> str:
-    """Return the name by which the page's policy allows this one script and no other."""
-    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode('utf-8')).digest()).decode('ascii')}"
 
 
 def environment(*packages: str) -> Environment:

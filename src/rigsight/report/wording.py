@@ -289,11 +289,7 @@ def _deviations(separation: float) -> str:
         return "less than 0.1 standard deviations"
     if separation > _DECIDES:
         return f"more than {_DECIDES:g} standard deviations"
-    return (
-        f"{separation:.0f} standard deviations"
-        if separation >= 10.0
-        else f"{separation:.2g} standard deviations"
-    )
+    return f"{separation:{'.0f' if separation >= 10.0 else '.2g'}} standard deviations"
 
 
 def what_is_probable(diagnosis: Diagnosis) -> str:

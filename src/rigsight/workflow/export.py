@@ -93,14 +93,6 @@ def _validation(
     return found
 
 
-def _gap(model: Model, robot: Path, records: Sequence[Record]) -> tuple[WrittenGap, ...]:
-    """Return the gap in MuJoCo and in the model, both from the states that the first samples of the records show."""
-    from rigsight.robots import gap_of_written
-
-    starts = [first_state(model.structure, r, {**model.values, **r.constants}) for r in records]
-    return gap_of_written(model, robot, records, starts)
-
-
 def _robot(
     model: Model,
     target: str,
@@ -110,7 +102,7 @@ def _robot(
     step: float | None,
     records: Sequence[Record],
 ) -> WrittenFile:
-    from rigsight.robots import isaac_settings, usd_layer, write_back
+    from rigsight.robots import gap_of_written, isaac_settings, usd_layer, write_back
 
     if robot is None:
         raise InputError(
@@ -124,7 +116,9 @@ def _robot(
         )
     if target == "mjcf":
         back = write_back(model, robot)
-        gap = _gap(model, robot, records) if records else ()
+        # In MuJoCo and in the model, both from the states that the first samples of the records show.
+        starts = [first_state(model.structure, r, {**model.values, **r.constants}) for r in records]
+        gap = gap_of_written(model, robot, records, starts) if records else ()
         write_together(file.parent, {file.name: back.text})
         return WrittenFile(file, back.written, back.without_field, gap)
     written = (

@@ -19,10 +19,9 @@ from rigsight.rigs import Rig
 from rigsight.simulate import structure_of_fit
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import named_model
-from rigsight.workflow.gating import (
+from rigsight.workflow.gating.limits import (
     FALSE_ALARMS,
     Check,
-    Judge,
     Limits,
     Reader,
     Reference,
@@ -178,14 +177,20 @@ def gate_of(
     rig = model.structure.rig
     outputs = [signal.name for record in records for signal in rig.outputs if signal.name in record]
     against = judge(rig, limits, reference, outputs, len(records))
-    if not any(_is_limited(against, output) for output in outputs):
+    known = {gap.output for gap in reference.known}
+    if not any(output in known or limits.asked(output, 1.0) is not None for output in outputs):
         raise InputError(
             "Nothing is known of the gaps of this model: there is no diagnosis beside it. Name a campaign for which it "
             "is known to hold with --campaign, or set a limit with --floors or --limit."
         )
     stage = Stage(SIMULATING, len(records) + 1, listener)
     runs: dict[str, FreeRun] = {}
-    checks, numbers, failures, notes = list[Check](), list[NumberCheck](), dict[str, str](), list[str]()
+    checks, numbers, failures, notes = (
+        list[Check](),
+        list[NumberCheck](),
+        dict[str, str](),
+        list[str](),
+    )
     for record in records:
         try:
             run = free_run(model, record, reference.windows(record), reference.floors)
@@ -257,11 +262,6 @@ def _reference(model: Model, path: Path, known: Sequence[Record], new: Sequence[
         return found
     own = {floor.output: floor.std for floor in noise_floors(rig, new, found.window is not None)}
     return replace(found, floors={**own, **found.floors})
-
-
-def _is_limited(against: Judge, output: str) -> bool:
-    asked = against.limits.asked(output, 1.0)
-    return asked is not None or any(gap.output == output for gap in against.reference.known)
 
 
 def _notes(record: Record, run: FreeRun, found: Sequence[Check | None]) -> list[str]:

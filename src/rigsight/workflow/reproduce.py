@@ -67,22 +67,7 @@ class Reproduction:
 
 
 def run_reproduce(report: Path, out: Path, run: Callable[[Sequence[str], Path], None]) -> Reproduction:
-    """Run the diagnosis of a report again and compare.
-
-    Parameters
-    ----------
-    report
-        A report.html of a diagnosis of files.
-    out
-        Folder for the new results and for ``reproduction.json``.
-    run
-        Runs rigsight with arguments in a folder; raises InputError where it fails.
-
-    Raises
-    ------
-    InputError
-        If the file is no such report, its command runs Python files, or the diagnosis fails.
-    """
+    """Run the diagnosis of a report again and compare; `run` runs rigsight with arguments in a folder, or raises InputError."""
     check_writable(out, REPRODUCTION_FILE)
     made = read_origin(report)
     command, folder = _command(report, made["command"]), report.resolve().parent
@@ -163,33 +148,17 @@ def _differences(key: str, reported: Any, found: Any) -> Iterator[Difference]:
     elif isinstance(reported, list) and isinstance(found, list) and len(reported) == len(found):
         for number, (one, other) in enumerate(zip(reported, found, strict=True)):
             yield from _differences(f"{key}.{number}", one, other)
-    elif not _is_same(reported, found):
+    elif isinstance(reported, float | int) and isinstance(found, float | int):
+        if not math.isclose(reported, found, rel_tol=_SAME, abs_tol=_SAME**2):
+            yield Difference(key, reported, found)
+    elif reported != found:
         yield Difference(key, reported, found)
-
-
-def _is_same(reported: Any, found: Any) -> bool:
-    numbers = isinstance(reported, float | int) and isinstance(found, float | int)
-    return math.isclose(reported, found, rel_tol=_SAME, abs_tol=_SAME**2) if numbers else reported == found
 
 
 def origin(
     campaign: Campaign, diagnosis: Diagnosis, command: str, out: Path, by: str
 ) -> dict[str, Any] | None:
-    """Return what a report carries about itself; None for a campaign without files.
-
-    Parameters
-    ----------
-    campaign
-        The campaign that was diagnosed.
-    diagnosis
-        Its diagnosis.
-    command
-        The command as typed.
-    out
-        Folder of the report.
-    by
-        Who made it; empty for nobody in particular.
-    """
+    """Return what a report in the folder `out`, made by somebody, carries about itself; None for a campaign without files."""
     if campaign.path is None:
         return None
     content = diagnosis.to_json()

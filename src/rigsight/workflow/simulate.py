@@ -24,8 +24,7 @@ from rigsight.workflow.campaign.campaign_file import Where, checked_numbers
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import options_of
 from rigsight.workflow.campaign.record_notes import in_units_of
-from rigsight.workflow.run.record_csv import csv_text
-from rigsight.workflow.run.results import check_target, write_together
+from rigsight.workflow.run.results import check_target, csv_text, write_together
 
 
 def run_simulate(
@@ -52,7 +51,7 @@ def run_simulate(
                 f"Column mapping '{name}': a simulation of {rig.name} does not use it.{nearest(name, known)} "
                 f"It uses: {', '.join(known)}."
             )
-    own = checked_numbers(Where(MODEL_FILE), ("constants",), rig, rig.constants, constants or {})
+    own = checked_numbers(Where(MODEL_FILE), ("constants",), rig.name, rig.constants, constants or {})
     if out is not None:
         check_target(Path(out))
         if Path(out).exists() and Path(record).exists() and Path(out).samefile(record):

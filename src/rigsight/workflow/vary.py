@@ -236,19 +236,9 @@ class _Sweeps:
                 raise SimulationError("The model is unstable, so that it has no frequency response.")
             row, column = linear.outputs.index(self.pair.response), linear.inputs.index(self.pair.source)
             exact = linear.frequency_response(omega)[:, row, column] * delay
-            record = self.at()[0]
-            return (
-                FrequencyResponse(
-                    omega=omega,
-                    values=exact,
-                    source=self.pair.source,
-                    response=self.pair.response,
-                    unit=pair_unit(record, self.pair.source, self.pair.response),
-                    method="linear equations",
-                ),
-                0.0,
-                late,
-            )
+            ends = self.pair.source, self.pair.response
+            unit = pair_unit(self.at()[0], *ends)
+            return FrequencyResponse(omega, exact, *ends, unit, method="linear equations"), 0.0, late
         before: FrequencyResponse | None = None
         for slowness in _SLOWNESS:
             record, ratio = self.at(slowness)
@@ -272,10 +262,8 @@ class _Sweeps:
         names = dict(zip(structure.parameter_symbols, structure.names, strict=True))
         shifting = {names[symbol] for delay in delays for symbol in delay.free_symbols}
         known = {symbol: values[name] for symbol, name in names.items() if name in shifting}
-        return float(sum(delay.xreplace(known) for delay in delays)), {
-            **values,
-            **dict.fromkeys(shifting, 0.0),
-        }
+        late = float(sum(delay.xreplace(known) for delay in delays))
+        return late, {**values, **dict.fromkeys(shifting, 0.0)}
 
 
 def _variant(model: Model, parameter: Parameter, value: float, sweeps: _Sweeps) -> Variant:

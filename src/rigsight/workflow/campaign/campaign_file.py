@@ -137,7 +137,7 @@ def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
     data = toml_tables(
         text, path.name, dict.fromkeys(("Cannot declare", "Cannot overwrite", "Cannot mutate"), _TWICE)
     )
-    where = Where.of_toml(path.name, text, data)
+    where = Where(path.name, data, value_places(text))
     return checked_file(where, data, CampaignTable), where
 
 
@@ -249,11 +249,6 @@ class Where:
     # Line and column of each value by its keys; empty if unknown.
     places: Mapping[Location, Place] = field(default_factory=dict)
 
-    @classmethod
-    def of_toml(cls, name: str, text: str, data: Mapping[str, Any]) -> Where:
-        """Return the locations of the keys of a TOML file."""
-        return cls(name, data, value_places(text))
-
     def at(self, *location: str | int) -> str:
         """Return the beginning of a message: ``campaign.toml, line 7, column 5: rig.constants.v``."""
         return f"{self.name}{self._place(location)}: {self.called(location)}"
@@ -312,7 +307,7 @@ def checked_simulation(
 
 
 def checked_numbers(
-    where: Where, key: Location, rig: Rig, allowed: Iterable[Parameter], given: Mapping[str, float]
+    where: Where, key: Location, whose: str, allowed: Iterable[Parameter], given: Mapping[str, float]
 ) -> dict[str, float]:
     """Return given numbers, each one that is allowed and within its range."""
     known = {parameter.name: parameter for parameter in allowed}
@@ -321,7 +316,7 @@ def checked_numbers(
         here = where.at(*key, name)
         if name not in known:
             listed = ", ".join(known) or "none"
-            raise InputError(f"{here}: unknown to {rig.name}.{nearest(name, known)} Known: {listed}.")
+            raise InputError(f"{here}: unknown to {whose}.{nearest(name, known)} Known: {listed}.")
         try:
             checked[name] = known[name].check(value)
         except InputError as error:
@@ -350,7 +345,7 @@ def _check_tables(
 def _constants(
     where: Where, rig: Rig, given: Mapping[str, float], of_records: Collection[str]
 ) -> dict[str, float]:
-    checked = checked_numbers(where, ("rig", "constants"), rig, rig.constants, given)
+    checked = checked_numbers(where, ("rig", "constants"), rig.name, rig.constants, given)
     for constant in rig.constants:
         if constant.name in checked or constant.name in of_records:
             continue
@@ -373,7 +368,9 @@ def _parameters(where: Where, structure: Structure, given: Mapping[str, float]) 
     rig = structure.rig
     constants = {constant.name for constant in rig.constants}
     own = [parameter for parameter in structure.parameters if parameter.name not in constants]
-    checked = checked_numbers(where, ("rig", "parameters"), rig, (*own, *rig.alternative_parameters), given)
+    checked = checked_numbers(
+        where, ("rig", "parameters"), rig.name, (*own, *rig.alternative_parameters), given
+    )
     for parameter in own:
         if parameter not in rig.parameters and parameter.name not in checked:
             if parameter.default is None:

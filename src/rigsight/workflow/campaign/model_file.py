@@ -18,7 +18,14 @@ from rigsight.rigs import Rig, declared_rig
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
-from rigsight.workflow.campaign.campaign_file import LARGEST_FILE, Number, first_errors, value_message
+from rigsight.workflow.campaign.campaign_file import (
+    LARGEST_FILE,
+    Number,
+    Where,
+    checked_numbers,
+    first_errors,
+    value_message,
+)
 from rigsight.workflow.own.own_effects import effect_on
 from rigsight.workflow.own.own_rigs import known_rigs, text_of
 
@@ -191,25 +198,14 @@ def _values(path: Path, structure: Structure, table: ModelTable) -> dict[str, fl
     constants = [p.name for p in rig.constants]
     parameters = [p.name for p in rig.parameters]
     of_effects = [name for name in known if name not in (*constants, *parameters)]
-    values: dict[str, float] = {}
+    values = {name: p.default for name, p in known.items() if p.default is not None}
     missing: list[str] = []
     for group, names in zip(_GROUPS, (constants, parameters, of_effects), strict=True):
-        given: dict[str, float] = getattr(table, group)
-        for name in given:
-            if name not in names:
-                listed = ", ".join(names) or "none"
-                raise InputError(
-                    f"{path.name}: {group}.{name}: unknown to {_described(structure)}.{nearest(name, names)} Known: {listed}."
-                )
-        for name in names:
-            value = given.get(name, known[name].default)
-            if value is None:
-                missing.append(f"{group}.{name}")
-                continue
-            try:
-                values[name] = known[name].check(value)
-            except InputError as error:
-                raise InputError(f"{path.name}: {group}.{name}: {error}") from None
+        own = [known[name] for name in names]
+        values |= checked_numbers(
+            Where(path.name), (group,), _described(structure), own, getattr(table, group)
+        )
+        missing += [f"{group}.{name}" for name in names if name not in values]
     if missing:
         raise InputError(
             f"{path.name}: {_described(structure)} needs {', '.join(missing)}; give a value for each."

@@ -155,10 +155,9 @@ def _in_si(samples: Floats, guess: Guess) -> Floats:
 
 
 def _rises(time: Channel) -> bool:
-    try:
+    with suppress(InputError):
         return step_and_gaps(as_stamps(time.load()))[0] is not None
-    except InputError:
-        return False
+    return False
 
 
 def _timing(guess: FileGuess, channels: Sequence[Channel], no_time: str) -> tuple[list[str], int]:
@@ -187,32 +186,26 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     lines, blanks = [], 0
     needed = _needed(guess)
     remaining = _remaining(guess, channels)
+    source = remaining or "no channel remains"
     for one in (guess.time, *guess.signals):
         if one.channel is not None and one.assumed:
-            (line,) = _column(one, guess.clocks)
+            line = _column(one, guess.clocks)
             mark = "; " if "  # " in line else "  # "
             lines.append(f"{line}{mark}guessed: {one.assumed}; check")
         elif one.channel is not None:
-            lines += _column(one, guess.clocks)
+            lines += filter(None, [_column(one, guess.clocks)])
         elif one.candidates:
             lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {_listed(one.candidates)}")
             blanks += 1
         elif one.signal in guess.rig.absent_inputs and not remaining:
             lines.append(f"# {one.signal} =    # {_unit_of(one)}not recorded: taken as 0 (no excitation)")
         elif one.signal in needed:
-            free = (
-                "; or remove this line if nothing drove the rig"
-                if one.signal in guess.rig.absent_inputs
-                else ""
-            )
-            lines.append(
-                f"{one.signal} = {BLANK}  # {_unit_of(one)}{remaining or 'no channel remains'}{free}"
-            )
+            may_rest = one.signal in guess.rig.absent_inputs
+            free = "; or remove this line if nothing drove the rig" if may_rest else ""
+            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{source}{free}")
             blanks += 1
         elif one.signal in distinguishing(guess.rig):
-            lines.append(
-                f"# {one.signal} =    # {_unit_of(one)}{remaining or 'no channel remains'}; or not recorded here"
-            )
+            lines.append(f"# {one.signal} =    # {_unit_of(one)}{source}; or not recorded here")
     reference = guess.reference.channel
     if reference is not None and reference.name != guess.reference.signal:
         lines.append(
@@ -257,58 +250,41 @@ def _coarse_step(time: Channel) -> float | None:
     return None
 
 
-def _with_time(line: str, guess: Guess, name: str, clocks: Mapping[str, str]) -> str:
-    """Return the line that maps a signal with the time that is its own."""
-    own = f"{{ name = {name}, time = {quoted(clocks[guess.signal])}"
-    if f"{{ name = {name}" in line:
-        return line.replace(f"{{ name = {name}", own, 1)
-    return line.replace(f"{guess.signal} = {name}", f"{guess.signal} = {own} }}", 1)
-
-
 def _unit_of(guess: Guess) -> str:
     return f"[{guess.si}], " if has_si(guess.si) else ""
 
 
-def _column(guess: Guess, clocks: Mapping[str, str]) -> list[str]:
-    """Return the line that maps a signal; empty if its channel has the name of the signal."""
+def _column(guess: Guess, clocks: Mapping[str, str]) -> str:
+    """Return the line that maps a signal, with its own time where it has one; empty if its channel has the name of the signal."""
     assert guess.channel is not None
-    name = quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)
+    keys = {"name": quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)}
     if guess.signal in clocks:
-        return [
-            _with_time(line, guess, name, clocks)
-            for line in _column(guess, {}) or [f"{guess.signal} = {name}"]
-        ]
-    if guess.unit is None:
-        needed = guess.channel.name != guess.signal
+        keys["time"] = quoted(clocks[guess.signal])
+    is_other_name, unit, remark = guess.channel.name != guess.signal, guess.unit, ""
+    if unit is None:
         if guess.signal == TIME and (step := _coarse_step(guess.channel)):
-            return [
-                f"t = {name}  # assumed in s, which gives a sample time of {step:.3g} s; is it in ms? check"
-            ]
-        remark = (
-            f"  # assumed in {guess.si}; check"
-            if has_si(guess.si)
-            else "  # unit unknown, used without conversion; check"
-        )
-        return [f"{guess.signal} = {name}{remark}"] if needed else []
-    if not has_si(guess.si):
-        found = in_drive_unit(guess.unit)
-        if found is None or found[0] == 1.0:
-            return [f"{guess.signal} = {name}  # in {guess.unit}, used without conversion"]
-        return [
-            f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}  # converted to {found[1]}; check gain"
-        ]
-    if not is_a(guess.unit, guess.si):
-        return [
-            f"{guess.signal} = {{ name = {name}, scale = 1.0 }}  # in {guess.unit}, used without conversion; "
-            f"{guess.signal} should be in {guess.si}: check"
-        ]
-    if guess.is_stated:
-        if guess.channel.name == guess.signal:
-            return []
-        return [f"{guess.signal} = {name}  # converted from {guess.unit}, as stated in the file"]
-    if guess.unit == guess.si:
-        return [f"{guess.signal} = {name}"] if guess.channel.name != guess.signal else []
-    return [f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}"]
+            remark = f"assumed in s, which gives a sample time of {step:.3g} s; is it in ms? check"
+        elif is_other_name and has_si(guess.si):
+            remark = f"assumed in {guess.si}; check"
+        elif is_other_name:
+            remark = "unit unknown, used without conversion; check"
+    elif not has_si(guess.si):
+        found = in_drive_unit(unit)
+        remark = f"in {unit}, used without conversion"
+        if found is not None and found[0] != 1.0:
+            keys["unit"], remark = quoted(unit), f"converted to {found[1]}; check gain"
+    elif not is_a(unit, guess.si):
+        keys["scale"] = "1.0"
+        remark = f"in {unit}, used without conversion; {guess.signal} should be in {guess.si}: check"
+    elif guess.is_stated:
+        remark = f"converted from {unit}, as stated in the file" if is_other_name else ""
+    elif unit != guess.si:
+        keys["unit"] = quoted(unit)
+    if not (is_other_name or remark or len(keys) > 1):
+        return ""
+    table = ", ".join(f"{key} = {value}" for key, value in keys.items())
+    value = keys["name"] if len(keys) == 1 else f"{{ {table} }}"
+    return f"{guess.signal} = {value}" + (f"  # {remark}" if remark else "")
 
 
 def guess_kind(samples: Floats) -> Kind:

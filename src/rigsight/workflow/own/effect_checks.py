@@ -21,7 +21,7 @@ from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
 from rigsight.records.record import Floats
-from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, Signal, joint_of, rig_of_tables
+from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, joint_of, rig_of_tables
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
 
@@ -174,31 +174,33 @@ def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float
 
 def null_gives_the_rig(effect: Effect) -> str | None:
     """Check that its null values leave the rig exactly as it is."""
-    bench = bench_of(effect)
-    record = sine_record(FULL, 3, bench=bench)
     null = effect.null_values()
-    plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
-    with_effect = simulate(compose(bench.rig, [effect]), {**start_values(effect)[0], **null}, record)
-    if np.array_equal(with_effect[bench.output], plain):
+    with_effect, plain = _with_and_without(effect, null)
+    if np.array_equal(with_effect, plain):
         return None
-    changed = _difference(with_effect[bench.output], plain)
-
+    changed = _difference(with_effect, plain)
     return (
         f"with {_reported(null)} the simulation differs from that of the rig without the effect: {changed}."
     )
 
 
-def vanishes_continuously(effect: Effect) -> str | None:
-    """Check that close to its null values the response is close to that of the rig without the effect."""
+def _with_and_without(effect: Effect, values: dict[str, float]) -> tuple[Floats, Floats]:
+    """Return the motion in a sine test with an effect that has these values, and without it."""
     bench = bench_of(effect)
     record = sine_record(FULL, 3, bench=bench)
+    plain = simulate(compose(bench.rig), bench.values, record)
+    run = simulate(compose(bench.rig, [effect]), {**start_values(effect)[0], **values}, record)
+    return run[bench.output], plain[bench.output]
+
+
+def vanishes_continuously(effect: Effect) -> str | None:
+    """Check that close to its null values the response is close to that of the rig without the effect."""
     start = start_values(effect)[0]
     near = {
         name: null / 2.0 if abs(null) > 1e3 * abs(start[name]) else _close(null, start[name])
         for name, null in effect.null_values().items()
     }
-    plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
-    with_effect = simulate(compose(bench.rig, [effect]), {**start, **near}, record)[bench.output]
+    with_effect, plain = _with_and_without(effect, near)
     if np.max(np.abs(with_effect - plain)) <= _CONTINUOUS * np.max(np.abs(plain)):
         return None
     return (
@@ -305,7 +307,8 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
         **{p.name: p.held_at(size[p.name]) for p in effect.parameters if not p.fitted},
         **{p.name: p.starts[0] * size[p.name] for p in own},
     }
-    noise = {signal.name: _NOISE * scales[base] for signal, base in _bases(bench.rig)}
+    bases = ("x", "length") if bench.rig.is_driven else ("force",)
+    noise = {s.name: _NOISE * scales[base] for s, base in zip(bench.rig.outputs, bases, strict=False)}
     records = []
     for record in driven:
         simulated = simulate(structure, truth, record)
@@ -348,10 +351,6 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
                 f"instead of {truth[name]:.4g}."
             )
     return None
-
-
-def _bases(rig: Rig) -> list[tuple[Signal, str]]:
-    return list(zip(rig.outputs, ("x", "length") if rig.is_driven else ("force",), strict=False))
 
 
 CHECKS: tuple[Callable[[Effect], str | None], ...] = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import json
 import platform
 import signal
@@ -13,9 +14,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rigsight.errors import InputError, MachineError, check_option
+
+if TYPE_CHECKING:
+    from rigsight.records import Record
 
 _REASONS = {
     errno.EACCES: "no permission to write there",
@@ -34,6 +38,9 @@ DIAGNOSIS_FILE, REPORT_FILE = "diagnosis.json", "report.html"
 """Results of a diagnosis; the bench reads one and links the other."""
 _VERSIONS_OF = ("rigsight", "numpy", "scipy")
 ELSEWHERE = "Name another place with --out."
+_DIGITS = 12
+_STAMPS_TO = 1e-4
+"""Of the sample time: how closely time is written, so that the file is evenly sampled when it is read again."""
 
 _noted: ContextVar[list[Path] | None] = ContextVar("folders with results", default=None)
 
@@ -177,3 +184,19 @@ def write_picture(file: Path, draw: Callable[[str], str | bytes]) -> Path:
     suffix = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
     check_target(file)
     return write_together(file.parent, {file.name: draw(suffix)})[0]
+
+
+def csv_text(record: Record, names: Sequence[str]) -> str:
+    """Return the time and the named signals of a record, under their names, as a CSV file that can be read again."""
+    # Loaded where it is used: the command line imports this module at its start.
+    import numpy as np
+
+    from rigsight.records.read_record import TIME
+    from rigsight.records.stamps import digits_for
+
+    table = np.column_stack([record.t, *(record[name] for name in names)])
+    digits = [digits_for(float(record.t[-1]), _STAMPS_TO * record.dt, _DIGITS), *[_DIGITS] * len(names)]
+    formats, heads = [f"%.{n}g" for n in digits], ",".join([TIME, *names])
+    file = io.StringIO()
+    np.savetxt(file, table, fmt=formats, delimiter=",", header=heads, comments="")
+    return file.getvalue()

@@ -1,0 +1,1 @@
+"""What a gate knows of a model and asks of records."""
