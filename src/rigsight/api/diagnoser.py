@@ -19,8 +19,9 @@ from rigsight.report.terminal import diagnosis_html
 from rigsight.report.wording import named_candidate
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
-from rigsight.workflow.diagnose import diagnose_campaign, write_diagnosis
+from rigsight.workflow.diagnose import diagnose_campaign, result_files
 from rigsight.workflow.run.progress import Listener
+from rigsight.workflow.run.results import write_together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -226,4 +227,4 @@ class DiagnosisResult(Result, Diagnosis):
         return self._frame(rows, ("effects", "probability", "error_over_noise"))
 
     def _write(self, folder: Path) -> tuple[Path, ...]:
-        return write_diagnosis(self, folder, self.made_by, self.seed, self.own_effects)
+        return write_together(folder, result_files(self, self.made_by, self.seed, self.own_effects))

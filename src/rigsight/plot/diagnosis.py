@@ -13,6 +13,7 @@ from rigsight.diagnose.location.trace import Stage, Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.plot.drawing import (
     FLOOR,
+    FLOOR_LINE,
     GIVEN,
     MEASURED,
     OTHER,
@@ -51,7 +52,6 @@ _RINGING = 5.0
 """Multiple of the measured settling time up to which the ringing of a simulation is shown."""
 _NOISE_REACHES = 5.0
 """Standard deviations that noise does not exceed in some thousand samples."""
-_FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
 _BINS = 250
 """Bins of a line in print, where the axis of a whole record is some 110 mm wide."""
 
@@ -137,7 +137,7 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: Mapping[str, str]
             is_total = row == 0 or name == "Left over"
             _waterfall_step(ax, row, 100.0 * start, 100.0 * stop, color, right, is_total)
         if np.isfinite(gap.noise_floor):
-            ax.axvline(100.0 * gap.noise_floor, **_FLOOR_LINE)
+            ax.axvline(100.0 * gap.noise_floor, **FLOOR_LINE)
             ax.annotate(
                 f"noise floor {100.0 * gap.noise_floor:.2g} %",
                 (100.0 * gap.noise_floor, 1.0), (3, 1), xycoords=("data", "axes fraction"), textcoords="offset points",
@@ -197,7 +197,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     ax.set_xscale("log")
     ax.set_xlim(left, right * (right / left) ** 0.12)
     plain_log_ticks(ax, left, right)
-    ax.axvline(1.0, **_FLOOR_LINE)
+    ax.axvline(1.0, **FLOOR_LINE)
     ax.set_yticks(rows[: len(shown)], shown)
     ax.set_ylim(sum(heights) + 0.05, -0.05)
     ax.tick_params(axis="y", length=0)

@@ -61,6 +61,7 @@ STYLE: dict[Any, Any] = {
     "text.parse_math": False,
 }
 
+FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
 TWO_SIDED = 1.96
 """Standard deviations of a 95 % interval."""
 PAGE_WIDTH = 5.4

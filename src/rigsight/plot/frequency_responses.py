@@ -36,6 +36,8 @@ _FACES = ("#440154", "#3b528b", "#21918c", "#5ec962", "#d8b40a", "#d55e00")
 _VARIED = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))
 _LIGHTEST = 0.84
 """Share of the color map that is still seen on white."""
+Variant = tuple[str, NDArray[np.complex128], bool]
+"""Label and complex response of a variant of a model, and whether it is the model as it is, drawn black and wider."""
 Path = tuple[str, str]
 """Input and sensor."""
 
@@ -58,15 +60,6 @@ class Panel:
     measured: FrequencyResponse  # the frequency response
     fitted: FittedCurve | None = None  # the fit, None where there is none
     label: str = ""  # name in a plot of several, e.g. the amplitude
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """The frequency response of a variant of a model."""
-
-    label: str  # for the legend
-    values: NDArray[np.complex128]  # complex, shape (n_frequencies,)
-    is_base: bool = False  # true for the model as it is; drawn black and wider
 
 
 @style()
@@ -264,20 +257,20 @@ def _draw_cell(top: Axes, bottom: Axes, own: FrequencyResponse | None, model: Fi
 
 
 @style()
-def varied_responses(omega: Floats, curves: Sequence[Curve], pair: str, unit: str, title: str) -> Figure:
-    """Draw magnitude [dB] and phase [deg] over angular frequency, one color and line style per curve."""
+def varied_responses(omega: Floats, curves: Sequence[Variant], pair: str, unit: str, title: str) -> Figure:
+    """Draw magnitude [dB] and phase [deg] over angular frequency, one color and line style per variant of a model."""
     import matplotlib as mpl
 
     figure = new_figure(7.4, 5.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     colors = mpl.colormaps["cividis"](np.linspace(0.0, _LIGHTEST, max(len(curves), 2)))
-    for i, curve in enumerate(curves):
+    for i, (label, values, is_base) in enumerate(curves):
         look = {"color": colors[i], "linewidth": 1.4, "linestyle": _VARIED[i % len(_VARIED)], "zorder": 2}
-        if curve.is_base:
+        if is_base:
             look = {"color": "black", "linewidth": 2.2, "linestyle": "-", "zorder": 3}
         with np.errstate(divide="ignore"):
-            top.plot(omega, 20.0 * np.log10(np.abs(curve.values)), label=curve.label, **look)
-        bottom.plot(omega, np.degrees(np.unwrap(np.angle(curve.values))), **look)
+            top.plot(omega, 20.0 * np.log10(np.abs(values)), label=label, **look)
+        bottom.plot(omega, np.degrees(np.unwrap(np.angle(values))), **look)
     label_bode(top, bottom, title, unit)
     top.set_ylabel(f"magnitude {pair} [dB of 1 {unit}]")
     bottom.set_ylabel("phase [\u00b0]")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from rigsight.diagnose.location.gap_parts import GapPart, StatePart, TimePart
 from rigsight.diagnose.location.trace import Stage
 from rigsight.inverse import MissingForce
 from rigsight.plot.drawing import (
-    FLOOR,
+    FLOOR_LINE,
     MEASURED,
     PAGE_WIDTH,
     STAGE_STYLES,
@@ -32,7 +32,6 @@ _LEFT, _RIGHT, _LEGEND = 0.78, 0.1, 0.35
 _STATES_HEIGHT = 3.0
 _BAR_ROOM = 0.84
 """Room beside a map for its color bar with ticks and label [inch]."""
-_FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
 _PERCENT = 100.0
 _SHADES = 15
 """Few enough to be drawn as areas; a smooth scale would become an image of its own. Odd, so that zero has a shade."""
@@ -74,7 +73,7 @@ def gap_bars(
         if np.isfinite(part.noise_floor):
             level = max(_PERCENT * part.noise_floor, bottom)
             named = _FLOOR_LABEL if i == 0 else None
-            ax.plot([i - 0.44, i + 0.44], [level, level], **{**_FLOOR_LINE, "linewidth": 1.3}, label=named)
+            ax.plot([i - 0.44, i + 0.44], [level, level], **{**FLOOR_LINE, "linewidth": 1.3}, label=named)
     ax.set_yscale("log")
     ax.set_ylim(bottom, 1.5 * top)
     ax.set_xlim(-0.6, len(parts) - 0.4)
@@ -120,7 +119,7 @@ def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
         for stage, label in stages.items():
             levels = [_PERCENT * getattr(part, stage) for part in own]
             ax.stairs(levels, edges, label=label, linewidth=1.4, baseline=None, **STAGE_STYLES[stage])
-        ax.axhline(_PERCENT * own[0].noise_floor, label=_FLOOR_LABEL, **_FLOOR_LINE)
+        ax.axhline(_PERCENT * own[0].noise_floor, label=_FLOOR_LABEL, **FLOOR_LINE)
         ax.set_yscale("log")
         ax.set_title(record, fontsize=8.5)
         ax.set_ylabel("gap [%]")

@@ -124,13 +124,6 @@ def _report_continuation(count: int, listener: Listener) -> None:
     listener(Step(stage, "", count, count))
 
 
-def write_diagnosis(
-    diagnosis: Diagnosis, out: Path, command: str, seed: int | None, effects: Iterable[Effect] = CATALOGUE
-) -> tuple[Path, ...]:
-    """Write the three results of a diagnosis into a folder, all or none; the report shows the equations of these effects."""
-    return write_together(out, result_files(diagnosis, command, seed, effects))
-
-
 def result_files(
     diagnosis: Diagnosis,
     command: str,
@@ -138,7 +131,7 @@ def result_files(
     effects: Iterable[Effect] = CATALOGUE,
     made_from: Mapping[str, Any] | None = None,
 ) -> dict[str, str]:
-    """Return the three results of a diagnosis by file name."""
+    """Return the three results of a diagnosis by file name; the report shows the equations of these effects."""
     return {
         DIAGNOSIS_FILE: json_text(diagnosis.to_json()),
         MODEL_FILE: json_text(diagnosis.model),

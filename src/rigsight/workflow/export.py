@@ -55,15 +55,17 @@ def run_export(
     read = named_model(model, own_effects, own_rigs)
     if usd is not None and target != "usd":
         raise InputError(f"--usd applies only to usd; leave it out for {target}.")
-    if target in ROBOT_TARGETS:
-        if hold is not None or source_only or (step is not None and target == "mjcf"):
-            raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")
-        records = () if campaign is None else _validation(campaign, target, own_effects, own_rigs)
-        return _robot(read, target, robot, usd, out, step, records)
-    if robot is not None:
+    if robot is not None and target not in ROBOT_TARGETS:
         raise InputError(f"--mjcf applies only to {', '.join(ROBOT_TARGETS)}; leave it out for {target}.")
-    if campaign is not None:
+    if target in ROBOT_TARGETS and (
+        hold is not None or source_only or (step is not None and target == "mjcf")
+    ):
+        raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")
+    if campaign is not None and target != "mjcf":
         raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
+    if target in ROBOT_TARGETS:
+        records = () if campaign is None else _validation(campaign, own_effects, own_rigs)
+        return _robot(read, target, robot, usd, out, step, records)
     chosen = TARGETS[target]
     file = _target_file(read, out, chosen.name, chosen.suffix)
     content = export_model(
@@ -79,14 +81,10 @@ def run_export(
     return WrittenFile(file)
 
 
-def _validation(
-    campaign: Path, target: str, own_effects: Sequence[Effect], own_rigs: Iterable[Rig]
-) -> tuple[Record, ...]:
+def _validation(campaign: Path, own_effects: Sequence[Effect], own_rigs: Iterable[Rig]) -> tuple[Record, ...]:
     """Return the validation records of a campaign."""
     from rigsight.workflow.campaign.read_campaign import read_campaign
 
-    if target != "mjcf":
-        raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
     found = read_campaign(campaign, own_effects, own_rigs).validation
     if not found:
         raise InputError(f'{campaign} has no validation record: give one of its records role = "validation".')

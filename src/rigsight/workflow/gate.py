@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from rigsight.compare import NumberCheck, Suspect, free_run, own_numbers, suspects
+from rigsight.compare import NumberCheck, Suspect, UsualGap, free_run, own_numbers, suspects
 from rigsight.compare.on_one_record import FreeRun
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
@@ -22,11 +22,11 @@ from rigsight.workflow.campaign.model_file import named_model
 from rigsight.workflow.gating.limits import (
     FALSE_ALARMS,
     Check,
+    Judge,
     Limits,
     Reader,
     Reference,
     beside,
-    judge,
     known_gaps,
     of_diagnosis,
     of_records,
@@ -125,12 +125,12 @@ class Gate:
 
     def to_junit(self) -> str:
         """Return the checks as JUnit XML."""
-        cases = [Case(f"{own.record}: {own.output}", check_text(own), own.closed) for own in self.checks]
+        cases = [(f"{own.record}: {own.output}", check_text(own), own.closed) for own in self.checks]
         for name in dict.fromkeys(own.record for own in self.numbers):
             changed = [own for own in self.numbers if own.record == name and own.closed]
             text = "; ".join(map(number_text, changed)) or "no number has changed"
-            cases.append(Case(f"{name}: numbers", text, bool(changed)))
-        cases += [Case(name, reason, failed=True) for name, reason in self.failures.items()]
+            cases.append((f"{name}: numbers", text, bool(changed)))
+        cases += [(name, reason, True) for name, reason in self.failures.items()]
         return junit_xml(f"rigsight gate {self.rig}", cases, suspect_text(self))
 
 
@@ -176,7 +176,9 @@ def gate_of(
     """Hold the gaps of a model on records against their limits."""
     rig = model.structure.rig
     outputs = [signal.name for record in records for signal in rig.outputs if signal.name in record]
-    against = judge(rig, limits, reference, outputs, len(records))
+    # Each sensor counts as often as a record holds it.
+    tested = [o for o in outputs if limits.asked(o, 1.0) is None and UsualGap.of(reference.known, o)]
+    against = Judge(rig, limits, reference, max(1, len(tested)), len(records))
     known = {gap.output for gap in reference.known}
     if not any(output in known or limits.asked(output, 1.0) is not None for output in outputs):
         raise InputError(
@@ -281,27 +283,18 @@ def _notes(record: Record, run: FreeRun, found: Sequence[Check | None]) -> list[
     return notes
 
 
-@dataclass(frozen=True)
-class Case:
-    """One check."""
-
-    name: str
-    text: str  # what was found
-    failed: bool
-
-
-def junit_xml(suite: str, cases: Sequence[Case], text: str) -> str:
-    """Return a test suite as XML; the text says what was found as a whole."""
-    failures = str(sum(case.failed for case in cases))
+def junit_xml(suite: str, cases: Sequence[tuple[str, str, bool]], text: str) -> str:
+    """Return cases, each with its name, what was found and whether it failed, as XML; the text says what was found as a whole."""
+    failures = str(sum(failed for _, _, failed in cases))
     counts = {"name": suite, "tests": str(len(cases)), "failures": failures, "errors": "0", "skipped": "0"}
     root = ET.Element("testsuites", {key: counts[key] for key in ("tests", "failures")})
     element = ET.SubElement(root, "testsuite", counts)
-    for case in cases:
-        own = ET.SubElement(element, "testcase", classname=suite, name=_printed(case.name), time="0")
-        if case.failed:
-            ET.SubElement(own, "failure", message=_printed(case.text), type="gap")
+    for name, found, failed in cases:
+        own = ET.SubElement(element, "testcase", classname=suite, name=_printed(name), time="0")
+        if failed:
+            ET.SubElement(own, "failure", message=_printed(found), type="gap")
         else:
-            ET.SubElement(own, "system-out").text = _printed(case.text)
+            ET.SubElement(own, "system-out").text = _printed(found)
     ET.SubElement(element, "system-out").text = _printed(text)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"

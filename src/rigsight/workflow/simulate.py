@@ -43,7 +43,8 @@ def run_simulate(
     rig = read.structure.rig
     columns = columns or {}
     known = [TIME, *(signal.name for signal in rig.inputs)]
-    if initial_state == "estimated":
+    estimated = initial_state == "estimated"
+    if estimated:
         known += [signal.name for signal in rig.outputs]
     for name in columns:
         if name not in known:
@@ -58,7 +59,6 @@ def run_simulate(
             raise InputError(
                 f"Cannot write {out}: it is the record that is simulated. Name another file with --out."
             )
-    estimated = initial_state == "estimated"
     driven = read_record(
         Path(record),
         rig.inputs,

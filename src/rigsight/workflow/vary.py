@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError, check_in_range, check_option
@@ -18,7 +19,7 @@ from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_
 from rigsight.json_data import json_data
 from rigsight.parameters import Parameter
 from rigsight.plot import png_bytes, svg_text
-from rigsight.plot.frequency_responses import Curve, varied_responses
+from rigsight.plot.frequency_responses import varied_responses
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, simulate
@@ -362,13 +363,13 @@ def _row(variant: Variant) -> dict[str, Any]:
     return {**found, "magnitude": variant.response.magnitude, "phase": variant.response.phase}
 
 
-def _curves(variation: Variation) -> list[Curve]:
+def _curves(variation: Variation) -> list[tuple[str, NDArray[np.complex128], bool]]:
     unit = "" if variation.parameter.unit in ("", "1") else f" {variation.parameter.unit}"
     return [
-        Curve(
+        (
             f"{variation.parameter.name} = {_plain(variant.value)}{unit}",
             variant.response.values,
-            is_base=math.isclose(variant.value, variation.base, rel_tol=1e-9),
+            math.isclose(variant.value, variation.base, rel_tol=1e-9),
         )
         for variant in variation.variants
         if variant.response is not None

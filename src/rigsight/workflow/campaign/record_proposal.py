@@ -66,9 +66,6 @@ class Proposal:
 
     file: str  # its name, as the campaign is to call it
     guess: FileGuess  # the probable channel of each signal
-    # What probably drove the rig.
-    kind: Kind
-    amplitude: float | None
     lines: tuple[str, ...]  # lines of TOML below ``role``, with what must be checked as comments
     n_blanks: int  # how many values are left to be filled in
     stretches: tuple[tuple[float, float], ...] = ()  # of a log of a robot: those in which it moves [s]
@@ -95,7 +92,7 @@ class Proposal:
         return "\n".join([*head, *held, *self.lines]) + "\n"
 
 
-def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None = None) -> Proposal:
+def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig]) -> Proposal:
     """Return how an open file is written into a campaign."""
     is_log = file.format in LOGS or any(channel.name == _EPISODE for channel in file.channels)
     guess = guess_file(file.channels, rigs, _rising(file.channels), is_log=is_log)
@@ -123,9 +120,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     if columns:
         lines += ["[records.columns]", *columns]
     stretches = tuple(_stretches(guess)) if is_log else ()
-    return Proposal(
-        name or path.name, guess, kind, amplitude, tuple(lines), timing_blanks + column_blanks, stretches
-    )
+    return Proposal(path.name, guess, tuple(lines), timing_blanks + column_blanks, stretches)
 
 
 def _stretches(guess: FileGuess) -> list[tuple[float, float]]:

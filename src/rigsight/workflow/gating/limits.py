@@ -264,16 +264,6 @@ class Judge:
         return check_numbers(record, own, self.reference.numbers, each)
 
 
-def judge(rig: Rig, limits: Limits, reference: Reference, outputs: Sequence[str], n_records: int) -> Judge:
-    """Return what gaps are held against; each sensor counts as often as a record holds it."""
-    tested = [
-        output
-        for output in outputs
-        if limits.asked(output, 1.0) is None and UsualGap.of(reference.known, output)
-    ]
-    return Judge(rig, limits, reference, max(1, len(tested)), n_records)
-
-
 def _limit(text: str, rig: Rig) -> tuple[str, float]:
     found = _LIMIT.fullmatch(text.strip())
     if found is None:

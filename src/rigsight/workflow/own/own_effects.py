@@ -9,7 +9,6 @@ import ast
 import importlib.metadata
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from rigsight.campaign import Campaign
@@ -29,15 +28,9 @@ ENTRY_POINTS = "rigsight.effects"
 """Entry point group of packages that bring effects; each entry is an `Effect` or a tuple of them."""
 CHECKING = "Checking own effects"
 _LONGEST_EQUATION = 160
+_Declared = tuple[Effect, str]
+"""An effect that is not in the catalogue, and the place of its declaration for messages."""
 _MISSING = "--effects expects a Python file. To try only one effect of the catalogue, use --effect NAME."
-
-
-@dataclass(frozen=True)
-class OwnEffect:
-    """An effect that is not in the catalogue, with the place of its declaration for messages."""
-
-    effect: Effect
-    declared: str
 
 
 def own_effects(
@@ -60,36 +53,32 @@ def own_effects(
     InputError
         Naming file and line, if a file cannot be run, declares no effect or a name twice, or an effect fails a check.
     """
-    found: list[OwnEffect] = []
+    found: list[_Declared] = []
     taken = {effect.name: "the catalogue" for effect in known_terms().values()}
     distinct = {Path(file).resolve(): Path(file) for file in files}.values()
-    for own in (*_installed(), *(own for path in distinct for own in _loaded(path))):
-        if any(own.effect is other.effect for other in found):
+    for effect, declared in (*_installed(), *(own for path in distinct for own in _loaded(path))):
+        if any(effect is other for other, _ in found):
             continue
-        faults = declaration_faults(own.effect)
-        if faults:
-            raise InputError(_message(own, faults))
-        if own.effect.name in taken:
+        _refuse(effect, declared, declaration_faults(effect))
+        if effect.name in taken:
             raise InputError(
-                f"{own.declared}: the effect name '{own.effect.name}' is used by {taken[own.effect.name]}; choose another."
+                f"{declared}: the effect name '{effect.name}' is used by {taken[effect.name]}; choose another."
             )
-        taken[own.effect.name] = own.declared
-        found.append(own)
+        taken[effect.name] = declared
+        found.append((effect, declared))
     if not found:
         return ()
     stage = Stage(CHECKING, len(found), listener)
-    for own in found:
-        for parent in own.effect.parents:
+    for effect, declared in found:
+        for parent in effect.parents:
             if parent not in taken:
                 raise InputError(
-                    f"{own.declared}: effect '{own.effect.name}' starts from '{parent}', which is not a known effect."
+                    f"{declared}: effect '{effect.name}' starts from '{parent}', which is not a known effect."
                 )
         if check:
-            broken = failed_checks(own.effect)
-            if broken:
-                raise InputError(_message(own, broken))
-            stage.finished(own.effect.name)
-    return tuple(own.effect for own in found)
+            _refuse(effect, declared, failed_checks(effect))
+            stage.finished(effect.name)
+    return tuple(effect for effect, _ in found)
 
 
 def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -108,17 +97,19 @@ def equation_text(effect: Effect) -> str:
     return textwrap.shorten(", ".join(lines).replace("*", " "), _LONGEST_EQUATION, placeholder=" ...")
 
 
-def _message(own: OwnEffect, faults: Sequence[str]) -> str:
-    start = f"{own.declared}: effect '{own.effect.name}': "
-    return "\n".join(f"{start}{fault}" for fault in faults[:5])
+def _refuse(effect: Effect, declared: str, faults: Sequence[str]) -> None:
+    """Refuse an effect with faults."""
+    if faults:
+        start = f"{declared}: effect '{effect.name}': "
+        raise InputError("\n".join(f"{start}{fault}" for fault in faults[:5]))
 
 
-def _loaded(path: Path) -> list[OwnEffect]:
+def _loaded(path: Path) -> list[_Declared]:
     """Run a Python file and return the effects that it declares, in the order of declaration."""
     module, tree = run_python_file(path, "the Python file with the effects", _MISSING)
     lines_of = _assignments(tree)
     declared = [
-        OwnEffect(value, f"{path.name}, line {lines_of[name]}" if name in lines_of else path.name)
+        (value, f"{path.name}, line {lines_of[name]}" if name in lines_of else path.name)
         for name, value in vars(module).items()
         if isinstance(value, Effect) and not any(value is effect for effect in CATALOGUE)
     ]
@@ -145,7 +136,7 @@ def _assignments(tree: ast.Module) -> dict[str, int]:
     return lines
 
 
-def _installed() -> list[OwnEffect]:
+def _installed() -> list[_Declared]:
     """Return the effects of installed packages."""
     found = []
     for entry in importlib.metadata.entry_points(group=ENTRY_POINTS):
@@ -163,7 +154,7 @@ def _installed() -> list[OwnEffect]:
                 raise InputError(
                     f"{declared}: is a {type(effect).__name__}, not an Effect. Fix or uninstall the package."
                 )
-            found.append(OwnEffect(effect, declared))
+            found.append((effect, declared))
     return found
 
 
