@@ -6,7 +6,7 @@ Without records, a sweep through the natural frequencies of the rig is simulated
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import get_args
 
@@ -19,12 +19,12 @@ from rigsight.excitation import linear_sweep, log_sweep
 from rigsight.parameters import ParameterSet
 from rigsight.records import Hold, Record, Role
 from rigsight.records.signals import is_constant
-from rigsight.rigs import RIGS, Rig, read_rig_file, rig_of_tables
+from rigsight.rigs import RIGS, Rig, read_rig_file, rig_of_tables, rotational
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.linearization import linearize
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.campaign_file import Offsets, Where, checked_numbers, checked_simulation
-from rigsight.workflow.campaign.read_campaign import campaign_of_records, check_roles
+from rigsight.workflow.campaign.read_campaign import campaign_of_records, check_roles, read_campaign
 from rigsight.workflow.campaign.record_notes import in_units_of, rig_in_units_of
 from rigsight.workflow.own.own_effects import effects_on
 
@@ -113,6 +113,34 @@ def make_campaign(
     check_option("offsets", offsets, get_args(Offsets))
     checked = [_checked(called, record, found) for record in records]
     return campaign_of_records(called, found, known, given, checked, modelled, offsets)
+
+
+def campaign_of(
+    campaign: Campaign | Sequence[Record] | str | Path,
+    own_effects: Iterable[Effect] = (),
+    rig: str | Rig | None = None,
+) -> Campaign:
+    """Return a campaign of a rig that may be given: as given, read from its file or folder, or made from records of the rig."""
+    found = None if rig is None else rig_of(rig)
+    if isinstance(campaign, Sequence) and not isinstance(campaign, str):
+        if found is None:
+            raise InputError(
+                "The rig of the records is not given: name it, for instance rs.Diagnoser(rig=...), or make a campaign with "
+                "rs.make_campaign(rig, records)."
+            )
+        return make_campaign(found, campaign)
+    own_rigs = () if found is None or found.name in RIGS else (found,)
+    read = campaign if isinstance(campaign, Campaign) else read_campaign(campaign, own_effects, own_rigs)
+    if (
+        found is not None
+        and read.rig not in (found, rotational(found))
+        and read.rig.mechanism != found.mechanism
+    ):
+        raise InputError(
+            f"The campaign '{read.title}' is of the rig '{read.rig.name}', but the estimator has rig='{found.name}'. Leave rig "
+            "out, or give records of that rig."
+        )
+    return read
 
 
 def make_model(
