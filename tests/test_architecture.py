@@ -18,14 +18,14 @@ PACKAGES = (ROOT / "src/rigsight", ROOT / "bench/src/rigsight_bench")
 MODULES = sorted(module for package in PACKAGES for module in package.rglob("*.py"))
 LONGEST_FILE = 600
 NAME_A_RIG = {
-    "api/example.py": "the records of the ten lines of the README come from a virtual axis",
+    "workflow/campaign/in_memory.py": "the records of the ten lines of the README come from a virtual axis",
     "discover/hysteresis.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/transfer/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
     "rigs/__init__.py": "the built-in rigs",
     "rigs/built_in.py": "the built-in rigs",
     "workflow/demo.py": "the demo is the running gear of the thesis",
-    "workflow/own/effect_benches.py": "effects of one's own are tried on three built-in rigs",
+    "workflow/own/effect_checks.py": "effects of one's own are tried on three built-in rigs",
     "trials/standard/campaign.py": "the standard design draws axes and running gears",
     "trials/standard/trial.py": "rolling effects are drawn on the running gear, the only built-in rig that rolls",
     "trials/handwritten/cells.py": "which rig each hidden effect of the handwritten design has",

@@ -17,8 +17,7 @@ from rigsight.errors import SimulationError
 from rigsight.records import Record
 from rigsight.rigs import ELEMENT, RUNNING_GEAR
 from rigsight.simulate import Structure, compose, simulate
-from rigsight.workflow.own.effect_benches import GEAR_BENCH, Bench, bench_of
-from rigsight.workflow.own.effect_checks import FULL, start_values
+from rigsight.workflow.own.effect_checks import FULL, GEAR_BENCH, Bench, bench_of, start_values
 
 LEVELS = (0.3, 1.0, 3.0)
 """Amplitudes of the drive, in units of the one for which an effect's start values are scaled."""

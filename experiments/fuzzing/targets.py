@@ -27,7 +27,7 @@ from rigsight.rigs import RIGS
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.inspect import run_inspect
-from rigsight.workflow.own import own_effects, python_file
+from rigsight.workflow.own import own_effects, own_rigs
 from rigsight.workflow.run.results import json_text
 from rigsight_bench.running.external import ExternalBench
 
@@ -152,7 +152,7 @@ def _key(data: bytes) -> object:
 
 def _effect_text(data: bytes) -> object:
     """Read a file of effects up to where it would be run: what the fuzzer wrote is never run."""
-    python_file.exec = lambda *_: None  # type: ignore[attr-defined]
+    own_rigs.exec = lambda *_: None  # type: ignore[attr-defined]
     path = _folder() / "mine.py"
     path.write_bytes(data)
     return own_effects.own_effects([path], check=False)

@@ -21,7 +21,7 @@ from rigsight.effects import CATALOGUE, Effect
 from rigsight.inverse import with_all_inputs
 from rigsight.workflow.check import check_of
 from rigsight.workflow.diagnose import diagnose_campaign
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
 from rigsight_bench.trials.designs import draw_trial
 from rigsight_bench.trials.trial import Trial
 

@@ -31,7 +31,7 @@ from rigsight.plan.rivals import Contest, contest_of
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
 from rigsight_bench.trials.standard.campaign import draw_rig
 from rigsight_bench.trials.strength import draw_shape, scaled, sized
 

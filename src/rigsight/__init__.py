@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from rigsight.api.diagnoser import DiagnosisResult as DiagnosisResult
     from rigsight.api.equation_discoverer import DiscoveryResult as DiscoveryResult
     from rigsight.api.equation_discoverer import EquationDiscoverer as EquationDiscoverer
-    from rigsight.api.example import example_campaign as example_campaign
     from rigsight.api.linear_identifier import IdentificationResult as IdentificationResult
     from rigsight.api.linear_identifier import LinearIdentifier as LinearIdentifier
     from rigsight.api.reading import read_record as read_record
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from rigsight.records import ColumnMapping as ColumnMapping
     from rigsight.records import Record as Record
     from rigsight.simulate.model import Model as Model
+    from rigsight.workflow.campaign.in_memory import example_campaign as example_campaign
     from rigsight.workflow.campaign.in_memory import make_campaign as make_campaign
     from rigsight.workflow.campaign.in_memory import make_model as make_model
     from rigsight.workflow.campaign.model_file import read_model as read_model
@@ -55,7 +55,7 @@ _HOMES = {
     "RigsightError": "rigsight.errors",
     "SimulationError": "rigsight.errors",
     "compare_models": "rigsight.api.comparing",
-    "example_campaign": "rigsight.api.example",
+    "example_campaign": "rigsight.workflow.campaign.in_memory",
     "make_campaign": "rigsight.workflow.campaign.in_memory",
     "make_model": "rigsight.workflow.campaign.in_memory",
     "own_effects": "rigsight.workflow.own.own_effects",

@@ -12,7 +12,7 @@ from rigsight.campaign import Campaign
 from rigsight.check import Check, check_campaign
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.records import Record
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
 
 from .axis_records import DT, campaign, swept
 

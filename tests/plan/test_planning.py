@@ -20,7 +20,7 @@ from rigsight.records import Record
 from rigsight.records.read_record import ReadingOptions, read_record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.run.record_csv import csv_text
+from rigsight.workflow.run.results import csv_text
 
 DT, NOISE = 0.01, 1e-5
 VALUES = {"gain": 1.0, "m": 2.0, "d": 12.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0, "T_c": 0.01}

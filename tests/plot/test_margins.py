@@ -26,13 +26,12 @@ def gaps(size: float) -> dict[str, float]:
 
 
 def bands(size: float) -> Figure:
-    return plot.gap_bands(
-        [
-            BandPart(**gaps(size), output="x", omega_low=110.0 * i, omega_high=110.0 * (i + 1), excited=i < 8)
-            for i in range(9)
-        ],
-        STAGES,
-    )
+    parts = [
+        BandPart(**gaps(size), output="x", omega_low=110.0 * i, omega_high=110.0 * (i + 1), excited=i < 8)
+        for i in range(9)
+    ]
+    labels = [f"{part.omega_low:.3g}\nto {part.omega_high:.3g}" for part in parts]
+    return plot.gap_bars(parts, labels, STAGES, "frequency [rad/s]")
 
 
 def records(size: float) -> Figure:
@@ -43,7 +42,7 @@ def records(size: float) -> Figure:
         )
         for _ in range(3)
     ]  # fmt: skip
-    return plot.gap_records(parts, ["1", "2", "3"], STAGES)
+    return plot.gap_bars(parts, ["1", "2", "3"], STAGES, "record")
 
 
 def times(size: float) -> Figure:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import cast
 
 from rigsight.identify.identification import Identification
-from rigsight.report.identification import amplitude_row
+from rigsight.report.identification import record_rows
 
 
 def identified(**amplitudes: float) -> Identification:
@@ -17,10 +17,10 @@ def identified(**amplitudes: float) -> Identification:
 
 def test_a_common_unit_stands_once() -> None:
     driven = identified(u=1.0)
-    assert amplitude_row(driven, driven.records) == ["amplitude [N]", "1"]
+    assert next(record_rows(driven, driven.records)) == ["amplitude [N]", "1"]
 
 
 def test_each_amplitude_has_its_unit_where_a_record_decays_freely() -> None:
     both = identified(u=1.0, x=0.0177)
-    assert amplitude_row(both, both.records) == ["amplitude", "1 N", "0.0177 m"]
-    assert amplitude_row(both, both.records[1:]) == ["amplitude", "0.0177 m"]
+    assert next(record_rows(both, both.records)) == ["amplitude", "1 N", "0.0177 m"]
+    assert next(record_rows(both, both.records[1:])) == ["amplitude", "0.0177 m"]

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 from rigsight.diagnose import Diagnosis
-from rigsight.report.notebook import diagnosis_html
+from rigsight.report.terminal import diagnosis_html
 
 KINDS = (
     "effect", "two effects", "own effect", "parameters", "none", "no candidates", "unknown", "not finite",

@@ -8,8 +8,8 @@ import pytest
 
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report import responses
-from rigsight.report.responses import amplitude_figures, record_responses
+from rigsight.report import record_views
+from rigsight.report.record_views import amplitude_figures, record_responses
 
 
 def test_measured_and_simulated_go_through_one_estimator(diagnosis: Diagnosis) -> None:
@@ -83,7 +83,7 @@ def test_of_inputs_that_move_at_once_each_path_is_shown(diagnosis: Diagnosis) ->
 def test_of_very_many_paths_those_to_the_worst_sensors_are_shown(
     diagnosis: Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(responses, "_MOST_PATHS", 2)
+    monkeypatch.setattr(record_views, "_MOST_PATHS", 2)
     arm = of_an_arm(diagnosis)
     worse = {**arm.gap, "angle_2": replace(arm.gap["angle_2"], reidentified=0.5)}
     found = record_responses(replace(arm, gap=worse), arm.traces[0])

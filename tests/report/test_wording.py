@@ -9,8 +9,7 @@ from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
 from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.effects import Family
-from rigsight.report.labels import percent
-from rigsight.report.quantities import Written, estimate_text, gap_percent, written
+from rigsight.report.labels import Written, estimate_text, gap_percent, percent, written
 from rigsight.report.wording import (
     advice_sentences,
     remainder_sentence,

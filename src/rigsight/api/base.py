@@ -12,11 +12,10 @@ from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, check_option
 from rigsight.records import Record
-from rigsight.rigs import RIGS, Rig, rotational
+from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.in_memory import make_campaign, rig_of
+from rigsight.workflow.campaign.in_memory import campaign_of
 from rigsight.workflow.campaign.model_file import model_of
-from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, listening
 from rigsight.workflow.simulate import simulate_model
@@ -178,6 +177,12 @@ class Result:
                 f"{' and '.join(chosen)} can be chosen only for the picture '{needed}', not for '{picture}'. Leave it out."
             )
 
+    @classmethod
+    def _estimates(cls, what: str, found: Mapping[str, Any]) -> pd.DataFrame:
+        """Return estimates by name as a table."""
+        rows = ({what: name, "value": n.value, "std": n.std, "unit": n.unit} for name, n in found.items())
+        return cls._frame(rows, (what, "value", "std", "unit"))
+
     @staticmethod
     def _frame(rows: Iterable[Mapping[str, Any]], columns: Iterable[str]) -> pd.DataFrame:
         """Return rows as a table with these columns first; columns that only some rows have follow."""
@@ -191,46 +196,3 @@ class Result:
         found = [dict(row) for row in rows]
         names = dict.fromkeys([*columns, *(name for row in found for name in row)])
         return pd.DataFrame(found, columns=list(names))
-
-
-def campaign_of(
-    campaign: Campaign | Sequence[Record] | str | Path,
-    own_effects: Iterable[Effect] = (),
-    rig: str | Rig | None = None,
-) -> Campaign:
-    """Return a campaign: as given, read from its file or folder, or made from records.
-
-    Parameters
-    ----------
-    campaign
-        A campaign, the toml file or the folder that contains one, or records of `rig`.
-    own_effects
-        Effects that it may name beside those of the catalogue.
-    rig
-        Rig of the records, or one that the file may name.
-
-    Raises
-    ------
-    InputError
-        Naming file and key of what cannot be used; or if records are given without a rig, or a campaign is of another rig.
-    """
-    found = None if rig is None else rig_of(rig)
-    if isinstance(campaign, Sequence) and not isinstance(campaign, str):
-        if found is None:
-            raise InputError(
-                "The rig of the records is not given: name it, for instance rs.Diagnoser(rig=...), or make a campaign with "
-                "rs.make_campaign(rig, records)."
-            )
-        return make_campaign(found, campaign)
-    own_rigs = () if found is None or found.name in RIGS else (found,)
-    read = campaign if isinstance(campaign, Campaign) else read_campaign(campaign, own_effects, own_rigs)
-    if (
-        found is not None
-        and read.rig not in (found, rotational(found))
-        and read.rig.mechanism != found.mechanism
-    ):
-        raise InputError(
-            f"The campaign '{read.title}' is of the rig '{read.rig.name}', but the estimator has rig='{found.name}'. Leave rig "
-            "out, or give records of that rig."
-        )
-    return read

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from rigsight.api.base import Result, campaign_of
+from rigsight.api.base import Result
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor
-from rigsight.report.comparison import overall_figure, record_figures
-from rigsight.report.notebook import comparison_html
+from rigsight.report.comparison import comparison_html, overall_figure, record_figures
 from rigsight.simulate.model import Model
+from rigsight.workflow.campaign.in_memory import campaign_of
 from rigsight.workflow.campaign.model_file import of_this_rig
 from rigsight.workflow.compare import compare_campaign, named_competitors, write_comparison
 from rigsight.workflow.run.kernels import checked_jobs

@@ -13,14 +13,15 @@ from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.location.trace import STAGES
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import check_option
-from rigsight.report.notebook import diagnosis_html
 from rigsight.report.record_views import record_drawing
 from rigsight.report.sections import TRUST_COLUMNS, budget_drawing, ranking_drawing, trust_drawing, trust_rows
+from rigsight.report.terminal import diagnosis_html
 from rigsight.report.wording import named_candidate
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
-from rigsight.workflow.diagnose import diagnose_campaign, write_diagnosis
+from rigsight.workflow.diagnose import diagnose_campaign, result_files
 from rigsight.workflow.run.progress import Listener
+from rigsight.workflow.run.results import write_together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -202,39 +203,28 @@ class DiagnosisResult(Result, Diagnosis):
             If there is no such table, or pandas is not installed.
         """
         check_option("The table", table, get_args(Table))
-        if table == "gap":
-            columns = (*STAGES, "noise_floor", "closed")
-            return self._frame(
-                (
-                    {"output": output, **{column: getattr(gap, column) for column in columns}}
-                    for output, gap in self.gap.items()
-                ),
-                ("output", *columns),
-            )
         if table == "trust":
-            return self._frame(trust_rows(self), tuple(TRUST_COLUMNS))
+            return self._frame(trust_rows(self), TRUST_COLUMNS)
+        if table == "gap":
+            stages = (*STAGES, "noise_floor", "closed")
+            gaps = [
+                {"output": name, **{s: getattr(gap, s) for s in stages}} for name, gap in self.gap.items()
+            ]
+            return self._frame(gaps, ("output", *stages))
         if table == "parameters":
             best = named_candidate(self)
-            return self._frame(
-                (
-                    {"parameter": name, "value": number.value, "std": number.std, "unit": number.unit}
-                    for name, number in (best.parameters if best is not None else {}).items()
-                ),
-                ("parameter", "value", "std", "unit"),
-            )
-        return self._frame(
-            (
-                {
-                    "effects": ", ".join(candidate.effects),
-                    "probability": candidate.probability,
-                    "error_over_noise": candidate.error_over_noise,
-                    **{f"nrmse_{output}": error for output, error in candidate.validation_nrmse.items()},
-                    "converged": candidate.success,
-                }
-                for candidate in self.candidates
-            ),
-            ("effects", "probability", "error_over_noise"),
-        )
+            return self._estimates("parameter", {} if best is None else best.parameters)
+        rows = [
+            {
+                "effects": ", ".join(candidate.effects),
+                "probability": candidate.probability,
+                "error_over_noise": candidate.error_over_noise,
+                **{f"nrmse_{output}": error for output, error in candidate.validation_nrmse.items()},
+                "converged": candidate.success,
+            }
+            for candidate in self.candidates
+        ]
+        return self._frame(rows, ("effects", "probability", "error_over_noise"))
 
     def _write(self, folder: Path) -> tuple[Path, ...]:
-        return write_diagnosis(self, folder, self.made_by, self.seed, self.own_effects)
+        return write_together(folder, result_files(self, self.made_by, self.seed, self.own_effects))

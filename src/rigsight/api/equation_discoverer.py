@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from rigsight.api.base import CampaignEstimator, Result
 from rigsight.campaign import Campaign
@@ -12,7 +12,7 @@ from rigsight.discover import Discovery
 from rigsight.effects import Effect
 from rigsight.errors import check_option
 from rigsight.plot.discovery import discovery_figure
-from rigsight.report.notebook import discovery_html
+from rigsight.report.terminal import discovery_html
 from rigsight.rigs import Rig
 from rigsight.workflow.discover import discover_campaign, write_discovery
 from rigsight.workflow.run.progress import Listener
@@ -133,33 +133,20 @@ class DiscoveryResult(Result, Discovery):
         """
         check_option("The table", table, get_args(Table))
         if table == "terms":
-            return self._frame(
-                (
-                    {"term": t.name, "kept": t.kept, "inclusion": t.inclusion, "doubt": t.doubt}
-                    for t in self.terms
-                ),
-                ("term", "kept", "inclusion", "doubt"),
-            )
+            rows = [(t.name, t.kept, t.inclusion, t.doubt) for t in self.terms]
+            names = ("term", "kept", "inclusion", "doubt")
+            return self._frame((dict(zip(names, row, strict=True)) for row in rows), names)
         if table == "alternatives":
-            columns = ("n_parameters", "held_out", "aic", "bic")
-            return self._frame(
-                (
-                    {
-                        "terms": ", ".join(other.terms),
-                        **{column: getattr(other, column) for column in columns},
-                    }
-                    for other in self.alternatives
-                ),
-                ("terms", *columns),
-            )
-        return self._frame(self._coefficient_rows(), ("coefficient", "value", "std", "unit"))
-
-    def _coefficient_rows(self) -> Iterator[dict[str, Any]]:
+            own = ("n_parameters", "held_out", "aic", "bic")
+            others = [
+                {"terms": ", ".join(other.terms), **{c: getattr(other, c) for c in own}}
+                for other in self.alternatives
+            ]
+            return self._frame(others, ("terms", *own))
         found = dict(self.rig_parameters)
         for term in self.kept:
             found |= term.coefficients
-        for name, number in found.items():
-            yield {"coefficient": name, "value": number.value, "std": number.std, "unit": number.unit}
+        return self._estimates("coefficient", found)
 
     def _write(self, folder: Path) -> tuple[Path, ...]:
         return write_discovery(self, folder)

@@ -12,7 +12,7 @@ from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
 from rigsight.identify.record_identification import EstimationOptions
-from rigsight.report.notebook import identification_html
+from rigsight.report.identification import identification_html
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.in_memory import effects_of
 from rigsight.workflow.identification.figures import amplitudes_figure, bode_figure, responses_figure

@@ -9,8 +9,7 @@ from pathlib import Path
 from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
 from rigsight.records import read_record as read_file
 from rigsight.rigs import Rig, rotational
-from rigsight.workflow.campaign.campaign_file import Where
-from rigsight.workflow.campaign.given_simulation import checked_numbers
+from rigsight.workflow.campaign.campaign_file import Where, checked_numbers
 from rigsight.workflow.campaign.in_memory import rig_of
 from rigsight.workflow.campaign.read_campaign import options_of
 
@@ -112,7 +111,7 @@ def read_record(
             start=start,
             end=end,
             constants=checked_numbers(
-                Where(Path(path).name), ("constants",), found, found.constants, constants or {}
+                Where(Path(path).name), ("constants",), found.name, found.constants, constants or {}
             ),
         ),
     )

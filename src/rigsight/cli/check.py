@@ -5,20 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import (
-    Campaign,
-    Debug,
-    Json,
-    OwnEffects,
-    OwnRigs,
-    Quiet,
-    ResultsFolder,
-    effect_names,
-)
-from rigsight.cli.terminal import command_line, show, show_files, show_json
+from rigsight.cli.terminal import command_line, show, show_files, show_json, table
 from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
@@ -28,22 +17,17 @@ if TYPE_CHECKING:
 
 
 def check(
-    campaign: Campaign,
-    out: ResultsFolder = Path("check"),
+    campaign: options.Campaign,
+    out: options.ResultsFolder = Path("check"),
     effect: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            show_default="the catalogue and your own",
-            help="Compare only this effect with the others that are named. May be repeated.",
-            autocompletion=effect_names,
-        ),
+        options.effect("Compare only this effect with the others that are named. May be repeated."),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Say in seconds what the records can show: their faults, the parameters they determine, the effects they tell apart.
 
@@ -72,28 +56,23 @@ def check(
 
 
 def _summary(found: Check) -> Group:
-    from rich import box
     from rich.console import Group
     from rich.markup import escape
-    from rich.table import Table
 
     from rigsight.report.check_page import forms, headline, rivals
 
-    findings = Table("", "Finding", box=box.SIMPLE)
-    for remark in found.remarks:
-        if remark.severity != "note":
-            findings.add_row(remark.severity, escape(f"{remark.sentence} {remark.remedy}"))
-    apart = Table("Effect", "Where", "Not told apart from", box=box.SIMPLE)
+    findings = [(r.severity, f"{r.sentence} {r.remedy}") for r in found.remarks if r.severity != "note"]
+    apart = []
     for rival in rivals(found.matrix):
         words = [rival.visible] if rival.visible else []
         words += [f"{by}: {names}" for by, names in rival.others]
-        apart.add_row(rival.effect, escape(rival.where), escape("; ".join(words)))
+        apart.append((rival.effect, rival.where, "; ".join(words)))
     alike = [f"Forms of {family} that are not told apart: {names}." for family, names in forms(found.matrix)]
-    faults = [findings] if findings.row_count else []
-    effects = [apart] if apart.row_count else ["All families of effects can be told apart."]
+    heads = ("Effect", "Where", "Not told apart from")
+    effects = [table(heads, apart)] if apart else ["All families of effects can be told apart."]
     return Group(
         headline(found),
-        *faults,
+        *([table(("", "Finding"), findings)] if findings else []),
         found.identifiability,
         *([found.matrix.reason] if found.matrix.reason else [*effects, *map(escape, alike)]),
     )

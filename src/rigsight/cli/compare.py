@@ -7,24 +7,14 @@ from typing import Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import (
-    Campaign,
-    Debug,
-    Jobs,
-    Json,
-    OwnEffects,
-    OwnRigs,
-    Quiet,
-    ResultsFolder,
-    Simulators,
-)
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.run.progress import listening
 
 
 def compare(
-    campaign: Campaign,
+    campaign: options.Campaign,
     model: Annotated[
         list[str],
         typer.Argument(
@@ -33,11 +23,10 @@ def compare(
             "simulation that the campaign gives. NAME=MODEL gives it a name in the results.",
         ),
     ],
-    out: ResultsFolder = Path("comparison"),
+    out: options.ResultsFolder = Path("comparison"),
     method: Annotated[
         str,
         typer.Option(
-            "--method",
             metavar="NAME",
             help="Estimator of the frequency responses: local_rational, local_polynomial, h1 or thesis.",
         ),
@@ -45,13 +34,13 @@ def compare(
     step_seconds: Annotated[
         float, typer.Option(metavar="SECONDS", help="Time after a step over which it is compared.")
     ] = 4.0,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    jobs: Jobs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    jobs: options.Jobs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Score models on all records: frequency responses, steps and free runs, each with its noise floor.
 

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import GOES_ON, report_errors
-from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.run.progress import listening
 
@@ -18,11 +18,11 @@ def demo(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for campaign and results.")
     ] = Path("demo"),
-    seed: Seed = 0,
-    jobs: Jobs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    seed: options.Seed = 0,
+    jobs: options.Jobs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Make a campaign of a virtual rig with a hidden effect, and diagnose it.
 

@@ -5,50 +5,28 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from rigsight.cli import options
 from rigsight.cli.exit_codes import GOES_ON, report_errors
-from rigsight.cli.options import (
-    Campaign,
-    Debug,
-    Jobs,
-    Json,
-    OwnEffects,
-    OwnRigs,
-    Quiet,
-    ResultsFolder,
-    Seed,
-    Simulators,
-    effect_names,
-)
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.run.progress import listening
 
 
 def diagnose(
-    campaign: Campaign,
-    out: ResultsFolder = Path("diagnosis"),
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            show_default="the catalogue and your own",
-            help="Try only this effect. May be repeated.",
-            autocompletion=effect_names,
-        ),
-    ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
+    campaign: options.Campaign,
+    out: options.ResultsFolder = Path("diagnosis"),
+    effect: Annotated[list[str] | None, options.effect("Try only this effect. May be repeated.")] = None,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
     by: Annotated[
         str,
-        typer.Option(metavar="NAME", show_default="nobody", help="Who made it, for the foot of the report."),
+        options.optional("NAME", "nobody", "Who made it, for the foot of the report."),
     ] = "",
-    seed: Seed = 0,
-    jobs: Jobs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    seed: options.Seed = 0,
+    jobs: options.Jobs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Find which effect is missing in a simulation, where it acts, and how far it closes the gap.
 

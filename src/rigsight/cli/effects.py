@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
 from rigsight.cli.terminal import show_as_json
 from rigsight.workflow.run.progress import listening
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 def list_effects(
-    effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """List the effects that a diagnosis tries, and check effects of your own.
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, Model, OwnEffects, OwnRigs, Quiet
 from rigsight.cli.terminal import show_as_json
 
 if TYPE_CHECKING:
@@ -16,41 +16,36 @@ if TYPE_CHECKING:
 
 
 def export(
-    model: Model,
+    model: options.Model,
     to: Annotated[
         str,
         typer.Option(
-            "--to",
             metavar="TARGET",
             help="python, control, c, fmu (FMI 2.0), fmu3 (FMI 3.0), matlab, latex, modelica, mjcf, isaac or usd.",
         ),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
+        options.optional(
+            "FILE",
+            "the rig's name with the target's suffix",
+            "File to write; the function, C prefix or model gets its name.",
             "--out",
             "-o",
-            metavar="FILE",
-            show_default="the rig's name with the target's suffix",
-            help="File to write; the function, C prefix or model gets its name.",
         ),
     ] = None,
     hold: Annotated[
         str | None,
-        typer.Option(
-            "--hold",
-            metavar="HOLD",
-            show_default="the model's",
-            help="Behavior of the input between samples: zoh (constant) or foh (linear).",
+        options.optional(
+            "HOLD", "the model's", "Behavior of the input between samples: zoh (constant) or foh (linear)."
         ),
     ] = None,
     step: Annotated[
         float | None,
-        typer.Option(
-            "--step",
-            metavar="SECONDS",
-            show_default="from the time constants of the model",
-            help="Largest internal time step (python, matlab); physics time step (isaac, usd).",
+        options.optional(
+            "SECONDS",
+            "from the time constants of the model",
+            "Largest internal time step (python, matlab); physics time step (isaac, usd).",
         ),
     ] = None,
     source_only: Annotated[
@@ -59,36 +54,33 @@ def export(
     ] = False,
     mjcf: Annotated[
         Path | None,
-        typer.Option(
-            "--mjcf",
-            metavar="FILE",
-            show_default="(none)",
-            help="For mjcf, isaac and usd: the MuJoCo model or URDF from which rigsight init made the rig.",
+        options.optional(
+            "FILE",
+            "(none)",
+            "For mjcf, isaac and usd: the MuJoCo model or URDF from which rigsight init made the rig.",
         ),
     ] = None,
     usd: Annotated[
         Path | None,
-        typer.Option(
-            "--usd",
-            metavar="FILE",
-            show_default="(none)",
-            help="For usd: the robot, whose joints are found by their names. Without it they are written at /Robot/joints.",
+        options.optional(
+            "FILE",
+            "(none)",
+            "For usd: the robot, whose joints are found by their names. Without it they are written at /Robot/joints.",
         ),
     ] = None,
     campaign: Annotated[
         Path | None,
-        typer.Option(
-            "--campaign",
-            metavar="CAMPAIGN",
-            show_default="(none)",
-            help="For mjcf: simulate the validation records of this campaign in MuJoCo with the written model.",
+        options.optional(
+            "CAMPAIGN",
+            "(none)",
+            "For mjcf: simulate the validation records of this campaign in MuJoCo with the written model.",
         ),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Write a model for other tools, such as C, MATLAB, an FMU or MuJoCo.
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, Model, OwnEffects, OwnRigs, Quiet, ResultsFolder, Simulators
-from rigsight.cli.terminal import show, show_files, show_json
+from rigsight.cli.terminal import show, show_files, show_json, table
 from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ CLOSED = 1
 
 
 def gate(
-    model: Model,
+    model: options.Model,
     records: Annotated[
         list[Path],
         typer.Argument(
@@ -33,44 +33,39 @@ def gate(
             help="New records: a campaign.toml, the folder that contains it, or measured files.",
         ),
     ],
-    out: ResultsFolder = Path("gate"),
+    out: options.ResultsFolder = Path("gate"),
     campaign: Annotated[
         Path | None,
-        typer.Option(
-            "--campaign",
-            metavar="CAMPAIGN",
-            show_default="the diagnosis beside the model",
-            help="Records for which the model is known to hold; its first record says how measured files are read.",
+        options.optional(
+            "CAMPAIGN",
+            "the diagnosis beside the model",
+            "Records for which the model is known to hold; its first record says how measured files are read.",
         ),
     ] = None,
     floors: Annotated[
         float | None,
-        typer.Option(
-            "--floors",
-            metavar="X",
-            show_default="what a true record rarely exceeds",
-            help="Limit of every gap in noise floors of its sensor.",
+        options.optional(
+            "X", "what a true record rarely exceeds", "Limit of every gap in noise floors of its sensor."
         ),
     ] = None,
     limit: Annotated[
         list[str] | None,
-        typer.Option(
-            "--limit",
-            metavar="SENSOR=VALUE UNIT",
-            show_default="as --floors",
-            help="Limit of the gap of a sensor: 'psi=0.1 deg'. May be repeated.",
+        options.optional(
+            "SENSOR=VALUE UNIT",
+            "as --floors",
+            "Limit of the gap of a sensor: 'psi=0.1 deg'. May be repeated.",
         ),
     ] = None,
     junit: Annotated[
         Path | None,
-        typer.Option("--junit", metavar="FILE", show_default="none", help="Write the checks as JUnit XML."),
+        options.optional("FILE", "none", "Write the checks as JUnit XML."),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Check whether a model still holds for new records; exit code 1 where a gap exceeds its limit.
 
@@ -104,25 +99,23 @@ def gate(
 
 
 def _summary(found: Gate) -> RenderableType:
-    from rich import box
     from rich.console import Group
     from rich.markup import escape
-    from rich.table import Table
 
     from rigsight.workflow.gate import suspect_text
 
-    table = Table("Record", "Sensor", "Gap", "In floors", "Usual", "Limit", "", box=box.SIMPLE)
-    for own in found.checks:
-        usual = "" if own.usual is None else f"{own.usual:.3g}"
-        table.add_row(
-            escape(own.record),
-            escape(own.output),
+    rows = [
+        (
+            own.record,
+            own.output,
             f"{own.gap:.3g} {own.unit}",
             f"{own.gap / own.floor:.3g}",
-            usual,
+            "" if own.usual is None else f"{own.usual:.3g}",
             f"{own.limit:.3g}",
             "closed" if own.closed else "",
         )
+        for own in found.checks
+    ]
     lines = [
         f"The gate is {'closed' if found.closed else 'open'}: {_share(found.checks)} gaps exceed their limits"
         + (
@@ -134,7 +127,8 @@ def _summary(found: Gate) -> RenderableType:
         suspect_text(found),
         *(f"Note: {note}" for note in found.notes),
     ]
-    return Group(table, *(escape(line) for line in lines if line))
+    heads = ("Record", "Sensor", "Gap", "In floors", "Usual", "Limit", "")
+    return Group(table(heads, rows), *(escape(line) for line in lines if line))
 
 
 def _share(checks: Sequence[Check | NumberCheck]) -> str:

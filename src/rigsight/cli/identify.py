@@ -7,31 +7,18 @@ from typing import Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import (
-    Campaign,
-    Debug,
-    Jobs,
-    Json,
-    OwnEffects,
-    OwnRigs,
-    Quiet,
-    ResultsFolder,
-    Seed,
-    Simulators,
-    effect_names,
-)
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.run.progress import listening
 
 
 def identify(
-    campaign: Campaign,
-    out: ResultsFolder = Path("identification"),
+    campaign: options.Campaign,
+    out: options.ResultsFolder = Path("identification"),
     method: Annotated[
         str,
         typer.Option(
-            "--method",
             metavar="NAME",
             help="Estimator of the frequency responses: local_rational or local_polynomial; for built-in rigs of one motion also "
             "h1 or thesis.",
@@ -39,17 +26,15 @@ def identify(
     ] = "local_rational",
     resolution: Annotated[
         float | None,
-        typer.Option(
-            "--resolution",
-            metavar="RAD_S",
-            show_default="chosen for each record",
-            help="Frequency resolution: width of the local bands, or spacing of the averaged frequencies.",
+        options.optional(
+            "RAD_S",
+            "chosen for each record",
+            "Frequency resolution: width of the local bands, or spacing of the averaged frequencies.",
         ),
     ] = None,
     objective: Annotated[
         str,
         typer.Option(
-            "--objective",
             metavar="NAME",
             help="What fits over time minimize: windows, the error with fitted initial states, over windows if the rig drifts; "
             "or free-run, the error of each whole record, from the state that its first samples give.",
@@ -57,30 +42,23 @@ def identify(
     ] = "windows",
     initial_samples: Annotated[
         int | None,
-        typer.Option(
-            "--initial-samples",
-            metavar="N",
-            show_default="20",
-            help="Number of first samples that give the initial state of a free run.",
-        ),
+        options.optional("N", "20", "Number of first samples that give the initial state of a free run."),
     ] = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            show_default="the rig's own equations",
-            help="Calibrate the rig with this effect as well; one with memory, such as bouc_wen_hysteresis. May be repeated.",
-            autocompletion=effect_names,
+        options.effect(
+            "Calibrate the rig with this effect as well; one with memory, such as bouc_wen_hysteresis. May be repeated.",
+            "the rig's own equations",
         ),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    seed: Seed = 0,
-    jobs: Jobs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    seed: options.Seed = 0,
+    jobs: options.Jobs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Identify the parameters of the rig from frequency responses and steps, for each record and for all together.
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.workflow.run.progress import listening
 
@@ -27,39 +27,35 @@ def init(
     ] = None,
     model: Annotated[
         str | None,
-        typer.Option(
-            "--model",
-            metavar="RIG",
-            show_default="the rig that matches the channels best, of --rigs where given",
-            help="Name of a rig: one that 'rigsight rigs' lists, or one declared with --rigs.",
+        options.optional(
+            "RIG",
+            "the rig that matches the channels best, of --rigs where given",
+            "Name of a rig: one that 'rigsight rigs' lists, or one declared with --rigs.",
         ),
     ] = None,
     mjcf: Annotated[
         Path | None,
-        typer.Option(
-            "--mjcf",
-            metavar="FILE",
-            show_default="none",
-            help="A MuJoCo model or URDF from which a rig file is written beside the campaign. Needs the extra mujoco.",
+        options.optional(
+            "FILE",
+            "none",
+            "A MuJoCo model or URDF from which a rig file is written beside the campaign. Needs the extra mujoco.",
         ),
     ] = None,
     gear: Annotated[
         list[str] | None,
-        typer.Option(
-            "--gear",
-            metavar="JOINT=STIFFNESS",
-            show_default="rigid joints",
-            help="A joint with a compliant gear and its stiffness in N m/rad (N/m), so that play in the gear can be found. "
+        options.optional(
+            "JOINT=STIFFNESS",
+            "rigid joints",
+            "A joint with a compliant gear and its stiffness in N m/rad (N/m), so that play in the gear can be found. "
             "May be repeated.",
         ),
     ] = None,
     lock: Annotated[
         list[str] | None,
-        typer.Option(
-            "--lock",
-            metavar="JOINT=POSITION",
-            show_default="all joints move",
-            help="A joint that a brake or its controller holds, and where, in rad (m): a constant, which a record may set to "
+        options.optional(
+            "JOINT=POSITION",
+            "all joints move",
+            "A joint that a brake or its controller holds, and where, in rad (m): a constant, which a record may set to "
             "another position. May be repeated.",
         ),
     ] = None,
@@ -71,11 +67,11 @@ def init(
             "longer.",
         ),
     ] = False,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Write a commented campaign.toml for the measured files of a folder.
 

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnRigs, Quiet
 from rigsight.cli.terminal import show, show_as_json
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from rigsight.records.channel_summary import ChannelSummary
     from rigsight.workflow.inspect import Inspection
 
 
@@ -31,29 +32,23 @@ def inspect(
     ],
     picture: Annotated[
         Path | None,
-        typer.Option(
-            "--picture",
-            metavar="FILE",
-            show_default="none",
-            help="Plot the channels into a PNG or SVG file as well.",
-        ),
+        options.optional("FILE", "none", "Plot the channels into a PNG or SVG file as well."),
     ] = None,
-    rigs: OwnRigs = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    rigs: options.OwnRigs = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Show the channels of a measured file with units, sample rates, ranges and gaps, and propose its entry in a campaign."""
     with report_errors(debug):
-        from rigsight.plot import channel_plots, encoded
-        from rigsight.workflow.inspect import plotted_channels, run_inspect
+        from rigsight.plot import encoded
+        from rigsight.workflow.inspect import channel_picture, run_inspect
         from rigsight.workflow.own.own_rigs import own_rigs
-        from rigsight.workflow.run.picture import write_picture
+        from rigsight.workflow.run.results import write_picture
 
         found = run_inspect(file, own_rigs(rigs or []).values())
         if picture is not None:
-            plots = plotted_channels(file)
-            write_picture(picture, lambda suffix: encoded(channel_plots(plots), suffix, file.name))
+            write_picture(picture, lambda suffix: encoded(channel_picture(file), suffix, file.name))
     if json:
         show_as_json(found.to_json())
     elif not quiet:
@@ -76,48 +71,35 @@ def _table(found: Inspection) -> Table:
 
     from rigsight.records.stamps import written_stamp
 
-    headings = (
-        "channel",
-        "unit",
-        "samples",
-        "rate",
-        "from",
-        "to",
-        "minimum",
-        "maximum",
-        "gaps",
-        "not finite",
-    )
-    rows = []
-    for channel in found.channels:
-        rate = "" if not channel.dt else f"{1.0 / channel.dt:.6g}"
-        ends = (
-            "" if stamp is None else written_stamp(stamp, channel.dt or 0.0, fewest=5)
-            for stamp in (channel.t0, channel.t1)
-        )
-        rows.append(
-            (
-                escape(channel.name),
-                escape(channel.unit or ""),
-                str(channel.n_samples),
-                rate,
-                *ends,
-                *("" if number is None else f"{number:.5g}" for number in (channel.minimum, channel.maximum)),
-                str(channel.n_gaps or ""),
-                str(channel.n_not_finite or ""),
-            )
-        )
+    def number(value: float | None) -> str:
+        return "" if value is None else f"{value:.5g}"
+
+    def end(channel: ChannelSummary, stamp: float | None) -> str:
+        return "" if stamp is None else written_stamp(stamp, channel.dt or 0.0, fewest=5)
+
+    listed = found.channels
+    columns = {
+        "channel": [escape(c.name) for c in listed],
+        "unit": [escape(c.unit or "") for c in listed],
+        "samples": [str(c.n_samples) for c in listed],
+        "rate": [f"{1.0 / c.dt:.6g}" if c.dt else "" for c in listed],
+        "from": [end(c, c.t0) for c in listed],
+        "to": [end(c, c.t1) for c in listed],
+        "minimum": [number(c.minimum) for c in listed],
+        "maximum": [number(c.maximum) for c in listed],
+        "gaps": [str(c.n_gaps or "") for c in listed],
+        "not finite": [str(c.n_not_finite or "") for c in listed],
+    }
     # A column that is empty for all channels is left out.
-    told_of = [i for i in range(len(headings)) if i == 0 or any(row[i] for row in rows)]
+    columns = {name: cells for name, cells in columns.items() if name == "channel" or any(cells)}
     title = escape(f"{found.file} ({found.format})")
     table = Table(title=title, box=box.SIMPLE, title_justify="left", collapse_padding=True)
-    for i in told_of:
-        if i < 2:
+    for name, cells in columns.items():
+        if name in ("channel", "unit"):
             # Without a least width, numbers would leave a narrow terminal no room for the names.
-            longest = max(len(row[i]) for row in rows)
-            table.add_column(headings[i], overflow="fold", min_width=min(longest, _NAME_WIDTH))
+            table.add_column(name, overflow="fold", min_width=min(max(map(len, cells)), _NAME_WIDTH))
         else:
-            table.add_column(headings[i], justify="right", no_wrap=True)
-    for row in rows:
-        table.add_row(*(row[i] for i in told_of))
+            table.add_column(name, justify="right", no_wrap=True)
+    for row in zip(*columns.values(), strict=True):
+        table.add_row(*row)
     return table

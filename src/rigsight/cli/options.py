@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,6 +13,16 @@ def effect_names(begun: str) -> list[str]:
     from rigsight.effects import CATALOGUE
 
     return [effect.name for effect in CATALOGUE if effect.name.startswith(begun)]
+
+
+def optional(metavar: str, otherwise: str, about: str, *names: str) -> Any:
+    """Return an option, and what is taken where it is not given; its name is that of the parameter where none is stated."""
+    return typer.Option(*names, metavar=metavar, show_default=otherwise, help=about)
+
+
+def effect(about: str, by_default: str = "the catalogue and your own") -> Any:
+    """Return the option for the names of the effects with which a command does this."""
+    return typer.Option(metavar="NAME", show_default=by_default, help=about, autocompletion=effect_names)
 
 
 Campaign = Annotated[

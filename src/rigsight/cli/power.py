@@ -5,21 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import (
-    Campaign,
-    Debug,
-    Json,
-    OwnEffects,
-    OwnRigs,
-    Quiet,
-    ResultsFolder,
-    Seed,
-    effect_names,
-)
-from rigsight.cli.terminal import show, show_files, show_json
+from rigsight.cli.terminal import show, show_files, show_json, table
 from rigsight.workflow.run.progress import listening
 
 if TYPE_CHECKING:
@@ -29,23 +17,15 @@ if TYPE_CHECKING:
 
 
 def power(
-    campaign: Campaign,
-    out: ResultsFolder = Path("power"),
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            show_default="the catalogue and your own",
-            help="Ask only for this effect. May be repeated.",
-            autocompletion=effect_names,
-        ),
-    ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    seed: Seed = 0,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    campaign: options.Campaign,
+    out: options.ResultsFolder = Path("power"),
+    effect: Annotated[list[str] | None, options.effect("Ask only for this effect. May be repeated.")] = None,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    seed: options.Seed = 0,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Show the smallest size of each effect that these records would have named, before you trust that nothing is missing.
 
@@ -74,18 +54,14 @@ def power(
 
 
 def _table(found: Power) -> Table:
-    from rich import box
-    from rich.markup import escape
-    from rich.table import Table
-
     from rigsight.report.labels import effect_label, unit_text
 
-    table = Table("Effect", "Where", "Named from", box=box.SIMPLE)
+    rows = []
     for size in found.sizes:
         values = [
             f"{name} = {value:.3g} {unit_text(unit)}".strip()
             for name, (value, unit) in size.parameters.items()
         ]
         words = values[0] + (f" (with {', '.join(values[1:])})" if values[1:] else "") if values else ""
-        table.add_row(effect_label(size.effect), escape(size.where), escape(words or size.reason))
-    return table
+        rows.append((effect_label(size.effect), size.where, words or size.reason))
+    return table(("Effect", "Where", "Named from"), rows)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, Quiet, ResultsFolder
-from rigsight.cli.terminal import show, show_files, show_json
+from rigsight.cli.terminal import show, show_files, show_json, table
 from rigsight.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,10 +25,10 @@ NOT_THE_SAME = 1
 
 def reproduce(
     report: Annotated[Path, typer.Argument(metavar="REPORT", help="The report.html of a diagnosis.")],
-    out: ResultsFolder = Path("reproduction"),
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    out: options.ResultsFolder = Path("reproduction"),
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Run the diagnosis of a report again and say whether it says the same; exit code 1 where it does not.
 
@@ -57,10 +57,7 @@ def reproduce(
 
 
 def _summary(found: Reproduction) -> Group:
-    from rich import box
     from rich.console import Group
-    from rich.markup import escape
-    from rich.table import Table
 
     if found.is_same:
         words = "The same inputs give the same results."
@@ -68,9 +65,6 @@ def _summary(found: Reproduction) -> Group:
         words = f"Not run: these inputs are missing or changed: {', '.join(found.changed_inputs)}."
     else:
         words = "The same inputs give other results."
-    table = Table("", "Report", "Now", box=box.SIMPLE)
-    for name, (before, now) in found.versions.items():
-        table.add_row(f"version of {name}", before, now)
-    for one in found.differences:
-        table.add_row(escape(one.key), escape(f"{one.reported}"), escape(f"{one.found}"))
-    return Group(words, *([table] if table.row_count else []))
+    rows = [(f"version of {name}", *pair) for name, pair in found.versions.items()]
+    rows += [(one.key, f"{one.reported}", f"{one.found}") for one in found.differences]
+    return Group(words, *([table(("", "Report", "Now"), rows)] if rows else []))

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnRigs, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError, check_option
-from rigsight.workflow.run.picture import write_picture
+from rigsight.workflow.run.results import write_picture
 
 
 def list_rigs(
@@ -21,12 +21,12 @@ def list_rigs(
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option("--picture", metavar="FILE", help="Draw the rig NAME into a PNG or SVG file instead."),
+        typer.Option(metavar="FILE", help="Draw the rig NAME into a PNG or SVG file instead."),
     ] = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    json: Json = False,
-    debug: Debug = False,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    json: options.Json = False,
+    debug: options.Debug = False,
 ) -> None:
     """List the built-in rigs, check rig files of your own, print the file of a rig, or draw it.
 

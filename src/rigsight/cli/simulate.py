@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, Model, OwnEffects, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError
 from rigsight.workflow.run.progress import listening
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    model: Model,
+    model: options.Model,
     record: Annotated[
         Path,
         typer.Argument(
@@ -28,54 +28,47 @@ def simulate(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE",
-            show_default="RECORD_simulated.csv in the current folder",
-            help="CSV file to write.",
+        options.optional(
+            "FILE", "RECORD_simulated.csv in the current folder", "CSV file to write.", "--out", "-o"
         ),
     ] = None,
     column: Annotated[
         list[str] | None,
         typer.Option(
-            "--column",
             metavar="SIGNAL=COLUMN",
             help="Column of a signal, by name or number: u=current or u=2. May be repeated.",
         ),
     ] = None,
     unit: Annotated[
         list[str] | None,
-        typer.Option(
-            "--unit",
-            metavar="SIGNAL=UNIT",
-            show_default="the unit in the file, else SI",
-            help="Unit of a signal's column: t=ms. May be repeated.",
+        options.optional(
+            "SIGNAL=UNIT",
+            "the unit in the file, else SI",
+            "Unit of a signal's column: t=ms. May be repeated.",
         ),
     ] = None,
     initial_state: Annotated[
         str | None,
-        typer.Option(
-            metavar="STATE=VALUE,...|estimated",
-            show_default="equilibrium at the first input sample",
-            help="Initial values of states (psi=0.01,w=0), or 'estimated' to fit them to the outputs in the record.",
+        options.optional(
+            "STATE=VALUE,...|estimated",
+            "equilibrium at the first input sample",
+            "Initial values of states (psi=0.01,w=0), or 'estimated' to fit them to the outputs in the record.",
         ),
     ] = None,
     constant: Annotated[
         list[str] | None,
-        typer.Option(
-            "--constant",
-            metavar="NAME=VALUE",
-            show_default="as in the model",
-            help="A constant of the rig with a different value in this record: m_load=1.2. May be repeated.",
+        options.optional(
+            "NAME=VALUE",
+            "as in the model",
+            "A constant of the rig with a different value in this record: m_load=1.2. May be repeated.",
         ),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Predict the outputs of a model for the inputs of a record.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import typer
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+    from rich.table import Table
 
 
 def command_line() -> str:
@@ -24,6 +25,18 @@ def show(summary: RenderableType) -> None:
     from rich.console import Console
 
     Console(highlight=False).print(summary)
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """Return a table whose cells are shown as they are written."""
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    made = Table(*heads, box=box.SIMPLE)
+    for row in rows:
+        made.add_row(*map(escape, row))
+    return made
 
 
 def show_json(file: Path) -> None:

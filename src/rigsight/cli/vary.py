@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import show_json
 from rigsight.errors import InputError
 from rigsight.workflow.run.progress import listening
@@ -28,51 +28,37 @@ def vary(
     ],
     low: Annotated[
         float | None,
-        typer.Option(
-            "--from", metavar="VALUE", show_default="half the value in the model", help="First value."
-        ),
+        options.optional("VALUE", "half the value in the model", "First value.", "--from"),
     ] = None,
     high: Annotated[
         float | None,
-        typer.Option(
-            "--to", metavar="VALUE", show_default="twice the value in the model", help="Last value."
-        ),
+        options.optional("VALUE", "twice the value in the model", "Last value.", "--to"),
     ] = None,
     steps: Annotated[int, typer.Option(help="Number of values.")] = 5,
     amplitude: Annotated[float, typer.Option(help="Amplitude of the sweep, in the unit of the input.")] = 1.0,
     lowest: Annotated[
         float | None,
-        typer.Option(
-            metavar="OMEGA",
-            show_default="1/12 of the natural frequency",
-            help="Lower end of the band [rad/s].",
-        ),
+        options.optional("OMEGA", "1/12 of the natural frequency", "Lower end of the band [rad/s]."),
     ] = None,
     highest: Annotated[
         float | None,
-        typer.Option(
-            metavar="OMEGA",
-            show_default="6 times the natural frequency",
-            help="Upper end of the band [rad/s].",
-        ),
+        options.optional("OMEGA", "6 times the natural frequency", "Upper end of the band [rad/s]."),
     ] = None,
     source: Annotated[
         str | None,
-        typer.Option("--input", metavar="NAME", show_default="the first", help="Input to sweep."),
+        options.optional("NAME", "the first", "Input to sweep.", "--input"),
     ] = None,
     response: Annotated[
         str | None,
-        typer.Option(
-            "--output", metavar="NAME", show_default="the first", help="Output whose response is shown."
-        ),
+        options.optional("NAME", "the first", "Output whose response is shown.", "--output"),
     ] = None,
-    effects: OwnEffects = None,
-    rigs: OwnRigs = None,
-    simulator: Simulators = None,
-    out: ResultsFolder = Path("vary"),
-    json: Json = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
+    effects: options.OwnEffects = None,
+    rigs: options.OwnRigs = None,
+    simulator: options.Simulators = None,
+    out: options.ResultsFolder = Path("vary"),
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
 ) -> None:
     """Show how the frequency response of a model changes with a parameter.
 

@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-from rigsight.plot.channels import ChannelPlot as ChannelPlot
 from rigsight.plot.channels import channel_plots as channel_plots
 from rigsight.plot.diagnosis import ForceLoop as ForceLoop
 from rigsight.plot.diagnosis import comparison as comparison
@@ -26,13 +25,10 @@ from rigsight.plot.estimates import amplitude_dependence as amplitude_dependence
 from rigsight.plot.estimates import parameters_by_group as parameters_by_group
 from rigsight.plot.frequency_responses import FittedCurve as FittedCurve
 from rigsight.plot.frequency_responses import Panel as Panel
-from rigsight.plot.frequency_responses import ResponseCell as ResponseCell
 from rigsight.plot.frequency_responses import bode as bode
 from rigsight.plot.frequency_responses import overlaid_responses as overlaid_responses
 from rigsight.plot.frequency_responses import response_grid as response_grid
-from rigsight.plot.gap_maps import gap_amplitudes as gap_amplitudes
-from rigsight.plot.gap_maps import gap_bands as gap_bands
-from rigsight.plot.gap_maps import gap_records as gap_records
+from rigsight.plot.gap_maps import gap_bars as gap_bars
 from rigsight.plot.gap_maps import gap_states as gap_states
 from rigsight.plot.gap_maps import gap_times as gap_times
 from rigsight.plot.gap_maps import missing_force as missing_force

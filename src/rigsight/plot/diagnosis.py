@@ -13,6 +13,7 @@ from rigsight.diagnose.location.trace import Stage, Trace
 from rigsight.diagnose.result import Diagnosis
 from rigsight.plot.drawing import (
     FLOOR,
+    FLOOR_LINE,
     GIVEN,
     MEASURED,
     OTHER,
@@ -20,12 +21,12 @@ from rigsight.plot.drawing import (
     REIDENTIFIED,
     STAGE_STYLES,
     WITH_EFFECT,
-    in_style,
     line,
     new_figure,
     plain_log_ticks,
     set_margins,
     shown_in,
+    style,
     text_width,
     with_unit,
 )
@@ -51,7 +52,6 @@ _RINGING = 5.0
 """Multiple of the measured settling time up to which the ringing of a simulation is shown."""
 _NOISE_REACHES = 5.0
 """Standard deviations that noise does not exceed in some thousand samples."""
-_FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
 _BINS = 250
 """Bins of a line in print, where the axis of a whole record is some 110 mm wide."""
 
@@ -113,10 +113,8 @@ def _largest(residual: Floats, length: int) -> slice:
     return slice(start, start + length)
 
 
-@in_style
-def gap_budget(
-    diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | None = None, is_given: bool = True
-) -> Figure:
+@style()
+def gap_budget(diagnosis: Diagnosis, after_label: str, labels: Mapping[str, str], is_given: bool) -> Figure:
     """Draw the gap of each output as a waterfall: given, explained by parameters and by the effect, remaining, noise floor."""
     outputs = list(diagnosis.gap)
     figure = new_figure(PAGE_WIDTH, 0.45 + 1.75 * max(1, len(outputs)), layout=None)
@@ -139,7 +137,7 @@ def gap_budget(
             is_total = row == 0 or name == "Left over"
             _waterfall_step(ax, row, 100.0 * start, 100.0 * stop, color, right, is_total)
         if np.isfinite(gap.noise_floor):
-            ax.axvline(100.0 * gap.noise_floor, **_FLOOR_LINE)
+            ax.axvline(100.0 * gap.noise_floor, **FLOOR_LINE)
             ax.annotate(
                 f"noise floor {100.0 * gap.noise_floor:.2g} %",
                 (100.0 * gap.noise_floor, 1.0), (3, 1), xycoords=("data", "axes fraction"), textcoords="offset points",
@@ -149,7 +147,7 @@ def gap_budget(
         ax.set_ylim(len(steps) - 0.45, -0.6)
         ax.set_xlim(0.0, 1.18 * right)
         ax.tick_params(axis="y", length=0)
-        ax.set_title((labels or {}).get(output, output), pad=14)
+        ax.set_title(labels[output], pad=14)
         ax.grid(axis="x")
     axes[-1].set_xlabel("gap [% of the measured RMS]")
     names = ["Refitting its parameters" if is_given else "Identified", after_label]
@@ -169,7 +167,7 @@ def _waterfall_step(
     ax.text(high + 0.012 * right, row, text, va="center", fontsize=8.5, color=FLOOR)
 
 
-@in_style
+@style()
 def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figure:
     """Draw the error of each candidate on the validation records, in units of the noise floor on a logarithmic axis."""
     candidates = diagnosis.candidates[:limit]
@@ -199,7 +197,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     ax.set_xscale("log")
     ax.set_xlim(left, right * (right / left) ** 0.12)
     plain_log_ticks(ax, left, right)
-    ax.axvline(1.0, **_FLOOR_LINE)
+    ax.axvline(1.0, **FLOOR_LINE)
     ax.set_yticks(rows[: len(shown)], shown)
     ax.set_ylim(sum(heights) + 0.05, -0.05)
     ax.tick_params(axis="y", length=0)
@@ -210,21 +208,14 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     return figure
 
 
-@in_style
-def comparison(
-    diagnosis: Diagnosis,
-    trace: Trace,
-    output: str,
-    after_label: str = "after",
-    stages: Mapping[Stage, str] | None = None,
-) -> Figure:
-    """Draw measured against simulated, by default given and after, with the residuals below."""
+@style()
+def comparison(diagnosis: Diagnosis, trace: Trace, output: str, stages: Mapping[Stage, str]) -> Figure:
+    """Draw measured against simulated at some stages, with the residuals below."""
     from matplotlib.ticker import MaxNLocator
 
     t = trace.t - time_origin(trace.t)
-    names = stages or {"before": "given simulation", "after": after_label}
     measured = np.asarray(trace.measured[output], dtype=np.float64)
-    errors: dict[Stage, Floats] = {stage: -trace.residual(stage, output) for stage in names}
+    errors: dict[Stage, Floats] = {stage: -trace.residual(stage, output) for stage in stages}
     factor, unit = shown_in(diagnosis.units.get(output, ""), measured)
     error_factor, error_unit = shown_in(diagnosis.units.get(output, ""), *errors.values())
 
@@ -234,7 +225,7 @@ def comparison(
     line(top, t, measured * factor, _BINS, color=MEASURED, label="measured", linewidth=2.6, alpha=0.55)
     for stage, error in errors.items():
         look = STAGE_STYLES[stage]
-        line(top, t, (measured + error) * factor, _BINS, label=names[stage], linewidth=1.0, **look)
+        line(top, t, (measured + error) * factor, _BINS, label=stages[stage], linewidth=1.0, **look)
         line(bottom, t, error * error_factor, _BINS, color=look["color"], linewidth=0.8)
     floor = next((f.std for f in diagnosis.noise_floors if f.output == output), None)
     if floor is not None and np.isfinite(floor):
@@ -269,7 +260,7 @@ class ForceLoop:
     simulated: Mapping[Stage, Floats]  # stage -> its force, shape (n_samples,)
 
 
-@in_style
+@style()
 def force_loops(loop: ForceLoop, stages: Mapping[Stage, str]) -> Figure:
     """Draw the force over displacement and, beside it, over velocity: measured, and each stage."""
     from matplotlib.ticker import MaxNLocator

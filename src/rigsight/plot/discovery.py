@@ -13,10 +13,10 @@ from rigsight.plot.drawing import (
     OTHER,
     TWO_SIDED,
     WITH_EFFECT,
-    in_style,
     line,
     new_figure,
     shown_in,
+    style,
 )
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _POINTS = 4000
 """Samples of a missing force that are drawn."""
 
 
-@in_style
+@style()
 def discovery_figure(found: Discovery) -> Figure:
     """Draw the terms and the free runs of a discovery."""
     terms = [term for term in found.terms if math.isfinite(term.otherwise)][:_MOST_TERMS]

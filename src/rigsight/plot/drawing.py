@@ -7,11 +7,10 @@ their last reference.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import wraps
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -22,9 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rigsight.diagnose.location.trace import Stage
-
-P = ParamSpec("P")
-R = TypeVar("R")
 
 MEASURED = "#5f6770"
 GIVEN = "#d55e00"
@@ -65,6 +61,7 @@ STYLE: dict[Any, Any] = {
     "text.parse_math": False,
 }
 
+FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
 TWO_SIDED = 1.96
 """Standard deviations of a 95 % interval."""
 PAGE_WIDTH = 5.4
@@ -81,7 +78,7 @@ _LABEL = 0.17
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Draw and save in the style of these figures, whatever the notebook around it has set."""
+    """Draw and save in the style of these figures, whatever the notebook around it has set; a context and a decorator."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -89,17 +86,6 @@ def style() -> Iterator[None]:
         for name, value in STYLE.items():
             mpl.rcParams[name] = value
         yield
-
-
-def in_style(draw: Callable[P, R]) -> Callable[P, R]:
-    """Let a function draw in the style of these figures."""
-
-    @wraps(draw)
-    def drawn(*args: P.args, **kwargs: P.kwargs) -> R:
-        with style():
-            return draw(*args, **kwargs)
-
-    return drawn
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from rigsight.plot.drawing import (
     TWO_SIDED,
     WITH_EFFECT,
     display_scale,
-    in_style,
     new_figure,
     panel_grid,
+    style,
     with_unit,
 )
 
@@ -68,7 +68,7 @@ class GroupPanel:
     differs: bool  # whether groups differ beyond chance
 
 
-@in_style
+@style()
 def amplitude_dependence(panels: Sequence[AmplitudePanel], input_label: str) -> Figure:
     """Draw each parameter over the amplitude with 95 % intervals, and the joint set as a line."""
     columns = min(3, len(panels))
@@ -111,7 +111,7 @@ def _draw_over_amplitude(ax: Axes, panel: AmplitudePanel) -> None:
     ax.grid()
 
 
-@in_style
+@style()
 def parameters_by_group(panels: Sequence[GroupPanel]) -> Figure:
     """Draw each parameter as groups alone have it, with 95 % intervals, against the common estimate."""
     columns = min(2, len(panels))
@@ -147,7 +147,13 @@ def _draw_groups(ax: Axes, panel: GroupPanel) -> None:
     ax.errorbar(
         values, places, xerr=reach, color=color, linestyle="none", marker=marker, markersize=4.5, capsize=3
     )
-    ax.set_yticks(places, [_short(label) for label, _, _ in panel.groups])
+    ax.set_yticks(
+        places,
+        [
+            label if len(label) <= _LONGEST_LABEL else f"{label[: _LONGEST_LABEL - 1]}\u2026"
+            for label, _, _ in panel.groups
+        ],
+    )
     ax.set_ylim(len(panel.groups) - 0.4, -0.6)
     ax.set_title(f"{with_unit(panel.name, scale.unit)} by {panel.by}")
     ax.margins(x=0.08)
@@ -156,7 +162,3 @@ def _draw_groups(ax: Axes, panel: GroupPanel) -> None:
     ax.ticklabel_format(axis="x", useOffset=False)
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="x")
-
-
-def _short(label: str) -> str:
-    return label if len(label) <= _LONGEST_LABEL else f"{label[: _LONGEST_LABEL - 1]}\u2026"

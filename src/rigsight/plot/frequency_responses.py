@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.frequency import FrequencyResponse
+from rigsight.frequency.signal_pair import ratio_unit
 from rigsight.plot.drawing import (
     FLOOR,
     MEASURED,
     TWO_SIDED,
     WITH_EFFECT,
-    in_style,
     new_figure,
     plain_log_ticks,
     set_margins,
+    style,
 )
 from rigsight.records.record import Floats
 
@@ -35,6 +36,10 @@ _FACES = ("#440154", "#3b528b", "#21918c", "#5ec962", "#d8b40a", "#d55e00")
 _VARIED = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))
 _LIGHTEST = 0.84
 """Share of the color map that is still seen on white."""
+Variant = tuple[str, NDArray[np.complex128], bool]
+"""Label and complex response of a variant of a model, and whether it is the model as it is, drawn black and wider."""
+Path = tuple[str, str]
+"""Input and sensor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,29 +62,7 @@ class Panel:
     label: str = ""  # name in a plot of several, e.g. the amplitude
 
 
-@dataclass(frozen=True, eq=False)
-class ResponseCell:
-    """One path of a grid of inputs and sensors."""
-
-    # Input, sensor, and the unit of their ratio.
-    source: str
-    response: str
-    unit: str
-    measured: FrequencyResponse | None  # None where the records do not show it
-    model: FittedCurve | None  # None where there is none
-    remark: str = ""  # stands in an empty panel
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """The frequency response of a variant of a model."""
-
-    label: str  # for the legend
-    values: NDArray[np.complex128]  # complex, shape (n_frequencies,)
-    is_base: bool = False  # true for the model as it is; drawn black and wider
-
-
-@in_style
+@style()
 def bode(panels: Sequence[Panel]) -> Figure:
     """Draw measured against fitted as magnitude and phase, one column per path, with 95 % bands."""
     figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 4.9)
@@ -96,7 +79,7 @@ def bode(panels: Sequence[Panel]) -> Figure:
     return figure
 
 
-@in_style
+@style()
 def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "fitted") -> Figure:
     """Draw the magnitudes of several records over each other: measured as lines, fitted dashed in the same color."""
     labels = list(dict.fromkeys(panel.label for panels in columns for panel in panels))
@@ -218,66 +201,76 @@ def label_bode(top: Axes, bottom: Axes, title: str, unit: str) -> None:
         ax.grid()
 
 
-@in_style
-def response_grid(cells: Sequence[Sequence[ResponseCell]]) -> Figure:
-    """Draw magnitude over phase of every path, with 95 % bands: sensors are rows, inputs columns."""
-    n_rows, n_columns = len(cells), len(cells[0])
+@style()
+def response_grid(
+    measured: Mapping[Path, FrequencyResponse | None],
+    models: Mapping[Path, FittedCurve],
+    units: Mapping[str, str],
+) -> Figure:
+    """Draw magnitude over phase of every path, with 95 % bands: sensors are rows, inputs columns.
+
+    A path that the records do not show has no measured response, one without a model none of a model.
+    """
+    sources = list(dict.fromkeys(source for source, _ in measured))
+    responses = list(dict.fromkeys(response for _, response in measured))
+    n_rows, n_columns = len(responses), len(sources)
     figure = new_figure(max(3.9 * n_columns, 6.0), 3.9 * n_rows + 0.3)
     axes = figure.subplots(2 * n_rows, n_columns, squeeze=False, height_ratios=[3, 2] * n_rows)
-    curves = [own for row in cells for cell in row for own in (cell.measured, cell.model) if own is not None]
-    omegas = [curve.omega for curve in curves] or [np.array([0.1, 10.0])]
+    curves = [*measured.values(), *models.values()]
+    omegas = [curve.omega for curve in curves if curve is not None] or [np.array([0.1, 10.0])]
     has_legend = False
-    for i, row in enumerate(cells):
-        for j, cell in enumerate(row):
+    for i, response in enumerate(responses):
+        for j, source in enumerate(sources):
             top, bottom = axes[2 * i, j], axes[2 * i + 1, j]
-            _draw_cell(top, bottom, cell)
-            top.set_title(f"{cell.source} \u2192 {cell.response}")
+            unit = ratio_unit(units.get(response, ""), units.get(source, ""))
+            own = measured[source, response]
+            _draw_cell(top, bottom, own, models.get((source, response)))
+            top.set_title(f"{source} \u2192 {response}")
             for ax in (top, bottom):
                 span(ax, omegas)
                 ax.grid()
             top.tick_params(labelbottom=False)
             if j == 0:
                 bottom.set_ylabel("phase [deg]")
-            top.set_ylabel(f"magnitude [dB re 1 {cell.unit}]" if cell.unit != "1" else "magnitude [dB]")
+            top.set_ylabel(f"magnitude [dB re 1 {unit}]" if unit != "1" else "magnitude [dB]")
             if i == n_rows - 1:
                 bottom.set_xlabel(_OMEGA)
-            if cell.measured is not None and not has_legend:
+            if own is not None and not has_legend:
                 top.legend(loc="lower left", fontsize=8.0)
                 has_legend = True
     figure.align_ylabels(axes)
     return figure
 
 
-def _draw_cell(top: Axes, bottom: Axes, cell: ResponseCell) -> None:
-    if cell.measured is not None:
-        measured = thinned(cell.measured, _MOST_OF_CELL)
-        _draw_magnitude(top, measured, cell.model)
-        _draw_phase(bottom, measured, cell.model)
+def _draw_cell(top: Axes, bottom: Axes, own: FrequencyResponse | None, model: FittedCurve | None) -> None:
+    if own is not None:
+        _draw_magnitude(top, thinned(own, _MOST_OF_CELL), model)
+        _draw_phase(bottom, thinned(own, _MOST_OF_CELL), model)
         return
-    if cell.model is not None:
-        size = decibel(np.abs(cell.model.values))
-        top.plot(cell.model.omega, size, color=WITH_EFFECT, linewidth=1.3)
+    if model is not None:
+        size = decibel(np.abs(model.values))
+        top.plot(model.omega, size, color=WITH_EFFECT, linewidth=1.3)
         limit(top, size)
-        phase = np.degrees(np.unwrap(np.angle(cell.model.values)))
-        bottom.plot(cell.model.omega, phase, color=WITH_EFFECT, linewidth=1.3)
-    top.text(0.03, 0.05, cell.remark, transform=top.transAxes, fontsize=8.0)
+        phase = np.degrees(np.unwrap(np.angle(model.values)))
+        bottom.plot(model.omega, phase, color=WITH_EFFECT, linewidth=1.3)
+    top.text(0.03, 0.05, "not determined by these records", transform=top.transAxes, fontsize=8.0)
 
 
-@in_style
-def varied_responses(omega: Floats, curves: Sequence[Curve], pair: str, unit: str, title: str) -> Figure:
-    """Draw magnitude [dB] and phase [deg] over angular frequency, one color and line style per curve."""
+@style()
+def varied_responses(omega: Floats, curves: Sequence[Variant], pair: str, unit: str, title: str) -> Figure:
+    """Draw magnitude [dB] and phase [deg] over angular frequency, one color and line style per variant of a model."""
     import matplotlib as mpl
 
     figure = new_figure(7.4, 5.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     colors = mpl.colormaps["cividis"](np.linspace(0.0, _LIGHTEST, max(len(curves), 2)))
-    for i, curve in enumerate(curves):
-        style = {"color": colors[i], "linewidth": 1.4, "linestyle": _VARIED[i % len(_VARIED)], "zorder": 2}
-        if curve.is_base:
-            style = {"color": "black", "linewidth": 2.2, "linestyle": "-", "zorder": 3}
+    for i, (label, values, is_base) in enumerate(curves):
+        look = {"color": colors[i], "linewidth": 1.4, "linestyle": _VARIED[i % len(_VARIED)], "zorder": 2}
+        if is_base:
+            look = {"color": "black", "linewidth": 2.2, "linestyle": "-", "zorder": 3}
         with np.errstate(divide="ignore"):
-            top.plot(omega, 20.0 * np.log10(np.abs(curve.values)), label=curve.label, **style)
-        bottom.plot(omega, np.degrees(np.unwrap(np.angle(curve.values))), **style)
+            top.plot(omega, 20.0 * np.log10(np.abs(values)), label=label, **look)
+        bottom.plot(omega, np.degrees(np.unwrap(np.angle(values))), **look)
     label_bode(top, bottom, title, unit)
     top.set_ylabel(f"magnitude {pair} [dB of 1 {unit}]")
     bottom.set_ylabel("phase [\u00b0]")

@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigsight.diagnose.location.gap_parts import (
-    AmplitudePart,
-    BandPart,
-    GapPart,
-    RecordPart,
-    StatePart,
-    TimePart,
-)
+from rigsight.diagnose.location.gap_parts import GapPart, StatePart, TimePart
 from rigsight.diagnose.location.trace import Stage
 from rigsight.inverse import MissingForce
 from rigsight.plot.drawing import (
-    FLOOR,
+    FLOOR_LINE,
     MEASURED,
     PAGE_WIDTH,
     STAGE_STYLES,
     WITH_EFFECT,
-    in_style,
     new_figure,
     set_margins,
     shown_in,
+    style,
     with_unit,
 )
 
@@ -39,7 +32,6 @@ _LEFT, _RIGHT, _LEGEND = 0.78, 0.1, 0.35
 _STATES_HEIGHT = 3.0
 _BAR_ROOM = 0.84
 """Room beside a map for its color bar with ticks and label [inch]."""
-_FLOOR_LINE: dict[str, Any] = {"color": FLOOR, "linestyle": (0, (4, 2)), "linewidth": 1.2}
 _PERCENT = 100.0
 _SHADES = 15
 """Few enough to be drawn as areas; a smooth scale would become an image of its own. Odd, so that zero has a shade."""
@@ -50,8 +42,13 @@ _USUAL, _ROOM = (1.0, 99.0), 0.3
 _FLOOR_LABEL = "noise floor"
 
 
-def _bars(
-    parts: Sequence[GapPart], stages: Mapping[Stage, str], labels: Sequence[str], xlabel: str, ylabel: str
+@style()
+def gap_bars(
+    parts: Sequence[GapPart],
+    labels: Sequence[str],
+    stages: Mapping[Stage, str],
+    xlabel: str,
+    ylabel: str = "gap [%]",
 ) -> Figure:
     """Draw the stages of each part beside each other on a logarithmic axis, the noise floor as a line over each group."""
     figure = new_figure(PAGE_WIDTH, 2.9, layout=None)
@@ -76,7 +73,7 @@ def _bars(
         if np.isfinite(part.noise_floor):
             level = max(_PERCENT * part.noise_floor, bottom)
             named = _FLOOR_LABEL if i == 0 else None
-            ax.plot([i - 0.44, i + 0.44], [level, level], **{**_FLOOR_LINE, "linewidth": 1.3}, label=named)
+            ax.plot([i - 0.44, i + 0.44], [level, level], **{**FLOOR_LINE, "linewidth": 1.3}, label=named)
     ax.set_yscale("log")
     ax.set_ylim(bottom, 1.5 * top)
     ax.set_xlim(-0.6, len(parts) - 0.4)
@@ -109,36 +106,7 @@ def _legend(figure: Figure, ax: Axes) -> None:
     )  # fmt: skip
 
 
-@in_style
-def gap_bands(parts: Sequence[BandPart], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage in each frequency band; squares add up to that of the whole gap."""
-    return _bars(
-        parts, stages, [_band_label(part) for part in parts], "frequency [rad/s]", "gap in the band [%]"
-    )
-
-
-def _band_label(part: BandPart) -> str:
-    if not part.excited:
-        return f"above\n{part.omega_low:.3g}"
-    low = "up" if part.omega_low == 0.0 else f"{part.omega_low:.3g}"
-    return f"{low}\nto {part.omega_high:.3g}"
-
-
-@in_style
-def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], stages: Mapping[Stage, str]) -> Figure:
-    """Draw the error of each stage on each record, relative to the record's own motion."""
-    return _bars(parts, stages, labels, "record", "gap [%]")
-
-
-@in_style
-def gap_amplitudes(
-    parts: Sequence[AmplitudePart], labels: Sequence[str], stages: Mapping[Stage, str]
-) -> Figure:
-    """Draw the error of each stage at each amplitude of the input, ascending, relative to the motion there."""
-    return _bars(parts, stages, labels, "amplitude of the input", "gap [%]")
-
-
-@in_style
+@style()
 def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
     """Draw the error of each stage over time, one panel per scored record, with the noise floor."""
     records = list(dict.fromkeys(part.record for part in parts))
@@ -151,7 +119,7 @@ def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
         for stage, label in stages.items():
             levels = [_PERCENT * getattr(part, stage) for part in own]
             ax.stairs(levels, edges, label=label, linewidth=1.4, baseline=None, **STAGE_STYLES[stage])
-        ax.axhline(_PERCENT * own[0].noise_floor, label=_FLOOR_LABEL, **_FLOOR_LINE)
+        ax.axhline(_PERCENT * own[0].noise_floor, label=_FLOOR_LABEL, **FLOOR_LINE)
         ax.set_yscale("log")
         ax.set_title(record, fontsize=8.5)
         ax.set_ylabel("gap [%]")
@@ -165,7 +133,7 @@ def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
     return figure
 
 
-@in_style
+@style()
 def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
     """Draw the error over the plane of displacement and velocity and, where it is known, the missing force."""
     with_force = any(np.isfinite(part.force_mean) for part in parts)
@@ -223,7 +191,7 @@ def _plane(
     bar.ax.tick_params(color=MEASURED)
 
 
-@in_style
+@style()
 def missing_force(force: MissingForce) -> Figure:
     """Draw a missing force over velocity and displacement, each with its mean and two standard errors, and over time."""
     figure = new_figure(PAGE_WIDTH, 3.9)

@@ -16,12 +16,12 @@ from rigsight.plot.drawing import (
     OTHER,
     TWO_SIDED,
     WITH_EFFECT,
-    in_style,
     new_figure,
     panel_grid,
     plain_log_ticks,
     set_margins,
     shown_in,
+    style,
 )
 from rigsight.plot.frequency_responses import (
     decibel,
@@ -89,7 +89,7 @@ def model_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     }
 
 
-@in_style
+@style()
 def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Draw magnitude above phase, one column per path: measured as points with its 95 % band, each model as a line."""
     figure, axes = _responses_grid(2, len(panels), len(styles), 5.2)
@@ -147,7 +147,7 @@ def _responses_grid(rows: int, panels: int, n_models: int, height: float) -> tup
     return figure, axes[kept]
 
 
-@in_style
+@style()
 def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Draw each output after a step, offsets removed: measured as a wide gray line, each model over it."""
     figure, axes = _responses_grid(1, len(panels), len(styles), 3.4)
@@ -167,7 +167,7 @@ def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, A
     return figure
 
 
-@in_style
+@style()
 def model_errors(panels: Sequence[ErrorPanel], names: Sequence[str]) -> Figure:
     """Draw the errors of all models as bars on logarithmic axes, each record as a point, the noise floor as a dashed line."""
     columns = min(3, len(panels))

@@ -13,10 +13,10 @@ from rigsight.plot.drawing import (
     OTHER,
     REIDENTIFIED,
     WITH_EFFECT,
-    in_style,
     line,
     new_figure,
     shown_in,
+    style,
     with_unit,
 )
 from rigsight.units import INPUT_UNIT
@@ -29,7 +29,7 @@ _WIDTH, _PANEL = 7.0, 1.7
 """Sizes [inch]."""
 
 
-@in_style
+@style()
 def planned_experiment(plan: Plan) -> Figure:
     """Draw a planned experiment.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rigsight.plot import rig_symbols as symbols
-from rigsight.plot.drawing import in_style, new_figure, text_width
+from rigsight.plot.drawing import new_figure, style, text_width
 from rigsight.plot.rig_content import Body, Place, RigContent, rig_content
 from rigsight.plot.rig_symbols import FAINT, INK, SUSPECTED, TEXT, block_size, write_block
 from rigsight.rigs import Rig
@@ -47,7 +47,7 @@ class PlaceMark:
     is_state: bool = False  # true for a state, which may be called as a sensor is
 
 
-@in_style
+@style()
 def rig_picture(rig: Rig, marks: Mapping[str, PlaceMark] | None = None) -> Figure:
     """Return a schematic of a rig."""
     return _Sheet(rig_content(rig), marks or {}).figure()
@@ -145,7 +145,8 @@ class _Sheet:
             self._draw_body(ax, row, body)
             self._draw_grounded(ax, row)
             self._draw_between(ax, row)
-        self._draw_wall(ax)
+        if held := [row for row, joints in self._grounded.items() if joints]:
+            symbols.wall(ax, self._wall, self._bottom[held[-1]], self._top[held[0]])
         self._draw_left(ax)
         return figure
 
@@ -229,11 +230,6 @@ class _Sheet:
                 [self._body_end, lane], [level, level], color=color, linewidth=1.2, marker="o", markersize=2.5
             )
 
-    def _draw_wall(self, ax: Axes) -> None:
-        rows = [row for row, joints in self._grounded.items() if joints]
-        if rows:
-            symbols.wall(ax, self._wall, self._bottom[rows[-1]], self._top[rows[0]])
-
     def _draw_left(self, ax: Axes) -> None:
         middles: dict[str, float] = {}
         lane = self._body - 0.2
@@ -296,7 +292,8 @@ class _Sheet:
     def _draw_signals(self, ax: Axes, middles: Mapping[str, float]) -> None:
         lane = self._left - 0.2
         for drive in self._content.drives:
-            slots = _slots(middles[drive.name], len(drive.inputs) + len(drive.sensors))
+            count, middle = len(drive.inputs) + len(drive.sensors), middles[drive.name]
+            slots = [middle + 0.14 * ((count - 1) / 2.0 - index) for index in range(count)]
             for name, level in zip(drive.inputs, slots, strict=False):
                 symbols.write(ax, self._input_right, level, name, ha="right")
                 symbols.arrow(ax, [(self._input_right + 0.05, level), (self._left, level)], INK)
@@ -304,8 +301,3 @@ class _Sheet:
                 way = [(self._left, middles[name]), (lane, middles[name]), (lane, level), (self._left, level)]
                 symbols.arrow(ax, way, FAINT, dashed=True)
                 lane -= _LANE
-
-
-def _slots(middle: float, count: int) -> Sequence[float]:
-    """Return the heights at which lines arrive at a block, spaced evenly about its middle."""
-    return [middle + 0.14 * ((count - 1) / 2.0 - index) for index in range(count)]

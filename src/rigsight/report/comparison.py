@@ -23,8 +23,8 @@ from rigsight.plot import (
     model_styles,
 )
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.quantities import column_label, error_text
-from rigsight.report.render import rendered
+from rigsight.report.labels import column_label, error_text
+from rigsight.report.render import notebook_html, rendered
 from rigsight.report.terminal import Summary, Writer, worth_knowing
 
 if TYPE_CHECKING:
@@ -283,3 +283,15 @@ def _step_panels(comparison: Comparison, record: RecordComparison, names: list[s
         )
         for output, moved in record.moved.items()
     ]
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Return the errors of all models over all records, the smallest of each column marked with a star."""
+    overall = comparison_view(comparison, None)
+    rows = [
+        (name, *(f"{cell.text}{' *' if cell.is_best else ''}" for cell in cells))
+        for name, cells in overall.rows.items()
+    ]
+    table = (("model", *overall.heads), [*rows, ("noise floor", *overall.floor)])
+    sentence = f"Errors over {overall.title}; * smallest of its column."
+    return notebook_html(f"Compared: {comparison.title}", [sentence], [table], comparison.notes)

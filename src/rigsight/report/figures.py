@@ -8,7 +8,7 @@ import math
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +20,7 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import Place, kind_of
 from rigsight.records.record import Floats
 from rigsight.records.stamps import written_span
-from rigsight.report.labels import effect_label, listed, sentence_case
-from rigsight.report.quantities import gap_percent, rig_of
+from rigsight.report.labels import effect_label, gap_percent, listed, rig_of, sentence_case
 from rigsight.report.wording import stage_names
 from rigsight.rigs import Rig, reading_symbol
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -69,8 +68,10 @@ class PageFigure:
 
 def page_figure(figure: Figure, key: str, alt: str, caption: str) -> PageFigure:
     """Return a figure for the page."""
-    svg = _svg(figure, key, alt)
-    image = svg if len(svg) <= _LARGEST_SVG else _png(figure, alt)
+    image = _svg(figure, key, alt)
+    if len(image) > _LARGEST_SVG:
+        data = base64.b64encode(plot.png_bytes(figure, _PNG_DPI)).decode("ascii")
+        image = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(alt, data)
     return PageFigure(key, image, caption)
 
 
@@ -94,11 +95,6 @@ def _svg(figure: Figure, key: str, alt: str) -> Markup:
 
 def _short_path(path: re.Match[str]) -> str:
     return _BEFORE_LETTER.sub(r"\1", _FURTHER_DIGITS.sub(r"\1", " ".join(path[0].split())))
-
-
-def _png(figure: Figure, alt: str) -> Markup:
-    data = base64.b64encode(plot.png_bytes(figure, _PNG_DPI)).decode("ascii")
-    return Markup('<img alt="{}" src="data:image/png;base64,{}">').format(alt, data)
 
 
 def rig_figure(diagnosis: Diagnosis) -> PageFigure | None:
@@ -265,16 +261,6 @@ class ChartPanel:
 
 
 @dataclass(frozen=True)
-class Detail:
-    """A part worth looking at: its limits on the shared axis, what the button that shows it is called, and what it does."""
-
-    low: float
-    high: float
-    label: str
-    title: str
-
-
-@dataclass(frozen=True)
 class Chart:
     """A figure that reacts, and what stands in for it where no script runs."""
 
@@ -301,15 +287,15 @@ def chart_data(
     panels: Sequence[ChartPanel],
     *,
     log: bool = False,
-    detail: Detail | None = None,
+    detail: Mapping[str, Any] | None = None,
 ) -> Markup:
-    """Return curves over an axis as JSON for the page's script."""
+    """Return curves over an axis as JSON for the page's script, with limits, label and title of a part worth looking at."""
     content = {
         "title": title,
         "label": label,
         "log": log,
         "x": [float(f"{place:.9g}") for place in x],
-        "detail": detail and asdict(detail),
+        "detail": detail,
         "panels": [{**vars(panel), "curves": [_curve(curve) for curve in panel.curves]} for panel in panels],
     }
     # Inside a script element only "<" could end it.

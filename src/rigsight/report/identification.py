@@ -1,15 +1,18 @@
-"""An identification for a terminal: a table over amplitudes, the joint set, the scores, and what must be known."""
+"""An identification on a terminal, in a notebook, and as one self-contained HTML page without a script."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.console import RenderableType
 from rich.padding import Padding
 from rich.table import Table
 
 from rigsight.diagnose.result import Estimate
+from rigsight.identify import FitResult
 from rigsight.identify.hysteresis.derived import LEVEL, Derived
 from rigsight.identify.identification import (
     HysteresisIdentification,
@@ -17,28 +20,41 @@ from rigsight.identify.identification import (
     RecordIdentification,
     RecordScore,
 )
+from rigsight.identify.linear_view import LinearView, Mode
 from rigsight.plot import with_unit
-from rigsight.report.quantities import (
+from rigsight.records.record import Floats
+from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.labels import (
     ERRORS_HOLD,
     UNDETERMINED,
+    ParameterRow,
     behind,
     estimate_text,
     gap_percent,
+    parameter_row,
     plain,
     written,
 )
+from rigsight.report.render import NotebookTable, notebook_html, rendered
 from rigsight.report.terminal import Summary, Writer, pairs, worth_knowing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 HEADING = "Hysteresis"
 _WIDTHS = 3.92
 """Standard deviations between the ends of a 95 % interval."""
 ERROR_HEADS = ("record", "role", "NRMSE without the effects", "with the effects")
-
-
 _MOST_WARNINGS = 12
 _WORSE = 1.05
 """Ratio from which a record's own fit is worth naming beside the joint one."""
 _NAME_WIDTH, _RECORD_WIDTH = 22, 20
+_STABLE = {
+    "stable": "stable",
+    "drifts": "stable except for free rigid-body motion",
+    "undamped": "not damped in all of its motions",
+    "unstable": "unstable",
+}
 
 
 def identification_summary(found: Identification) -> Summary:
@@ -77,8 +93,7 @@ def identification_summary(found: Identification) -> Summary:
 
 def _amplitude_tables(found: Identification, text: Writer, width: int) -> Iterator[Table]:
     """Yield a column per record in the order of amplitudes, in as many tables as the terminal's width asks for."""
-    records = sorted(found.records, key=lambda r: r.amplitude)
-    names = dict.fromkeys(name for record in records for name in record.estimates)
+    records = _by_amplitude(found)
     at_once = max(1, (width - _NAME_WIDTH) // _RECORD_WIDTH)
     for first in range(0, len(records), at_once):
         part = records[first : first + at_once]
@@ -86,35 +101,34 @@ def _amplitude_tables(found: Identification, text: Writer, width: int) -> Iterat
         table.add_column(text("record"))
         for record in part:
             table.add_column(text(record.record.name), justify="right", overflow="fold")
-        table.add_row(*map(text, amplitude_row(found, part)))
-        for name in names:
-            head = text(with_unit(name, found.units.get(name, "")))
-            table.add_row(head, *(text(estimate_cell(record, name)) for record in part))
+        for row in record_rows(found, part):
+            table.add_row(*map(text, row))
         if any(record.resonance is not None for record in records):
             seen = ("-" if r.resonance is None else f"{r.resonance:.3g}" for r in part)
             table.add_row(text("resonance [rad/s]"), *map(text, seen))
         yield table
 
 
-def amplitude_row(found: Identification, records: Sequence[RecordIdentification]) -> list[str]:
-    """Return head and cells of the amplitudes of records; the unit is in the head, or in each cell where sources differ."""
+def record_rows(found: Identification, records: Sequence[RecordIdentification]) -> Iterator[list[str]]:
+    """Yield head and cells of the amplitudes of records, and of each parameter with its standard error."""
+    # The unit of amplitudes is in the head, or in each cell where sources differ.
     units = [found.units.get(record.source, "") for record in records]
     if len({found.units.get(record.source, "") for record in found.records}) == 1:
-        return [with_unit("amplitude", units[0]), *(f"{record.amplitude:.4g}" for record in records)]
-    return [
-        "amplitude",
-        *(f"{record.amplitude:.4g} {unit}".rstrip() for record, unit in zip(records, units, strict=True)),
-    ]
+        yield [with_unit("amplitude", units[0]), *(f"{record.amplitude:.4g}" for record in records)]
+    else:
+        sizes = zip(records, units, strict=True)
+        yield ["amplitude", *(f"{record.amplitude:.4g} {unit}".rstrip() for record, unit in sizes)]
+    for name in dict.fromkeys(name for record in _by_amplitude(found) for name in record.estimates):
+        cells = []
+        for record in records:
+            value, std = record.estimates.get(name, (math.nan, math.nan))
+            text = plain(written(value, std)) if math.isfinite(std) else f"{value:.3g}"
+            cells.append(text if name in record.estimates else "-")
+        yield [with_unit(name, found.units.get(name, "")), *cells]
 
 
-def estimate_cell(record: RecordIdentification, name: str) -> str:
-    """Return a parameter of one record with its standard error, a dash where the record does not show it."""
-    if name not in record.estimates:
-        return "-"
-    value, std = record.estimates[name]
-    if not math.isfinite(std):
-        return f"{value:.3g}"
-    return plain(written(value, std))
+def _by_amplitude(found: Identification) -> list[RecordIdentification]:
+    return sorted(found.records, key=lambda record: record.amplitude)
 
 
 def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
@@ -201,3 +215,176 @@ def derived_text(one: Derived) -> str:
     spread = (one.upper - one.lower) / _WIDTHS
     value, lower, upper = (plain(written(number, spread)) for number in (one.value, one.lower, one.upper))
     return f"{value}{behind(one.unit)} ({100.0 * LEVEL:.0f} %: {lower} to {upper})"
+
+
+def render_identification(
+    identification: Identification,
+    drawings: Sequence[Figure],
+    amplitudes: Figure | None,
+    command: str,
+    versions: Mapping[str, str],
+    seed: int | None = None,
+) -> str:
+    """Return the page of an identification."""
+    reported = identification.identifiability
+    assert reported is not None
+    joint, names = identification.joint, identification.joint.names
+    fit, hysteresis = joint.fit.fit, identification.hysteresis
+    figure = None
+    if amplitudes is not None:
+        caption = "Parameters fitted to each record alone, over its amplitude, with 95 % intervals; dashed: the common set."
+        figure = page_figure(amplitudes, "amplitudes-figure", identification.amplitude_statement, caption)
+    return rendered(
+        "identification.html.jinja",
+        command or "from Python",
+        versions,
+        seed,
+        identification=identification,
+        sentence=reported.sentence,
+        all_determined=len(reported.determined) == len(names) and fit.success,
+        n_determined=len(reported.determined),
+        n_parameters=len(names),
+        views=_views(identification, drawings),
+        parameters=_parameters(names, fit, identification.units, identification.meanings),
+        combinations=[
+            parameter_row(c.text, Estimate(c.value, c.std, c.unit), description=f"of {', '.join(c.members)}")
+            for c in reported.combinations
+        ],
+        errors_hold=ERRORS_HOLD,
+        outputs=list(dict.fromkeys(name for score in joint.scores for name in score.nrmse)),
+        hysteresis=None if hysteresis is None else _hysteresis(hysteresis),
+        amplitudes=figure,
+    )
+
+
+def _parameters(
+    names: Iterable[str], fit: FitResult, units: Mapping[str, str], meanings: Mapping[str, str]
+) -> list[ParameterRow]:
+    return [
+        parameter_row(
+            name,
+            Estimate(fit.values[name], fit.standard_errors[name], units.get(name, "")),
+            description=meanings.get(name, ""),
+        )
+        for name in names
+    ]
+
+
+def _hysteresis(found: HysteresisIdentification) -> dict[str, Any]:
+    fit = found.calibration.fit
+    return {
+        "statement": found.statement,
+        "parameters": _parameters(fit.free, fit, found.units, found.meanings),
+        "held": ", ".join(f"{name} = {value:.4g}" for name, value in found.held.items()),
+        "derived": list(derived_rows(found)),
+        "errors": list(error_rows(found)),
+    }
+
+
+def _views(identification: Identification, drawings: Sequence[Figure]) -> list[dict[str, Any]]:
+    found, remaining = [], iter(drawings)
+    for number, view in enumerate(identification.views, 1):
+        found.append(
+            {
+                "title": ", ".join(f"{name} = {value:g}" for name, value in view.constants.items()),
+                "figure": None if view.measured is None else _figure(view, next(remaining), number),
+                "problems": [
+                    f"{source} \u2192 {response}: {problem}"
+                    for (source, response), problem in (
+                        view.measured.problems if view.measured else {}
+                    ).items()
+                ],
+                "modes": [_mode(mode) for mode in view.modes],
+                "stability": _STABLE[view.linearization.stability],
+                "at": _place(view),
+                "transfer_functions": [
+                    _transfer_function(view, source, response)
+                    for source in view.linearization.inputs
+                    for response in view.linearization.outputs
+                ],
+            }
+        )
+    return found
+
+
+def _figure(view: LinearView, drawing: Figure, number: int) -> PageFigure:
+    shown = "; ".join(
+        f"{source} to {response}: peak {20.0 * math.log10(float(curve.magnitude.max())):.3g} dB at "
+        f"{float(curve.omega[int(np.argmax(curve.magnitude))]):.3g} rad/s"
+        for (source, response), curve in (view.measured.found if view.measured else {}).items()
+    )
+    caption = (
+        "Magnitude and phase of each sensor's response to each input: measured from all records together (gray, with 95 % "
+        "bands), and that of the fitted equations, linearized at equilibrium (blue)."
+    )
+    return page_figure(
+        drawing, f"responses-{number}", shown or "No frequency response was measured.", caption
+    )
+
+
+def _place(view: LinearView) -> str:
+    linear = view.linearization
+    pairs = [
+        *zip(linear.inputs, linear.at_inputs, strict=True),
+        *zip(linear.states, linear.at_state, strict=True),
+    ]
+    return ", ".join(f"{name} = {float(value):.4g}" for name, value in pairs if value != 0.0) or "all at zero"
+
+
+def _mode(mode: Mode) -> dict[str, Any]:
+    real, imaginary = mode.pole.real, mode.pole.imag
+    return {
+        "pole": (f"{real:.4g} \u00b1 {imaginary:.4g} i" if imaginary else f"{real:.4g}").replace(
+            "-", "\u2212"
+        ),
+        "frequency": written(mode.natural_frequency, mode.frequency_std),
+        "damping": None
+        if not math.isfinite(mode.damping_ratio)
+        else written(mode.damping_ratio, mode.damping_std),
+    }
+
+
+def _transfer_function(view: LinearView, source: str, response: str) -> dict[str, str]:
+    found = view.linearization.transfer_function(source, response)
+    return {
+        "path": f"{source} \u2192 {response}",
+        "numerator": _polynomial(found.numerator),
+        "denominator": _polynomial(found.denominator),
+    }
+
+
+def _polynomial(coefficients: Floats) -> str:
+    degree = coefficients.size - 1
+    parts = [
+        (value, f"{abs(value):.4g}{' s' if power else ''}{f'^{power}' if power > 1 else ''}")
+        for power, value in zip(range(degree, -1, -1), map(float, coefficients), strict=True)
+        if value != 0.0
+    ]
+    if not parts:
+        return "0"
+    signs = ["\u2212" if value < 0.0 else "+" for value, _ in parts]
+    first = f"{signs[0].replace('+', '')}{parts[0][1]}"
+    return first + "".join(f" {sign} {text}" for sign, (_, text) in zip(signs[1:], parts[1:], strict=True))
+
+
+def identification_html(identification: Identification) -> str:
+    """Return the parameters of each record in the order of amplitudes, and those of all records together."""
+    records = _by_amplitude(identification)
+    tables: list[NotebookTable] = [
+        (
+            ("record", *(record.record.name for record in records)),
+            list(record_rows(identification, records)),
+        ),
+        (("all records", ""), list(joint_rows(identification))),
+    ]
+    reported = identification.identifiability
+    sentences = [
+        identification.amplitude_statement,
+        identification.joint.statement,
+        "" if reported is None else reported.sentence,
+    ]
+    if (hysteresis := identification.hysteresis) is not None:
+        sentences.append(hysteresis.statement)
+        tables.append(((HEADING, ""), list(hysteresis_rows(hysteresis))))
+        tables.append((ERROR_HEADS, list(error_rows(hysteresis))))
+    return notebook_html(f"Identified: {identification.title}", sentences, tables, identification.warnings)

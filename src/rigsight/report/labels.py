@@ -1,13 +1,20 @@
-"""What are effects, places, families and shares called, on the page and on the terminal?"""
+"""What are effects, places, families and shares called, and how is a number written? With digits that records support."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
+from rigsight.compare import Column
+from rigsight.compare.comparison import Quantity
+from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.diagnose.verdict.families import FamilyAtPlace
-from rigsight.effects import AT
+from rigsight.effects import AT, Effect, kind_of, placed
 from rigsight.inverse import ProposedCause
+from rigsight.parameters import Parameter
+from rigsight.plot.drawing import TWO_SIDED
+from rigsight.rigs import Rig, declared_rig
 
 TIMES = "\u00d7"
 _WITHOUT_EFFECT = "no effect, refitted parameters"
@@ -31,6 +38,15 @@ _PLACES = {
 }
 _FORMS = 4
 """Number of forms of a family that are shown."""
+UNDETERMINED = "not determined by these records"
+ERRORS_HOLD = "Standard errors are of the noise alone: they hold if the equations of the rig do."
+_QUANTITY_LABELS: dict[Quantity, str] = {
+    "magnitude_rmse": "magnitude [{unit}]",
+    "phase_rmse": "phase [{unit}]",
+    "magnitude_db": "magnitude [dB]",
+    "step_rmse": "step [{unit}]",
+    "free_run_nrmse": "free run, NRMSE",
+}
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:
@@ -95,3 +111,127 @@ def share_label(own: FamilyAtPlace) -> str:
     """Return the share of the gap of a family with its interval: ``"81 % (74 % to 86 %)"``."""
     low, high = map(percent, own.interval)
     return f"{percent(own.share)} ({low} to {high})"
+
+
+@dataclass(frozen=True)
+class Written:
+    """A number as text: ``(value +/- std) * 10^exponent``."""
+
+    # Digits; std is empty where there is none.
+    value: str
+    std: str
+    exponent: int  # power of ten outside the brackets, 0 for none
+
+
+def written(value: float, std: float | None = None) -> Written:
+    """Return value and standard error with two significant digits of the error; four digits of a value without one."""
+    if not math.isfinite(value):
+        return Written("not finite", "", 0)
+    if std is None or not math.isfinite(std) or std <= 0.0:
+        exponent = _exponent(abs(value))
+        return Written(f"{value * 10.0**-exponent:z.4g}", "", exponent)
+    exponent = _exponent(max(abs(value), std))
+    decimals, scale = _decimals(std, exponent), 10.0**-exponent
+    return Written(f"{value * scale:z.{decimals}f}", f"{std * scale:.{decimals}f}", exponent)
+
+
+def written_limits(low: float, high: float, std: float) -> tuple[Written, Written]:
+    """Return the limits of an interval with two significant digits of the standard error, both with the same power of ten."""
+    exponent = _exponent(max(abs(low), abs(high)))
+    decimals = _decimals(std, exponent)
+    first, last = (Written(f"{limit * 10.0**-exponent:z.{decimals}f}", "", exponent) for limit in (low, high))
+    return first, last
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter, or a combination of some, in a table; a remark stands where the records do not determine it."""
+
+    name: str
+    number: Written
+    unit: str
+    description: str
+    interval: tuple[Written, ...] = ()  # 95 %, empty where there is none
+    remark: str = ""
+    given: str = ""  # value in the given simulation, empty where that has none
+
+
+def parameter_row(
+    name: str, estimate: Estimate, parameter: Parameter | None = None, given: str = "", description: str = ""
+) -> ParameterRow:
+    """Return an estimate with its 95 % interval, cut where the parameter's own range ends."""
+    value, std = estimate.value, estimate.std
+    interval: tuple[Written, ...] = ()
+    if math.isfinite(value) and math.isfinite(std) and std > 0.0:
+        low, high = value - TWO_SIDED * std, value + TWO_SIDED * std
+        if parameter is not None:
+            low, high = max(low, parameter.lower), min(high, parameter.upper)
+        interval = written_limits(low, high, std)
+    remark = "" if math.isfinite(std) else UNDETERMINED
+    about = description if parameter is None else parameter.description
+    return ParameterRow(name, written(value, std), estimate.unit, about, interval, remark, given)
+
+
+def _exponent(size: float) -> int:
+    """Return the power of ten that is written outside of a number of this size: none but for large and small ones."""
+    power = math.floor(math.log10(size)) if size > 0.0 else 0
+    return power if power >= 5 or power <= -4 else 0
+
+
+def _decimals(std: float, exponent: int) -> int:
+    # At most ten digits: beyond, the standard error says more about the optimizer than about the rig.
+    return min(max(0, 1 - math.floor(math.log10(std * 10.0**-exponent))), 9)
+
+
+def plain(number: Written) -> str:
+    """Return a number in ASCII, e.g. ``"(3.10 +/- 0.02)e+5"``."""
+    inside = f"{number.value} +/- {number.std}" if number.std else number.value
+    if not number.exponent:
+        return inside
+    return f"({inside})e{number.exponent:+d}" if number.std else f"{inside}e{number.exponent:+d}"
+
+
+def behind(unit: str) -> str:
+    """Return a unit as it follows a number; nothing for a dimensionless one."""
+    return "" if unit in ("", "1") else f" {unit}"
+
+
+def estimate_text(estimate: Estimate) -> str:
+    """Return an estimate in ASCII, e.g. ``"81.2 +/- 1.3 N m/rad"``."""
+    if not math.isfinite(estimate.std):
+        return UNDETERMINED
+    return f"{plain(written(estimate.value, estimate.std))}{behind(estimate.unit)}"
+
+
+def gap_percent(value: float) -> str:
+    """Return an NRMSE as percent with three digits, of a model that left the record with two."""
+    if not math.isfinite(value):
+        return "not finite"
+    if value < 10.0:
+        return f"{100.0 * value:.3g} %"
+    rounded = f"{100.0 * value:.1e}"
+    return f"{float(rounded):.0f} %" if value < 1e5 else f"{rounded} %"
+
+
+def column_label(column: Column) -> str:
+    """Return what a column of a comparison holds, in ASCII: ``"u -> psi, phase [rad]"``."""
+    return f"{column.signal}, {_QUANTITY_LABELS[column.quantity].format(unit=column.unit)}"
+
+
+def error_text(value: float | None, quantity: Quantity) -> str:
+    """Return an error with three digits; an NRMSE in percent; a dash where there is none."""
+    if value is None:
+        return "-"
+    return gap_percent(value) if quantity == "free_run_nrmse" else f"{value:.3g}"
+
+
+def rig_of(diagnosis: Diagnosis) -> Rig | None:
+    """Return the rig; None for a result that only names one that is not built in."""
+    return declared_rig(diagnosis.rig, diagnosis.model.get("declaration", {}))
+
+
+def effect_of(name: str, known: Mapping[str, Effect]) -> Effect | None:
+    """Return the effect of this name at its place, None where it is not known."""
+    effect = known.get(kind_of(name))
+    place = name.partition(AT)[2]
+    return placed(effect, place) if effect is not None and place else effect

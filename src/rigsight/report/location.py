@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigsight import plot
-from rigsight.diagnose.location.gap_parts import AmplitudePart, GapPart, StatePart
+from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPart, StatePart
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import kind_of
 from rigsight.records.stamps import written_span
@@ -16,12 +16,13 @@ from rigsight.report.labels import (
     TIMES,
     effect_label,
     family_label,
+    gap_percent,
     listed,
     percent,
+    rig_of,
     sentence_case,
     unit_text,
 )
-from rigsight.report.quantities import gap_percent, rig_of
 from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names, stages_reported
 
@@ -153,7 +154,9 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         named = [(f"{limit} rad/s", part) for limit, part in zip(limits, bands, strict=True)]
         figures.append(
             page_figure(
-                plot.gap_bands(bands, stages),
+                plot.gap_bars(
+                    bands, [_band(p) for p in bands], stages, "frequency [rad/s]", "gap in the band [%]"
+                ),
                 f"{key}-bands",
                 f"Bars of the gap by band of frequency. {_reported(named, diagnosis)}",
                 f"By frequency. {_largest(named, rest)} The squares of the bars add up to the square of the gap; the "
@@ -168,7 +171,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         which = "; ".join(f"{_size(p)} {p.records[0]}" for p in amplitudes)
         figures.append(
             page_figure(
-                plot.gap_amplitudes(amplitudes, labels, stages),
+                plot.gap_bars(amplitudes, labels, stages, "amplitude of the input"),
                 f"{key}-amplitudes",
                 f"Bars of the gap by amplitude of the input. {_reported(spoken, diagnosis)}",
                 f"By amplitude of the input, each relative to the motion there{f': {which}' if one_record_each else ''}.",
@@ -179,7 +182,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         labels = [str(i) for i, _ in enumerate(records, start=1)]
         figures.append(
             page_figure(
-                plot.gap_records(records, labels, stages),
+                plot.gap_bars(records, labels, stages, "record"),
                 f"{key}-records",
                 f"Bars of the gap by record. {_reported([(p.record, p) for p in records], diagnosis)}",
                 "By record, each relative to its own motion: "
@@ -200,6 +203,13 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             )
         )
     return figures
+
+
+def _band(part: BandPart) -> str:
+    if not part.excited:
+        return f"above\n{part.omega_low:.3g}"
+    low = "up" if part.omega_low == 0.0 else f"{part.omega_low:.3g}"
+    return f"{low}\nto {part.omega_high:.3g}"
 
 
 def _states_figure(states: Sequence[StatePart], output: str, motion: str, key: str, rest: str) -> PageFigure:

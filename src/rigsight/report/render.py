@@ -20,10 +20,18 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import labels, location, sections, wording
 from rigsight.report.figures import loop_figures, rig_figure
-from rigsight.report.labels import TIMES, effect_label, effects_label, percent, sentence_case
-from rigsight.report.quantities import Written, effect_of, gap_percent, rig_of
-from rigsight.report.record_views import record_views
-from rigsight.report.responses import amplitude_figures, record_responses
+from rigsight.report.labels import (
+    TIMES,
+    Written,
+    effect_label,
+    effect_of,
+    effects_label,
+    gap_percent,
+    percent,
+    rig_of,
+    sentence_case,
+)
+from rigsight.report.record_views import amplitude_figures, record_responses, record_views
 from rigsight.report.wording import advice_sentences, stage_names
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
@@ -31,6 +39,8 @@ from rigsight.simulate.printing.notation import mathml_equation
 from rigsight.simulate.printing.shown import shown_equations
 
 _TEMPLATES = files("rigsight.report") / "templates"
+NotebookTable = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Heads, which may be none, and rows of texts; the first cell of a row is its label."""
 
 
 def render_report(
@@ -41,10 +51,12 @@ def render_report(
     own_effects: Iterable[Effect] = (),
     origin: Mapping[str, Any] | None = None,
 ) -> str:
-    """Return the report as one HTML page; `origin` is what repeats it, see `workflow.run.origin`."""
+    """Return the report as one HTML page; `origin` is what repeats it, see `workflow.reproduce`."""
     known = known_effects(own_effects)
     responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
     script = _script()
+    # The name by which the page's policy allows this one script and no other.
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     return rendered(
         "report.html.jinja",
         command,
@@ -80,7 +92,7 @@ def render_report(
         advice=advice_sentences(diagnosis),
         floors=sections.floor_rows(diagnosis),
         script=Markup(script),
-        script_hash=_content_hash(script),
+        script_hash=f"sha256-{digest}",
     )
 
 
@@ -92,6 +104,17 @@ def rendered(
     return page.render(command=command, versions=versions, seed=seed, made=datetime.now(UTC), **content)
 
 
+def notebook_html(
+    title: str, sentences: Iterable[str], tables: Sequence[NotebookTable], warnings: Sequence[str] = ()
+) -> str:
+    """Return a small self-contained piece of a page, for a notebook."""
+    return (
+        environment()
+        .get_template("notebook.html.jinja")
+        .render(title=title, sentences=[s for s in sentences if s], tables=tables, warnings=warnings)
+    )
+
+
 def _script() -> str:
     """Return what the page runs: uPlot, below the license that must go with it, and what sets up its charts."""
     terms, library, charts = (
@@ -99,11 +122,6 @@ def _script() -> str:
         for name in ("uplot/LICENSE", "uplot/uPlot.iife.min.js", "charts.js")
     )
     return f"\n/* {terms}*/\n{library}{charts}"
-
-
-def _content_hash(script: str) -> str:
-    """Return the name by which the page's policy allows this one script and no other."""
-    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode('utf-8')).digest()).decode('ascii')}"
 
 
 def environment(*packages: str) -> Environment:

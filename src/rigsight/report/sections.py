@@ -17,16 +17,8 @@ from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
 from rigsight.effects import Effect
 from rigsight.errors import InputError
 from rigsight.parameters import Parameter
+from rigsight.report import labels
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.labels import effect_label, effects_label, percent, sentence_case
-from rigsight.report.quantities import (
-    ParameterRow,
-    effect_of,
-    gap_percent,
-    parameter_row,
-    rig_of,
-    written,
-)
 from rigsight.report.wording import given_text, is_given, named_candidate, stages_reported
 
 if TYPE_CHECKING:
@@ -42,15 +34,17 @@ _NAMED_IN_A_LINE = 3
 def effect_summaries(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[tuple[str, str, str]]:
     """Return label, name and summary of every effect named; the summary of one that is not among the known is empty."""
     return [
-        (sentence_case(effect_label(name)), name, effect.summary if effect is not None else "")
-        for name, effect in ((name, effect_of(name, known)) for name in diagnosis.effects)
+        (labels.sentence_case(labels.effect_label(name)), name, effect.summary if effect is not None else "")
+        for name, effect in ((name, labels.effect_of(name, known)) for name in diagnosis.effects)
     ]
 
 
 def budget_drawing(diagnosis: Diagnosis) -> Figure:
     """Return the gap budget of all outputs as a waterfall."""
     label = (
-        f"Adding {effects_label(diagnosis.effects)}" if len(diagnosis.effects) == 1 else "Adding the effects"
+        f"Adding {labels.effects_label(diagnosis.effects)}"
+        if len(diagnosis.effects) == 1
+        else "Adding the effects"
     )
     titles = {output: output_label(diagnosis, output) for output in diagnosis.gap}
     return plot.gap_budget(diagnosis, label, titles, is_given(diagnosis))
@@ -59,7 +53,7 @@ def budget_drawing(diagnosis: Diagnosis) -> Figure:
 def budget_figure(diagnosis: Diagnosis) -> PageFigure:
     """Return the gap budget with its caption."""
     alt = " ".join(
-        f"{output}: {stages_reported(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}."
+        f"{output}: {stages_reported(diagnosis, gap)}, noise floor {labels.gap_percent(gap.noise_floor)}."
         for output, gap in diagnosis.gap.items()
     )
     meaning = (
@@ -80,9 +74,9 @@ def budget_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return [
         {
             "output": output_label(diagnosis, output),
-            **{stage: gap_percent(getattr(gap, stage)) for stage in STAGES},
-            "noise_floor": gap_percent(gap.noise_floor),
-            "closed": percent(gap.closed),
+            **{stage: labels.gap_percent(getattr(gap, stage)) for stage in STAGES},
+            "noise_floor": labels.gap_percent(gap.noise_floor),
+            "closed": labels.percent(gap.closed),
             "intervals": {stage: interval_text(limits, stage) for stage, limits in gap.intervals.items()},
         }
         for output, gap in diagnosis.gap.items()
@@ -93,18 +87,20 @@ def interval_text(limits: tuple[float, float], stage: str) -> str:
     """Return a 95 % interval of a stage as text, ``"9.1 % to 9.9 %"``; one number for equal ends, empty if not finite."""
     if not all(map(math.isfinite, limits)):
         return ""
-    low, high = map(percent if stage == "closed" else gap_percent, limits)
+    low, high = map(labels.percent if stage == "closed" else labels.gap_percent, limits)
     return low if low == high else f"{low} to {high}"
 
 
 def ranking_drawing(diagnosis: Diagnosis) -> Figure:
     """Return the candidates as bars."""
-    return plot.ranking(diagnosis, [effects_label(candidate.effects) for candidate in diagnosis.candidates])
+    return plot.ranking(
+        diagnosis, [labels.effects_label(candidate.effects) for candidate in diagnosis.candidates]
+    )
 
 
 def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
     """Return the ranking with its caption."""
-    names = [effects_label(candidate.effects) for candidate in diagnosis.candidates]
+    names = [labels.effects_label(candidate.effects) for candidate in diagnosis.candidates]
     scored = [
         f"{name} {c.error_over_noise:.3g}"
         for name, c in zip(names, diagnosis.candidates, strict=True)
@@ -124,20 +120,20 @@ def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
     )
 
 
-def parameter_rows(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> list[ParameterRow]:
+def parameter_rows(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> list[labels.ParameterRow]:
     """Return the numbers of the diagnosed simulation: fitted ones with their errors, else those of the model file."""
     known = {p.name: p for p in _parameters(diagnosis, effects)}
     candidate = named_candidate(diagnosis)
     if candidate is not None and diagnosis.verdict in ("effect", "parameters"):
         return [
-            parameter_row(name, estimate, known.get(name), given_text(diagnosis, name))
+            labels.parameter_row(name, estimate, known.get(name), given_text(diagnosis, name))
             for name, estimate in candidate.parameters.items()
         ]
     model, units = diagnosis.model, diagnosis.model.get("units", {})
     values = {**model.get("parameters", {}), **model.get("effect_parameters", {})}
     return [
-        ParameterRow(
-            name, written(value), units.get(name, ""), known[name].description if name in known else ""
+        labels.ParameterRow(
+            name, labels.written(value), units.get(name, ""), known[name].description if name in known else ""
         )
         for name, value in values.items()
         if isinstance(value, int | float)
@@ -188,17 +184,17 @@ def _disturbing(floor: NoiseFloor) -> str:
 
 def output_label(diagnosis: Diagnosis, output: str) -> str:
     """Return an output for people: ``"yaw angle psi"``; the bare name on a rig that is not ours."""
-    rig = rig_of(diagnosis)
+    rig = labels.rig_of(diagnosis)
     meaning = next((s.description for s in rig.outputs if s.name == output), "") if rig else ""
     return meaning if meaning.startswith(output) else f"{meaning} {output}".strip()
 
 
 def _parameters(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Iterator[Parameter]:
-    rig = rig_of(diagnosis)
+    rig = labels.rig_of(diagnosis)
     if rig:
         yield from rig.parameters
     for name in (*diagnosis.model.get("effects", ()), *diagnosis.effects):
-        effect = effect_of(name, known)
+        effect = labels.effect_of(name, known)
         for parameter in () if effect is None else effect.parameters:
             yield parameter
             # Where two effects share a name, theirs is in front of it.
@@ -254,7 +250,7 @@ def trust_line(diagnosis: Diagnosis) -> str:
     more = len(differing) - len(reported)
     rest = f"; {more} more {'differs' if more == 1 else 'differ'}" if more > 0 else ""
     first = differing[0].points_to
-    return f"Trust: {'; '.join(reported)}{rest}. {sentence_case(first.cause) if first else ''}."
+    return f"Trust: {'; '.join(reported)}{rest}. {labels.sentence_case(first.cause) if first else ''}."
 
 
 def trust_rows(diagnosis: Diagnosis) -> Iterator[dict[str, Any]]:
@@ -286,15 +282,13 @@ def _how(number: ParameterTrust) -> str:
         return "not compared"
     if number.stable:
         return "the same"
-    if number.pattern is Pattern.RECORD:
-        return "differs from record to record"
-    if number.pattern is Pattern.PORTION:
-        return f"{number.moves} along the records"
-    if number.pattern is Pattern.WINDOW:
-        return f"{number.moves} when windows get shorter"
-    if number.pattern is Pattern.TIME:
-        return f"{number.moves} from record to record"
-    return f"{number.moves} with {' and '.join(number.goes_with)}"
+    words = {
+        Pattern.RECORD: "differs from record to record",
+        Pattern.PORTION: f"{number.moves} along the records",
+        Pattern.WINDOW: f"{number.moves} when windows get shorter",
+        Pattern.TIME: f"{number.moves} from record to record",
+    }
+    return words.get(number.pattern, f"{number.moves} with {' and '.join(number.goes_with)}")
 
 
 def _row(number: ParameterTrust) -> dict[str, Any]:
@@ -302,9 +296,9 @@ def _row(number: ParameterTrust) -> dict[str, Any]:
     found = number.points_to
     return {
         "name": number.name,
-        "number": written(number.value, number.std),
+        "number": labels.written(number.value, number.std),
         "unit": number.unit,
-        "same": sentence_case(_how(number)),
+        "same": labels.sentence_case(_how(number)),
         "p_value": "" if number.pattern is Pattern.UNKNOWN else p_value,
-        "cause": "" if found is None else f"{sentence_case(found.cause)}. Next: {found.experiment}",
+        "cause": "" if found is None else f"{labels.sentence_case(found.cause)}. Next: {found.experiment}",
     }

@@ -1,4 +1,4 @@
-"""Results on a terminal: a verdict in about ten lines, a discovery; plain ASCII of our own, color only as an extra."""
+"""A diagnosis and a discovery on a terminal and in a notebook; plain ASCII of our own, color only as an extra."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from rigsight.diagnose.result import Candidate, Diagnosis, Estimate
 from rigsight.discover import Discovery
 from rigsight.discover.result import Term
 from rigsight.report import labels, wording
-from rigsight.report.quantities import estimate_text, gap_percent
+from rigsight.report.labels import estimate_text, gap_percent
+from rigsight.report.render import notebook_html
 from rigsight.report.sections import trust_line
 
 _RANKED = 3
@@ -23,8 +24,6 @@ _ADVICES = 1
 _FAULTS = 3
 """Numbers of candidates and rivals, experiments and faults shown; the report holds all."""
 _COLORS = {"effect": "bold green", "parameters": "bold green", "none": "bold green", "unknown": "bold yellow"}
-
-
 Writer = Callable[..., Text]
 """Makes a line of words and, optionally, a style."""
 
@@ -188,3 +187,25 @@ def _alone(found: Discovery | str) -> str:
         return found
     terms = ", ".join(term.name for term in found.kept)
     return f"{terms or 'no further term'}, held-out error {gap_percent(found.held_out_nrmse)}"
+
+
+def diagnosis_html(diagnosis: Diagnosis) -> str:
+    """Return verdict, gap, ranking and the numbers of the effect."""
+    sentences = [
+        wording.verdict_sentence(diagnosis),
+        *wording.fault_sentences(diagnosis),
+        wording.missing_force_sentence(diagnosis),
+        wording.remainder_sentence(diagnosis),
+        trust_line(diagnosis),
+        wording.ambiguity_sentence(diagnosis),
+        *wording.advice_sentences(diagnosis),
+        wording.basis_sentence(diagnosis),
+    ]
+    rows = ((), list(diagnosis_rows(diagnosis)))
+    return notebook_html(f"{wording.verdict_name(diagnosis)}: {diagnosis.title}", sentences, [rows])
+
+
+def discovery_html(discovery: Discovery) -> str:
+    """Return the equations, their numbers and terms, and the error on the held-out records."""
+    rows = ((), list(discovery_rows(discovery)))
+    return notebook_html(f"Discovered: {discovery.title}", discovery.equations, [rows], discovery.warnings)

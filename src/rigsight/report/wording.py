@@ -17,12 +17,12 @@ from rigsight.report.labels import (
     effect_label,
     effects_label,
     family_label,
+    gap_percent,
     listed,
     percent,
     place_label,
     unit_text,
 )
-from rigsight.report.quantities import gap_percent
 
 _SEPARATES = 1.0
 """RMS difference in standard deviations of the noise below which an experiment does not help."""
@@ -34,8 +34,6 @@ _VERDICT_NAMES = {
     "none": "No gap",
     "unknown": "Unknown cause",
 }
-
-
 _STATED = {
     "parameters": "no missing effect",
     "none": "no missing effect",
@@ -291,11 +289,7 @@ def _deviations(separation: float) -> str:
         return "less than 0.1 standard deviations"
     if separation > _DECIDES:
         return f"more than {_DECIDES:g} standard deviations"
-    return (
-        f"{separation:.0f} standard deviations"
-        if separation >= 10.0
-        else f"{separation:.2g} standard deviations"
-    )
+    return f"{separation:{'.0f' if separation >= 10.0 else '.2g'}} standard deviations"
 
 
 def what_is_probable(diagnosis: Diagnosis) -> str:

@@ -11,9 +11,9 @@ from rigsight.check.campaign_check import PARTS
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report.check_page import render_check
 from rigsight.rigs import Rig
+from rigsight.workflow.campaign.in_memory import campaign_of_rig, is_rig_file
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.campaign.without_records import campaign_of_rig, is_rig_file
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
 from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
 
@@ -22,7 +22,7 @@ CHECK_FILE, CHECK_PAGE = "check.json", "check.html"
 
 def run_check(
     campaign: str | Path,
-    out: str | Path | None = None,
+    out: Path,
     *,
     effects: Sequence[Effect] = CATALOGUE,
     own_effects: Sequence[Effect] = (),
@@ -30,23 +30,13 @@ def run_check(
     listener: Listener = silent,
     command: str = "",
 ) -> Check:
-    """Return what the records of a campaign can show, and write it into a folder as check.json and check.html.
-
-    Of a rig file: what a simulated sweep of the rig would show.
-
-    Raises
-    ------
-    InputError
-        If the campaign or one of its records cannot be read, or a rig file leaves a number open.
-    """
-    if out is not None:
-        check_writable(Path(out), CHECK_FILE, CHECK_PAGE)
+    """Return what the records of a campaign, or a simulated sweep of a rig file, can show, and write it into a folder."""
+    check_writable(out, CHECK_FILE, CHECK_PAGE)
     path = Path(campaign)
     read = campaign_of_rig(path) if is_rig_file(path) else read_campaign(path, own_effects, own_rigs)
     report_notes(read.notes, listener)
     found = check_of(read, effects, listener)
-    if out is not None:
-        write_together(Path(out), check_files(found, command))
+    write_together(out, check_files(found, command))
     return found
 
 

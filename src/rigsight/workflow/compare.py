@@ -26,7 +26,7 @@ from rigsight.simulate import compose
 from rigsight.simulate.equilibrium import can_drift
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model, of_this_rig
-from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import free_name, read_campaign
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent
 from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
@@ -157,7 +157,7 @@ def named_competitors(
             if source == GIVEN and not Path(source).exists()
             else of_this_rig(text, named_model(source, own_effects, own_rigs), campaign)
         )
-        found.append(Competitor(_distinct(name, [c.name for c in found]), model, source))
+        found.append(Competitor(free_name(name, [c.name for c in found]), model, source))
     return found
 
 
@@ -186,14 +186,6 @@ def _name_and_source(text: str) -> tuple[str, str]:
     if path.name == MODEL_FILE:
         return readable(path.absolute().parent.name) or text, text
     return readable(path.stem if path.suffix == ".json" else path.absolute().name) or text, text
-
-
-def _distinct(name: str, taken: Sequence[str]) -> str:
-    count, free = 1, name
-    while free in taken:
-        count += 1
-        free = f"{name}_{count}"
-    return free
 
 
 def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:

@@ -28,8 +28,6 @@ from rigsight.workflow.run.results import check_writable, write_together
 VIRTUAL_RIG_SET = "iwan_tables"
 DT = 5e-3
 """Sample time of the thesis's rig [s]."""
-
-
 CAMPAIGN_FOLDER = "campaign"
 HIDDEN_EFFECT = "iwan_hysteresis"
 MEASURING = "Measuring on the virtual rig"
@@ -86,7 +84,9 @@ def run_demo(
     jobs = checked_jobs(n_jobs)
     check_writable(out)
     folder = (out / CAMPAIGN_FOLDER).absolute()
-    prepare_kernels(_structures(), jobs, listener)
+    modelled = tuple(effect_named(name) for name in _GIVEN_EFFECTS)
+    tried = structures_to_try(RUNNING_GEAR, CATALOGUE, modelled)
+    prepare_kernels([VirtualRig().structure, *tried], jobs, listener)
     files = _campaign(np.random.default_rng(seed), listener)
     with tempfile.TemporaryDirectory(prefix="rigsight-") as place:
         for name, text in files.items():
@@ -100,12 +100,6 @@ def run_demo(
         write_together(out, inside | result_files(diagnosis, command, seed))
 
     return diagnose_campaign(campaign, CATALOGUE, seed, jobs, listener, keep)
-
-
-def _structures() -> list[Structure]:
-    """Return what is simulated: the rig itself, and what its diagnosis tries."""
-    modelled = tuple(effect_named(name) for name in _GIVEN_EFFECTS)
-    return [VirtualRig().structure, *structures_to_try(RUNNING_GEAR, CATALOGUE, modelled)]
 
 
 def _campaign(rng: np.random.Generator, listener: Listener) -> dict[str, str]:

@@ -27,9 +27,9 @@ from rigsight.simulate import cache_folder
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.check import CHECK_FILE, CHECK_PAGE, check_files, check_of
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
+from rigsight.workflow.reproduce import origin
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
-from rigsight.workflow.run.origin import origin
 from rigsight.workflow.run.progress import Listener, Stage, Step, report_notes, silent
 from rigsight.workflow.run.results import (
     DIAGNOSIS_FILE,
@@ -124,13 +124,6 @@ def _report_continuation(count: int, listener: Listener) -> None:
     listener(Step(stage, "", count, count))
 
 
-def write_diagnosis(
-    diagnosis: Diagnosis, out: Path, command: str, seed: int | None, effects: Iterable[Effect] = CATALOGUE
-) -> tuple[Path, ...]:
-    """Write the three results of a diagnosis into a folder, all or none; the report shows the equations of these effects."""
-    return write_together(out, result_files(diagnosis, command, seed, effects))
-
-
 def result_files(
     diagnosis: Diagnosis,
     command: str,
@@ -138,7 +131,7 @@ def result_files(
     effects: Iterable[Effect] = CATALOGUE,
     made_from: Mapping[str, Any] | None = None,
 ) -> dict[str, str]:
-    """Return the three results of a diagnosis by file name."""
+    """Return the three results of a diagnosis by file name; the report shows the equations of these effects."""
     return {
         DIAGNOSIS_FILE: json_text(diagnosis.to_json()),
         MODEL_FILE: json_text(diagnosis.model),

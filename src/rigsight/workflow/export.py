@@ -55,15 +55,17 @@ def run_export(
     read = named_model(model, own_effects, own_rigs)
     if usd is not None and target != "usd":
         raise InputError(f"--usd applies only to usd; leave it out for {target}.")
-    if target in ROBOT_TARGETS:
-        if hold is not None or source_only or (step is not None and target == "mjcf"):
-            raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")
-        records = () if campaign is None else _validation(campaign, target, own_effects, own_rigs)
-        return _robot(read, target, robot, usd, out, step, records)
-    if robot is not None:
+    if robot is not None and target not in ROBOT_TARGETS:
         raise InputError(f"--mjcf applies only to {', '.join(ROBOT_TARGETS)}; leave it out for {target}.")
-    if campaign is not None:
+    if target in ROBOT_TARGETS and (
+        hold is not None or source_only or (step is not None and target == "mjcf")
+    ):
+        raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")
+    if campaign is not None and target != "mjcf":
         raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
+    if target in ROBOT_TARGETS:
+        records = () if campaign is None else _validation(campaign, own_effects, own_rigs)
+        return _robot(read, target, robot, usd, out, step, records)
     chosen = TARGETS[target]
     file = _target_file(read, out, chosen.name, chosen.suffix)
     content = export_model(
@@ -79,26 +81,14 @@ def run_export(
     return WrittenFile(file)
 
 
-def _validation(
-    campaign: Path, target: str, own_effects: Sequence[Effect], own_rigs: Iterable[Rig]
-) -> tuple[Record, ...]:
+def _validation(campaign: Path, own_effects: Sequence[Effect], own_rigs: Iterable[Rig]) -> tuple[Record, ...]:
     """Return the validation records of a campaign."""
     from rigsight.workflow.campaign.read_campaign import read_campaign
 
-    if target != "mjcf":
-        raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
     found = read_campaign(campaign, own_effects, own_rigs).validation
     if not found:
         raise InputError(f'{campaign} has no validation record: give one of its records role = "validation".')
     return found
-
-
-def _gap(model: Model, robot: Path, records: Sequence[Record]) -> tuple[WrittenGap, ...]:
-    """Return the gap in MuJoCo and in the model, both from the states that the first samples of the records show."""
-    from rigsight.robots import gap_of_written
-
-    starts = [first_state(model.structure, r, {**model.values, **r.constants}) for r in records]
-    return gap_of_written(model, robot, records, starts)
 
 
 def _robot(
@@ -110,7 +100,7 @@ def _robot(
     step: float | None,
     records: Sequence[Record],
 ) -> WrittenFile:
-    from rigsight.robots import isaac_settings, usd_layer, write_back
+    from rigsight.robots import gap_of_written, isaac_settings, usd_layer, write_back
 
     if robot is None:
         raise InputError(
@@ -124,7 +114,9 @@ def _robot(
         )
     if target == "mjcf":
         back = write_back(model, robot)
-        gap = _gap(model, robot, records) if records else ()
+        # In MuJoCo and in the model, both from the states that the first samples of the records show.
+        starts = [first_state(model.structure, r, {**model.values, **r.constants}) for r in records]
+        gap = gap_of_written(model, robot, records, starts) if records else ()
         write_together(file.parent, {file.name: back.text})
         return WrittenFile(file, back.written, back.without_field, gap)
     written = (

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
-from rigsight.compare import NumberCheck, Suspect, free_run, own_numbers, suspects
+from rigsight.compare import NumberCheck, Suspect, UsualGap, free_run, own_numbers, suspects
 from rigsight.compare.on_one_record import FreeRun
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
@@ -18,10 +19,18 @@ from rigsight.rigs import Rig
 from rigsight.simulate import structure_of_fit
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import named_model
-from rigsight.workflow.gating.junit import Case, junit_xml
-from rigsight.workflow.gating.limits import FALSE_ALARMS, Check, Judge, Limits, judge
-from rigsight.workflow.gating.new_records import Reader
-from rigsight.workflow.gating.reference import Reference, beside, known_gaps, of_diagnosis, of_records
+from rigsight.workflow.gating.limits import (
+    FALSE_ALARMS,
+    Check,
+    Judge,
+    Limits,
+    Reader,
+    Reference,
+    beside,
+    known_gaps,
+    of_diagnosis,
+    of_records,
+)
 from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, silent
 from rigsight.workflow.run.results import check_target, check_writable, json_text, write_together
@@ -116,12 +125,12 @@ class Gate:
 
     def to_junit(self) -> str:
         """Return the checks as JUnit XML."""
-        cases = [Case(f"{own.record}: {own.output}", check_text(own), own.closed) for own in self.checks]
+        cases = [(f"{own.record}: {own.output}", check_text(own), own.closed) for own in self.checks]
         for name in dict.fromkeys(own.record for own in self.numbers):
             changed = [own for own in self.numbers if own.record == name and own.closed]
             text = "; ".join(map(number_text, changed)) or "no number has changed"
-            cases.append(Case(f"{name}: numbers", text, bool(changed)))
-        cases += [Case(name, reason, failed=True) for name, reason in self.failures.items()]
+            cases.append((f"{name}: numbers", text, bool(changed)))
+        cases += [(name, reason, True) for name, reason in self.failures.items()]
         return junit_xml(f"rigsight gate {self.rig}", cases, suspect_text(self))
 
 
@@ -167,15 +176,23 @@ def gate_of(
     """Hold the gaps of a model on records against their limits."""
     rig = model.structure.rig
     outputs = [signal.name for record in records for signal in rig.outputs if signal.name in record]
-    against = judge(rig, limits, reference, outputs, len(records))
-    if not any(_is_limited(against, output) for output in outputs):
+    # Each sensor counts as often as a record holds it.
+    tested = [o for o in outputs if limits.asked(o, 1.0) is None and UsualGap.of(reference.known, o)]
+    against = Judge(rig, limits, reference, max(1, len(tested)), len(records))
+    known = {gap.output for gap in reference.known}
+    if not any(output in known or limits.asked(output, 1.0) is not None for output in outputs):
         raise InputError(
             "Nothing is known of the gaps of this model: there is no diagnosis beside it. Name a campaign for which it "
             "is known to hold with --campaign, or set a limit with --floors or --limit."
         )
     stage = Stage(SIMULATING, len(records) + 1, listener)
     runs: dict[str, FreeRun] = {}
-    checks, numbers, failures, notes = list[Check](), list[NumberCheck](), dict[str, str](), list[str]()
+    checks, numbers, failures, notes = (
+        list[Check](),
+        list[NumberCheck](),
+        dict[str, str](),
+        list[str](),
+    )
     for record in records:
         try:
             run = free_run(model, record, reference.windows(record), reference.floors)
@@ -249,11 +266,6 @@ def _reference(model: Model, path: Path, known: Sequence[Record], new: Sequence[
     return replace(found, floors={**own, **found.floors})
 
 
-def _is_limited(against: Judge, output: str) -> bool:
-    asked = against.limits.asked(output, 1.0)
-    return asked is not None or any(gap.output == output for gap in against.reference.known)
-
-
 def _notes(record: Record, run: FreeRun, found: Sequence[Check | None]) -> list[str]:
     notes = []
     if not run.estimated:
@@ -269,3 +281,25 @@ def _notes(record: Record, run: FreeRun, found: Sequence[Check | None]) -> list[
             "usual gap is extrapolated."
         )
     return notes
+
+
+def junit_xml(suite: str, cases: Sequence[tuple[str, str, bool]], text: str) -> str:
+    """Return cases, each with its name, what was found and whether it failed, as XML; the text says what was found as a whole."""
+    failures = str(sum(failed for _, _, failed in cases))
+    counts = {"name": suite, "tests": str(len(cases)), "failures": failures, "errors": "0", "skipped": "0"}
+    root = ET.Element("testsuites", {key: counts[key] for key in ("tests", "failures")})
+    element = ET.SubElement(root, "testsuite", counts)
+    for name, found, failed in cases:
+        own = ET.SubElement(element, "testcase", classname=suite, name=_printed(name), time="0")
+        if failed:
+            ET.SubElement(own, "failure", message=_printed(found), type="gap")
+        else:
+            ET.SubElement(own, "system-out").text = _printed(found)
+    ET.SubElement(element, "system-out").text = _printed(text)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _printed(text: str) -> str:
+    """Return a text with a sign for each character that XML does not allow."""
+    return "".join(sign if sign.isprintable() else "\ufffd" for sign in text)

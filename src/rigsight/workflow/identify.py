@@ -15,7 +15,7 @@ from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
 from rigsight.identify.record_identification import EstimationOptions
 from rigsight.identify.transfer.record_response import METHODS, Method
-from rigsight.report.identification_page import render_identification
+from rigsight.report.identification import render_identification
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
@@ -23,7 +23,7 @@ from rigsight.workflow.identification.figures import amplitudes_figure, identifi
 from rigsight.workflow.identification.hysteresis import structure_with_memory, with_hysteresis
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identification.rig import identify_rig
-from rigsight.workflow.own.effect_names import effects_on
+from rigsight.workflow.own.own_effects import effects_on
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, versions, write_together
@@ -63,26 +63,18 @@ def run_identify(
         read_campaign(campaign, own_effects, own_rigs), options, jobs, listener, effects=effects, seed=seed
     )
     if out is not None:
-        asked = [word for effect in effects for word in ("--effect", effect.name)]
-        estimated = [] if method == "local_rational" else ["--method", method]
-        resolved = [] if resolution is None else ["--resolution", f"{resolution!r}"]
-        aimed = [] if objective == "windows" else ["--objective", objective]
-        started = [] if initial_samples is None else ["--initial-samples", str(initial_samples)]
-        seeded = ["--seed", str(seed)] if seed else []
-        quoted = [
-            "rigsight",
-            "identify",
-            str(campaign),
-            *estimated,
-            *resolved,
-            *aimed,
-            *started,
-            *asked,
-            *seeded,
-            "--out",
-            str(out),
-        ]
-        write_identification(identification, Path(out), command or shlex.join(quoted), seed)
+        given = {
+            "--method": None if method == "local_rational" else method,
+            "--resolution": resolution,
+            "--objective": None if objective == "windows" else objective,
+            "--initial-samples": initial_samples,
+        }
+        chosen = [(option, value) for option, value in given.items() if value is not None]
+        chosen += [("--effect", effect.name) for effect in effects]
+        chosen += [("--seed", seed)] if seed else []
+        words = [str(word) for pair in (*chosen, ("--out", out)) for word in pair]
+        quoted = shlex.join(["rigsight", "identify", str(campaign), *words])
+        write_identification(identification, Path(out), command or quoted, seed)
     return identification
 
 

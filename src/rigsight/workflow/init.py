@@ -68,8 +68,7 @@ def run_init(
     if not folder.is_dir():
         raise InputError(f"{folder} is not a folder; name the folder of the measured files.")
     path = folder / CAMPAIGN_FILE
-    if path.exists() or path.is_symlink():
-        raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
+    _refuse(path, path.exists() or path.is_symlink())
     own = own_rigs(rig_files)
     known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
     if model is not None:
@@ -118,13 +117,9 @@ def run_init_from_mjcf(
     path = folder / f"{rig.name}.toml"
     text = rig_text(draft, source.name, folder)
     # When records have been added, the same command writes the campaign.
-    if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
-        raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
+    _refuse(path, path.exists() and path.read_text(encoding="utf-8", errors="replace") != text)
     campaign_file = folder / CAMPAIGN_FILE
-    if campaign_file.exists() or campaign_file.is_symlink():
-        raise InputError(
-            f"{campaign_file} exists already and is not overwritten; remove it, or edit it by hand."
-        )
+    _refuse(campaign_file, campaign_file.exists() or campaign_file.is_symlink())
     run = free_run(with_gears(robot.spec, draft), draft)
     stage.finished("compared with MuJoCo")
     write_together(folder, {path.name: text}, "Free disk space there, or get write permission.")
@@ -132,6 +127,11 @@ def run_init_from_mjcf(
     if measured_files(folder):
         campaign = run_init(folder, model=rig.name, rig_files=[path], values=draft.values, listener=listener)
     return ModelDraft(path, draft, run, campaign)
+
+
+def _refuse(path: Path, exists: bool) -> None:
+    if exists:
+        raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
 
 
 def _copied(folder: Path, file: Path) -> dict[str, str]:
@@ -251,17 +251,11 @@ def _roles(proposals: Sequence[Proposal]) -> list[tuple[Role, str]]:
         ]
     scored = [bool(_SCORED.search(Path(proposal.file).stem)) for proposal in proposals]
     if any(scored) and not all(scored):
-        return [
-            ("validation", "guessed from the file name; check") if named else ("estimation", "")
-            for named in scored
-        ]
-    last = len(proposals) - 1
-    return [
-        ("validation", "not fitted, only scored; guessed, choose any of the records")
-        if i == last
-        else ("estimation", "")
-        for i in range(len(proposals))
-    ]
+        remark = "guessed from the file name; check"
+    else:
+        scored = [proposal is proposals[-1] for proposal in proposals]
+        remark = "not fitted, only scored; guessed, choose any of the records"
+    return [("validation", remark) if is_scored else ("estimation", "") for is_scored in scored]
 
 
 def _rig_lines(folder: Path, rig: Rig, file: Path | None, others: Sequence[str]) -> list[str]:

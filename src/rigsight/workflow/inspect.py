@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rigsight.errors import InputError
 from rigsight.json_data import json_data
-from rigsight.plot import ChannelPlot
+from rigsight.plot import channel_plots
 from rigsight.records.channel_names import closeness
 from rigsight.records.channel_summary import ChannelSummary, open_measurement, summarize, time_summary
-from rigsight.records.formats.channel import Channel, ChannelFile, Refused, as_floats
+from rigsight.records.formats.channel import Channel, ChannelFile, Refused
 from rigsight.records.read_record import TIME
 from rigsight.rigs import RIGS, Rig
 from rigsight.workflow.campaign.record_proposal import propose
+
+if TYPE_CHECKING:
+    from rigsight.plot import Figure
 
 SCHEMA_VERSION = 1
 _NAMED = 2.0
@@ -75,24 +78,13 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
     )
 
 
-def plotted_channels(path: Path) -> list[ChannelPlot]:
-    """Return the channels of a file over their own time, over the channel that looks like time, or over their samples."""
+def channel_picture(path: Path) -> Figure:
+    """Return a plot of each channel of a file."""
     with open_measurement(path) as opened:
         file, _ = _readable(path, opened)
         time = next((channel for channel in file.channels if _is_time(channel)), None)
         drawn = [channel for channel in file.channels if channel is not time] or list(file.channels)
-        return [_plot(channel, time) for channel in drawn[:_MOST_DRAWN]]
-
-
-def _plot(channel: Channel, time: Channel | None) -> ChannelPlot:
-    values = as_floats(channel.load())
-    if channel.axis is not None:
-        return ChannelPlot(
-            channel.name, channel.unit, values, channel.axis.stamps(), f"time [{channel.axis.unit}]"
-        )
-    if time is not None and time.n_samples == values.size:
-        return ChannelPlot(channel.name, channel.unit, values, as_floats(time.load()), time.name)
-    return ChannelPlot(channel.name, channel.unit, values, None, "sample")
+        return channel_plots(drawn[:_MOST_DRAWN], time)
 
 
 def _is_time(channel: Channel) -> bool:

@@ -15,13 +15,12 @@ from rigsight.errors import InputError
 from rigsight.plan import Named, Plan, plan_experiment, read_limits
 from rigsight.plot import planned_experiment, png_bytes, svg_text
 from rigsight.rigs import Rig
+from rigsight.workflow.campaign.in_memory import is_rig_file
 from rigsight.workflow.campaign.model_file import json_object
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.campaign.without_records import is_rig_file
-from rigsight.workflow.own.effect_names import effect_on
+from rigsight.workflow.own.own_effects import effect_on
 from rigsight.workflow.run.progress import Listener, Stage, silent
-from rigsight.workflow.run.record_csv import csv_text
-from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, write_together
+from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, csv_text, json_text, write_together
 
 PLAN_FILE, PLAN_RECORD = "plan.json", "plan.csv"
 PLAN_PICTURES = ("plan.svg", "plan.png")

@@ -15,7 +15,7 @@ from rigsight.inverse import NAMED_IN, NamedSize, along_motion, named_sizes
 from rigsight.json_data import json_data
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
 from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.results import check_writable, json_text, write_together
 
@@ -47,7 +47,7 @@ class Power:
 
 def run_power(
     campaign: str | Path,
-    out: str | Path | None = None,
+    out: Path,
     *,
     effects: Sequence[Effect] = CATALOGUE,
     own_effects: Sequence[Effect] = (),
@@ -55,18 +55,10 @@ def run_power(
     seed: int = 0,
     listener: Listener = silent,
 ) -> Power:
-    """Return the smallest size of each effect that would have been named, and write it into a folder.
-
-    Raises
-    ------
-    InputError
-        If there is no estimation record, or the sensors do not show the motion of the rig.
-    """
-    if out is not None:
-        check_writable(Path(out), POWER_FILE)
+    """Return the smallest size of each effect that would have been named, and write it into a folder."""
+    check_writable(out, POWER_FILE)
     found = power_of(read_campaign(campaign, own_effects, own_rigs), effects, seed, listener)
-    if out is not None:
-        write_together(Path(out), {POWER_FILE: json_text(found.to_json())})
+    write_together(out, {POWER_FILE: json_text(found.to_json())})
     return found
 
 

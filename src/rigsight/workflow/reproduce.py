@@ -1,19 +1,27 @@
-"""The work of `rigsight reproduce`: a report -> the same diagnosis run again, and whether it says the same."""
+"""The work of `rigsight reproduce`: a report -> the same diagnosis run again, and whether it says the same.
+
+A report carries its `origin`: the command, where it ran, its inputs, and what came out.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+import os
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis
 from rigsight.errors import InputError
 from rigsight.json_data import json_data
-from rigsight.workflow.run.origin import digests
+from rigsight.records import Record
 from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, versions, write_together
 
 SCHEMA_VERSION = 1
@@ -24,6 +32,8 @@ _EXECUTES = ("--effects", "--simulator")
 """Options that name a Python file, which a report that somebody sent must not run."""
 _SAME = 1e-6
 """Relative difference of numbers that count as the same: another machine rounds differently."""
+RESULTS = ("verdict", "effects", "where", "probability", "gap", "families")
+"""Keys of ``diagnosis.json`` that are compared."""
 
 
 @dataclass(frozen=True)
@@ -57,22 +67,7 @@ class Reproduction:
 
 
 def run_reproduce(report: Path, out: Path, run: Callable[[Sequence[str], Path], None]) -> Reproduction:
-    """Run the diagnosis of a report again and compare.
-
-    Parameters
-    ----------
-    report
-        A report.html of a diagnosis of files.
-    out
-        Folder for the new results and for ``reproduction.json``.
-    run
-        Runs rigsight with arguments in a folder; raises InputError where it fails.
-
-    Raises
-    ------
-    InputError
-        If the file is no such report, its command runs Python files, or the diagnosis fails.
-    """
+    """Run the diagnosis of a report again and compare; `run` runs rigsight with arguments in a folder, or raises InputError."""
     check_writable(out, REPRODUCTION_FILE)
     made = read_origin(report)
     command, folder = _command(report, made["command"]), report.resolve().parent
@@ -153,10 +148,49 @@ def _differences(key: str, reported: Any, found: Any) -> Iterator[Difference]:
     elif isinstance(reported, list) and isinstance(found, list) and len(reported) == len(found):
         for number, (one, other) in enumerate(zip(reported, found, strict=True)):
             yield from _differences(f"{key}.{number}", one, other)
-    elif not _is_same(reported, found):
+    elif isinstance(reported, float | int) and isinstance(found, float | int):
+        if not math.isclose(reported, found, rel_tol=_SAME, abs_tol=_SAME**2):
+            yield Difference(key, reported, found)
+    elif reported != found:
         yield Difference(key, reported, found)
 
 
-def _is_same(reported: Any, found: Any) -> bool:
-    numbers = isinstance(reported, float | int) and isinstance(found, float | int)
-    return math.isclose(reported, found, rel_tol=_SAME, abs_tol=_SAME**2) if numbers else reported == found
+def origin(
+    campaign: Campaign, diagnosis: Diagnosis, command: str, out: Path, by: str
+) -> dict[str, Any] | None:
+    """Return what a report in the folder `out`, made by somebody, carries about itself; None for a campaign without files."""
+    if campaign.path is None:
+        return None
+    content = diagnosis.to_json()
+    return {
+        "command": command,
+        # From the folder of the report: both may be moved together.
+        "ran_in": os.path.relpath(Path.cwd(), out.resolve()),
+        "campaign": os.path.relpath(campaign.path.resolve(), out.resolve()),
+        "by": by,
+        "versions": versions(),
+        "inputs": digests(campaign.path.resolve().parent, _inputs(campaign.path, campaign.records)),
+        "results": dict(json_data({key: content[key] for key in RESULTS})),
+    }
+
+
+def digests(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """Return the SHA-256 of files of a folder by their name, empty for one that cannot be read."""
+    found = {}
+    for name in names:
+        try:
+            with (folder / name).open("rb") as file:
+                found[name] = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError:
+            found[name] = ""
+    return found
+
+
+def _inputs(campaign: Path, records: Iterable[Record]) -> Iterator[str]:
+    """Yield the files of a campaign, as they are called from its folder."""
+    yield campaign.name
+    rig_file = tomllib.loads(campaign.read_text("utf-8-sig")).get("rig", {}).get("file")
+    if rig_file:
+        yield rig_file
+    sources = [record.source.resolve() for record in records if record.source is not None]
+    yield from dict.fromkeys(os.path.relpath(source, campaign.resolve().parent) for source in sources)

@@ -20,13 +20,11 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.equations.composition import without_vanished_effects
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.campaign_file import Where
-from rigsight.workflow.campaign.given_simulation import checked_numbers
+from rigsight.workflow.campaign.campaign_file import Where, checked_numbers
 from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
 from rigsight.workflow.campaign.read_campaign import options_of
 from rigsight.workflow.campaign.record_notes import in_units_of
-from rigsight.workflow.run.record_csv import csv_text
-from rigsight.workflow.run.results import check_target, write_together
+from rigsight.workflow.run.results import check_target, csv_text, write_together
 
 
 def run_simulate(
@@ -45,7 +43,8 @@ def run_simulate(
     rig = read.structure.rig
     columns = columns or {}
     known = [TIME, *(signal.name for signal in rig.inputs)]
-    if initial_state == "estimated":
+    estimated = initial_state == "estimated"
+    if estimated:
         known += [signal.name for signal in rig.outputs]
     for name in columns:
         if name not in known:
@@ -53,14 +52,13 @@ def run_simulate(
                 f"Column mapping '{name}': a simulation of {rig.name} does not use it.{nearest(name, known)} "
                 f"It uses: {', '.join(known)}."
             )
-    own = checked_numbers(Where(MODEL_FILE), ("constants",), rig, rig.constants, constants or {})
+    own = checked_numbers(Where(MODEL_FILE), ("constants",), rig.name, rig.constants, constants or {})
     if out is not None:
         check_target(Path(out))
         if Path(out).exists() and Path(record).exists() and Path(out).samefile(record):
             raise InputError(
                 f"Cannot write {out}: it is the record that is simulated. Name another file with --out."
             )
-    estimated = initial_state == "estimated"
     driven = read_record(
         Path(record),
         rig.inputs,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError, check_in_range, check_option
@@ -18,7 +19,7 @@ from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_
 from rigsight.json_data import json_data
 from rigsight.parameters import Parameter
 from rigsight.plot import png_bytes, svg_text
-from rigsight.plot.frequency_responses import Curve, varied_responses
+from rigsight.plot.frequency_responses import varied_responses
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, simulate
@@ -236,19 +237,9 @@ class _Sweeps:
                 raise SimulationError("The model is unstable, so that it has no frequency response.")
             row, column = linear.outputs.index(self.pair.response), linear.inputs.index(self.pair.source)
             exact = linear.frequency_response(omega)[:, row, column] * delay
-            record = self.at()[0]
-            return (
-                FrequencyResponse(
-                    omega=omega,
-                    values=exact,
-                    source=self.pair.source,
-                    response=self.pair.response,
-                    unit=pair_unit(record, self.pair.source, self.pair.response),
-                    method="linear equations",
-                ),
-                0.0,
-                late,
-            )
+            ends = self.pair.source, self.pair.response
+            unit = pair_unit(self.at()[0], *ends)
+            return FrequencyResponse(omega, exact, *ends, unit, method="linear equations"), 0.0, late
         before: FrequencyResponse | None = None
         for slowness in _SLOWNESS:
             record, ratio = self.at(slowness)
@@ -272,10 +263,8 @@ class _Sweeps:
         names = dict(zip(structure.parameter_symbols, structure.names, strict=True))
         shifting = {names[symbol] for delay in delays for symbol in delay.free_symbols}
         known = {symbol: values[name] for symbol, name in names.items() if name in shifting}
-        return float(sum(delay.xreplace(known) for delay in delays)), {
-            **values,
-            **dict.fromkeys(shifting, 0.0),
-        }
+        late = float(sum(delay.xreplace(known) for delay in delays))
+        return late, {**values, **dict.fromkeys(shifting, 0.0)}
 
 
 def _variant(model: Model, parameter: Parameter, value: float, sweeps: _Sweeps) -> Variant:
@@ -374,13 +363,13 @@ def _row(variant: Variant) -> dict[str, Any]:
     return {**found, "magnitude": variant.response.magnitude, "phase": variant.response.phase}
 
 
-def _curves(variation: Variation) -> list[Curve]:
+def _curves(variation: Variation) -> list[tuple[str, NDArray[np.complex128], bool]]:
     unit = "" if variation.parameter.unit in ("", "1") else f" {variation.parameter.unit}"
     return [
-        Curve(
+        (
             f"{variation.parameter.name} = {_plain(variant.value)}{unit}",
             variant.response.values,
-            is_base=math.isclose(variant.value, variation.base, rel_tol=1e-9),
+            math.isclose(variant.value, variation.base, rel_tol=1e-9),
         )
         for variant in variation.variants
         if variant.response is not None

@@ -10,7 +10,7 @@ from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS
-from rigsight.workflow.own.effect_names import candidates_of
+from rigsight.workflow.own.own_effects import candidates_of
 
 CAMPAIGN = Campaign("axis", AXIS, {}, {}, ())
 

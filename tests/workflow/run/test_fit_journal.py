@@ -120,7 +120,7 @@ def test_fits_are_kept_where_the_disk_does_not_take_the_result(
     def full(*_: object) -> None:
         raise MachineError("the disk is full")
 
-    monkeypatch.setattr("rigsight.workflow.diagnose.write_diagnosis", full)
+    monkeypatch.setattr("rigsight.workflow.diagnose.write_together", full)
     with pytest.raises(MachineError):
         run_diagnose(axis_campaign, tmp_path / "out", effects=CANDIDATES, n_jobs=1)
     (journal,) = journals.iterdir()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigsight.plot.drawing import FLOOR, GIVEN, WITH_EFFECT, in_style, new_figure
+from rigsight.plot.drawing import FLOOR, GIVEN, WITH_EFFECT, new_figure, style
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.labels import percent
 from rigsight_bench.report.views import number
@@ -33,7 +33,7 @@ def reliability_figure(content: Mapping[str, Any]) -> PageFigure:
     return page_figure(_reliability(rows), "reliability-plot", f"Reliability: {told}.", caption)
 
 
-@in_style
+@style()
 def _reliability(rows: list[Mapping[str, Any]]) -> Figure:
     figure = new_figure(_WIDTH, 3.6)
     ax = figure.subplots()
@@ -78,7 +78,7 @@ def _bin_text(row: Mapping[str, Any]) -> str:
     return f"below {row['to']:g}" if row["from"] == 0.0 else f"{row['from']:g} to {row['to']:g}"
 
 
-@in_style
+@style()
 def _held_out(bins: list[Mapping[str, Any]]) -> Figure:
     figure = new_figure(_WIDTH, 3.1)
     ax = figure.subplots()

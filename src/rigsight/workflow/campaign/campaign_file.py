@@ -1,18 +1,22 @@
-"""The allowed contents of a `campaign.toml`, where its keys are, and the messages for what is not allowed."""
+"""The allowed contents of a `campaign.toml` and of its given simulation, where its keys are, and the messages for all else."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from rigsight.effects import Effect
 from rigsight.errors import InputError, nearest, shown
+from rigsight.parameters import Parameter
 from rigsight.records import Hold, Kind, Role
-from rigsight.records.formats.known import file_size
+from rigsight.rigs import Rig
 from rigsight.rigs.reading.toml_places import Place, toml_tables, value_places
+from rigsight.simulate import Structure, compose
+from rigsight.workflow.own.own_rigs import text_of
 
 MOST_RECORDS = 1000
 Offsets = Literal["shared", "per_record"]
@@ -100,6 +104,15 @@ class CampaignTable(FileTable):
     records: Annotated[list[RecordTable], Field(min_length=1, max_length=MOST_RECORDS)]
 
 
+_ALLOWED = {
+    "decimal": '"." or ",", GOT',
+    "header": "true, false, or the number of the line with the column names, GOT",
+    "separator": "one character, GOT; a blank means any white space",
+    "unwrap": "true or false for an angle, or the numbers after which the column begins again, GOT",
+}
+"""Key -> what it may be, and what it got."""
+
+
 def locate(campaign: Path) -> Path:
     """Return the toml file for a toml file or its folder."""
     if not campaign.exists():
@@ -120,20 +133,11 @@ def locate(campaign: Path) -> Path:
 
 def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
     """Return the checked contents of a campaign file, and where its keys are."""
-    try:
-        if file_size(path, "the campaign.toml") > LARGEST_FILE:
-            raise InputError(
-                f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB, so it is not a campaign.toml."
-            )
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    text = text_of(path, "a campaign.toml", LARGEST_FILE, "; save it as UTF-8", "the campaign.toml")
     data = toml_tables(
         text, path.name, dict.fromkeys(("Cannot declare", "Cannot overwrite", "Cannot mutate"), _TWICE)
     )
-    where = Where.of_toml(path.name, text, data)
+    where = Where(path.name, data, value_places(text))
     return checked_file(where, data, CampaignTable), where
 
 
@@ -142,28 +146,24 @@ def checked_file(where: Where, data: dict[str, Any], table: type[Checked]) -> Ch
     try:
         return table.model_validate(data)
     except ValidationError as error:
-        reported = _messages(
-            where, data, table, [dict(problem) for problem in error.errors(include_url=False)]
-        )
-        more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
-        raise InputError("\n".join(reported[:5]) + more) from None
-
-
-def _messages(
-    where: Where, data: dict[str, Any], table: type[FileTable], problems: list[dict[str, Any]]
-) -> list[str]:
-    """Return one line per error; if one alternative fails in detail, the errors of the other alternatives are left out."""
+        problems: list[dict[str, Any]] = [dict(problem) for problem in error.errors(include_url=False)]
     keys = [_without_union_members(problem["loc"], data) for problem in problems]
+    # If one alternative fails in detail, the errors of the other alternatives are left out.
     reported = [
-        _message(where, data, table, problem)
+        _message(where, key, table, problem)
         for problem, key in zip(problems, keys, strict=True)
         if not any(len(other) > len(key) and other[: len(key)] == key for other in keys)
     ]
-    return list(dict.fromkeys(reported))
+    raise first_errors(list(dict.fromkeys(reported)))
 
 
-def _message(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
-    location = _without_union_members(problem["loc"], data)
+def first_errors(reported: Sequence[str]) -> InputError:
+    """Return an error with the first of several messages."""
+    more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
+    return InputError("\n".join(reported[:5]) + more)
+
+
+def _message(where: Where, location: Location, table: type[FileTable], problem: dict[str, Any]) -> str:
     if not location:
         # Only a key with an unpaired surrogate has no location.
         return f"{where.name}: a key is not valid text: {shown(problem['input'])}. Use plain letters."
@@ -179,16 +179,8 @@ def _message(where: Where, data: dict[str, Any], table: type[FileTable], problem
     if location == ("records",) and kind in ("too_short", "too_long"):
         count = len(got)
         return f"{key}: {count} given, 1 to {MOST_RECORDS} are allowed.{_how_to_write(location)}"
-    if location[-1] == "decimal":
-        return f'{key}: must be "." or ",", got {shown(got)}.'
-    if location[-1] == "header":
-        return (
-            f"{key}: must be true, false, or the number of the line with the column names, got {shown(got)}."
-        )
-    if location[-1] == "separator":
-        return f"{key}: must be one character, got {shown(got)}; a blank means any white space."
-    if location[-1] == "unwrap":
-        return f"{key}: must be true or false for an angle, or the numbers after which the column begins again, got {shown(got)}."
+    if location[-1] in _ALLOWED:
+        return f"{key}: must be {_ALLOWED[str(location[-1])].replace('GOT', f'got {shown(got)}')}."
     if "columns" in location[:-1]:
         return (
             f"{key}: got {shown(got)}. Write the name of the column, its number counted from 1, "
@@ -213,7 +205,7 @@ def value_message(problem: dict[str, Any]) -> str | None:
     return None
 
 
-def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]) -> tuple[str | int, ...]:
+def _without_union_members(location: Location, data: dict[str, Any]) -> Location:
     """Drop the names of alternatives that pydantic puts into a location; they are not keys of the file."""
     kept: list[str | int] = []
     here: Any = data
@@ -230,7 +222,7 @@ def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]
     return tuple(kept)
 
 
-def _allowed_keys(location: tuple[str | int, ...], table: type[FileTable]) -> list[str]:
+def _allowed_keys(location: Location, table: type[FileTable]) -> list[str]:
     if location[0] == "rig" and len(location) > 1:
         table = RigTable
     elif location[0] in LISTS and len(location) > 1:
@@ -238,7 +230,7 @@ def _allowed_keys(location: tuple[str | int, ...], table: type[FileTable]) -> li
     return list(table.model_fields)
 
 
-def _how_to_write(location: tuple[str | int, ...]) -> str:
+def _how_to_write(location: Location) -> str:
     return {
         "rig": f" Write [rig] and {WHICH_RIG}",
         "model": f" Write {WHICH_RIG}",
@@ -256,11 +248,6 @@ class Where:
     data: Mapping[str, Any] = field(default_factory=dict)
     # Line and column of each value by its keys; empty if unknown.
     places: Mapping[Location, Place] = field(default_factory=dict)
-
-    @classmethod
-    def of_toml(cls, name: str, text: str, data: Mapping[str, Any]) -> Where:
-        """Return the locations of the keys of a TOML file."""
-        return cls(name, data, value_places(text))
 
     def at(self, *location: str | int) -> str:
         """Return the beginning of a message: ``campaign.toml, line 7, column 5: rig.constants.v``."""
@@ -289,3 +276,121 @@ class Where:
             if place is not None:
                 return f", line {place[0]}, column {place[1]}"
         return ""
+
+
+def rig_named(where: Where, name: str, known: Mapping[str, Rig]) -> Rig:
+    """Return the rig that ``rig.model`` names."""
+    if name not in known:
+        raise InputError(
+            f"{where.at('rig', 'model')}: is '{name}'.{nearest(name, known)} Allowed: {', '.join(known)}; for a rig of your own "
+            'give its file: file = "my_rig.toml".'
+        )
+    return known[name]
+
+
+def checked_simulation(
+    where: Where,
+    rig: Rig,
+    modelled: Sequence[Effect],
+    constants: Mapping[str, float],
+    parameters: Mapping[str, float],
+    of_records: Collection[str] = (),
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return constants and parameters of the given simulation, all defaults filled in."""
+    _check_tables(where, rig, constants, parameters)
+    known = _constants(where, rig, constants, of_records)
+    try:
+        structure = compose(rig, modelled)
+    except InputError as error:
+        raise InputError(f"{where.at('rig', 'effects')}: {error}") from None
+    return known, _parameters(where, structure, parameters)
+
+
+def checked_numbers(
+    where: Where, key: Location, whose: str, allowed: Iterable[Parameter], given: Mapping[str, float]
+) -> dict[str, float]:
+    """Return given numbers, each one that is allowed and within its range."""
+    known = {parameter.name: parameter for parameter in allowed}
+    checked = {}
+    for name, value in given.items():
+        here = where.at(*key, name)
+        if name not in known:
+            listed = ", ".join(known) or "none"
+            raise InputError(f"{here}: unknown to {whose}.{nearest(name, known)} Known: {listed}.")
+        try:
+            checked[name] = known[name].check(value)
+        except InputError as error:
+            raise InputError(f"{here}: {error}") from None
+    return checked
+
+
+def _check_tables(
+    where: Where, rig: Rig, constants: Mapping[str, float], parameters: Mapping[str, float]
+) -> None:
+    """Refuse a constant among the parameters, and a parameter among the constants, before one of them counts as missing."""
+    own_constants = {constant.name for constant in rig.constants}
+    own_parameters = {parameter.name for parameter in (*rig.parameters, *rig.alternative_parameters)}
+    for table, given, others, kind in (
+        ("parameters", parameters, own_constants - own_parameters, "constant"),
+        ("constants", constants, own_parameters - own_constants, "parameter"),
+    ):
+        for name in given:
+            if name in others:
+                raise InputError(
+                    f"{where.at('rig', table, name)}: unknown to {rig.name} under rig.{table}. It is a {kind}: give it under "
+                    f"rig.{kind}s."
+                )
+
+
+def _constants(
+    where: Where, rig: Rig, given: Mapping[str, float], of_records: Collection[str]
+) -> dict[str, float]:
+    checked = checked_numbers(where, ("rig", "constants"), rig.name, rig.constants, given)
+    for constant in rig.constants:
+        if constant.name in checked or constant.name in of_records:
+            continue
+        if constant.default is None:
+            raise InputError(
+                f"{where.at('rig', 'constants', constant.name)}: is missing; {rig.name} needs it "
+                f"({constant.description} [{constant.unit}])."
+            )
+        checked[constant.name] = constant.default
+    if rig.has_one_motion:
+        gain = rig.motion.drive_gain
+        if checked.get(str(gain)) == 0.0:
+            raise InputError(
+                f"{where.at('rig', 'constants', str(gain))}: is 0, so the input would have no effect. Give a gain other than 0."
+            )
+    return {constant.name: checked[constant.name] for constant in rig.constants if constant.name in checked}
+
+
+def _parameters(where: Where, structure: Structure, given: Mapping[str, float]) -> dict[str, float]:
+    rig = structure.rig
+    constants = {constant.name for constant in rig.constants}
+    own = [parameter for parameter in structure.parameters if parameter.name not in constants]
+    checked = checked_numbers(
+        where, ("rig", "parameters"), rig.name, (*own, *rig.alternative_parameters), given
+    )
+    for parameter in own:
+        if parameter not in rig.parameters and parameter.name not in checked:
+            if parameter.default is None:
+                raise InputError(
+                    f"{where.at('rig', 'parameters', parameter.name)}: is missing; the effects of the given simulation "
+                    f"need it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
+                )
+            checked[parameter.name] = parameter.default
+    for effect in structure.effects:
+        for pair in effect.ordered:
+            larger, smaller = (structure.parameter_name(effect, name) for name in pair)
+            if checked[larger] < checked[smaller]:
+                raise InputError(
+                    f"{where.at('rig', 'parameters', larger)}: must be at least {smaller} = {checked[smaller]:g} in "
+                    f"{effect.name}, got {checked[larger]:g}."
+                )
+    for alternative, determined in ((a.parameter.name, a.gives) for a in rig.alternatives):
+        if alternative in checked and determined in checked:
+            raise InputError(
+                f"{where.at('rig', 'parameters', alternative)}: cannot be given together with {determined}, which follows from "
+                "it; give one of the two."
+            )
+    return checked

@@ -1,24 +1,53 @@
-"""Make campaigns and models from records and values in memory, without files."""
+"""Make campaigns and models without files: of records and values in memory, an example, and of a rig without records yet.
+
+Without records, a sweep through the natural frequencies of the rig is simulated.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import get_args
+
+import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.effects import Effect, effect_named
-from rigsight.errors import InputError, check_option
+from rigsight.errors import InputError, SimulationError, check_option
+from rigsight.excitation import linear_sweep, log_sweep
 from rigsight.parameters import ParameterSet
-from rigsight.records import Hold, Record
+from rigsight.records import Hold, Record, Role
 from rigsight.records.signals import is_constant
-from rigsight.rigs import RIGS, Rig, rig_of_tables
-from rigsight.simulate import compose
+from rigsight.rigs import RIGS, Rig, read_rig_file, rig_of_tables, rotational
+from rigsight.simulate import compose, simulate
+from rigsight.simulate.linearization import linearize
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.campaign_file import Offsets, Where
-from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation
-from rigsight.workflow.campaign.read_campaign import of_first_record
-from rigsight.workflow.campaign.record_notes import in_units_of, record_notes, rig_in_units_of
-from rigsight.workflow.own.effect_names import effects_on
+from rigsight.workflow.campaign.campaign_file import Offsets, Where, checked_numbers, checked_simulation
+from rigsight.workflow.campaign.read_campaign import campaign_of_records, check_roles, read_campaign
+from rigsight.workflow.campaign.record_notes import in_units_of, rig_in_units_of
+from rigsight.workflow.own.own_effects import effects_on
+
+_EXAMPLE_GIVEN = {"m": 2.0, "d": 5.0, "k": 800.0}
+_K_3 = 5e6
+"""Cubic stiffness that is missing in the given simulation [N/m^3]."""
+_EXAMPLE_NOISE = 2e-5
+"""Standard deviation of the sensor noise [m]."""
+_EXAMPLE_DT = 5e-3
+_EXAMPLE_BAND = (3.0, 60.0)
+"""First and last angular frequency of the sweeps [rad/s]."""
+_EXAMPLE_SAMPLES = 2000
+_EXAMPLE_REST = 200
+"""Samples of rest before the sweep, which show only noise."""
+_BELOW, _ABOVE = 0.2, 5.0
+"""Ends of the sweep in units of the lowest and of the highest natural frequency."""
+_WIDEST = 1e3
+"""Ratio of these ends at most."""
+_ASIDE = 0.8
+"""Ratio of the frequencies of two inputs, so that each moves the rig in its own way."""
+_SAMPLES, _PER_PERIOD = 20000, 12.0
+_RELATIVE_NOISE = 1e-3
+"""Noise of each reading over its standard deviation: that of a good sensor."""
 
 
 def make_campaign(
@@ -74,10 +103,7 @@ def make_campaign(
     known, given = checked_simulation(
         Where(called), found, modelled, constants or {}, parameters or {}, by_record
     )
-    if all(record.role != "estimation" for record in records):
-        raise InputError(
-            f'{called}: records: none has role = "estimation", so nothing can be fitted. Give at least one record this role.'
-        )
+    check_roles(Where(called), records)
     taken = [record.name for record in records]
     twice = sorted({name for name in taken if taken.count(name) > 1})
     if twice:
@@ -85,21 +111,36 @@ def make_campaign(
             f"{called}: records: several have the name '{twice[0]}'. Give every record a different name."
         )
     check_option("offsets", offsets, get_args(Offsets))
-    checked = tuple(_checked(called, record, found) for record in records)
-    if offsets == "per_record":
-        checked = tuple(
-            record.with_free_offsets(signal.name for signal in found.outputs) for record in checked
+    checked = [_checked(called, record, found) for record in records]
+    return campaign_of_records(called, found, known, given, checked, modelled, offsets)
+
+
+def campaign_of(
+    campaign: Campaign | Sequence[Record] | str | Path,
+    own_effects: Iterable[Effect] = (),
+    rig: str | Rig | None = None,
+) -> Campaign:
+    """Return a campaign of a rig that may be given: as given, read from its file or folder, or made from records of the rig."""
+    found = None if rig is None else rig_of(rig)
+    if isinstance(campaign, Sequence) and not isinstance(campaign, str):
+        if found is None:
+            raise InputError(
+                "The rig of the records is not given: name it, for instance rs.Diagnoser(rig=...), or make a campaign with "
+                "rs.make_campaign(rig, records)."
+            )
+        return make_campaign(found, campaign)
+    own_rigs = () if found is None or found.name in RIGS else (found,)
+    read = campaign if isinstance(campaign, Campaign) else read_campaign(campaign, own_effects, own_rigs)
+    if (
+        found is not None
+        and read.rig not in (found, rotational(found))
+        and read.rig.mechanism != found.mechanism
+    ):
+        raise InputError(
+            f"The campaign '{read.title}' is of the rig '{read.rig.name}', but the estimator has rig='{found.name}'. Leave rig "
+            "out, or give records of that rig."
         )
-    constants, differing = of_first_record(found, known, checked)
-    return Campaign(
-        title=called,
-        rig=found,
-        constants=constants,
-        parameters=given,
-        records=checked,
-        modelled=tuple(modelled),
-        notes=tuple(note for note in (differing, *record_notes(called, found, checked)) if note),
-    )
+    return read
 
 
 def make_model(
@@ -175,6 +216,108 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
                 '"operation" and give no amplitude.'
             )
     checked_numbers(
-        Where(f"{called}: record '{record.name}'"), ("constants",), rig, rig.constants, record.constants
+        Where(f"{called}: record '{record.name}'"), ("constants",), rig.name, rig.constants, record.constants
     )
     return in_units_of(rig, record)
+
+
+def example_campaign(seed: int = 0) -> Campaign:
+    """Return two sweeps of a simulated stage, an axis with a hardening spring, and a simulation without the hardening.
+
+    The stage obeys ``m x'' + d x' + k x + k_3 x^3 = u`` with m = 2 kg, d = 5 N s/m, k = 800 N/m and k_3 = 5e6 N/m^3; its sensor
+    has noise of 0.02 mm. The given simulation has the same parameter values and no k_3. One sweep of 4 N is for estimation, one
+    of 3 N for validation; each lasts 10 s.
+
+    Parameters
+    ----------
+    seed
+        Seed of the sensor noise.
+
+    Examples
+    --------
+    >>> import rigsight as rs
+    >>> campaign = rs.example_campaign()
+    >>> [(record.name, record.role, record.n_samples) for record in campaign.records]
+    [('fit', 'estimation', 2000), ('score', 'validation', 2000)]
+    """
+    rng = np.random.default_rng(seed)
+    return make_campaign(
+        "axis",
+        [_sweep("fit", 4.0, "estimation", rng), _sweep("score", 3.0, "validation", rng)],
+        parameters=_EXAMPLE_GIVEN,
+        title="Example stage",
+    )
+
+
+def _sweep(name: str, amplitude: float, role: Role, rng: np.random.Generator) -> Record:
+    truth = make_model("axis", {**_EXAMPLE_GIVEN, "k_3": _K_3}, ["cubic_stiffness"])
+    t = _EXAMPLE_DT * np.arange(_EXAMPLE_SAMPLES, dtype=np.float64)
+    u = np.concatenate([np.zeros(_EXAMPLE_REST), linear_sweep(t[_EXAMPLE_REST:], amplitude, *_EXAMPLE_BAND)])
+    driven = Record(name, _EXAMPLE_DT, {"u": u}, {"u": "N"}, role=role, kind="sweep", amplitude=amplitude)
+    clean = simulate(truth.structure, truth.values, driven)
+    return clean.with_signals(x=clean["x"] + rng.normal(scale=_EXAMPLE_NOISE, size=_EXAMPLE_SAMPLES))
+
+
+def is_rig_file(path: Path) -> bool:
+    """Return whether a file declares a rig and is no campaign; what cannot be read is left to who reads the campaign."""
+    try:
+        tables = tomllib.loads(path.read_text("utf-8-sig"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return False
+    return "sensors" in tables and not {"rig", "records"} & tables.keys()
+
+
+def campaign_of_rig(path: Path) -> Campaign:
+    """Return a campaign whose one record is simulated with the numbers of a rig file."""
+    rig = read_rig_file(path)
+    numbers = {p.name: p.default for p in (*rig.constants, *rig.parameters)}
+    values = {name: value for name, value in numbers.items() if value is not None}
+    if len(values) < len(numbers):
+        missing = ", ".join(name for name in numbers if name not in values)
+        raise InputError(
+            f"{path}: without records every number needs a value, and these have none: {missing}. Give default = ... in the rig "
+            "file, or check a campaign with records."
+        )
+    if not rig.inputs:
+        raise InputError(
+            f"{path}: the rig has no input, so nothing moves it without records. Check a campaign."
+        )
+    try:
+        record, low, high = _swept(rig, values)
+    except SimulationError as error:
+        raise InputError(f"{path}: cannot be simulated with its numbers: {error}") from None
+    note = (
+        f"There are no records: a sweep from {low:.3g} to {high:.3g} rad/s with an amplitude of 1 in each input was simulated "
+        f"with the numbers of {path.name}, and noise of {_RELATIVE_NOISE:.1%} was added to each reading."
+    )
+    return Campaign(
+        rig.name,
+        rig,
+        {p.name: values[p.name] for p in rig.constants},
+        {p.name: values[p.name] for p in rig.parameters},
+        (record,),
+        notes=(note,),
+    )
+
+
+def _swept(rig: Rig, values: dict[str, float]) -> tuple[Record, float, float]:
+    """Return the simulated sweep with noise, and its first and last angular frequency [rad/s]."""
+    structure = compose(rig)
+    natural = np.abs(linearize(structure, values).poles)
+    natural = natural[natural > 1e-6 * np.max(natural, initial=0.0)]
+    high = _ABOVE * float(np.max(natural, initial=0.0)) or 1.0
+    low = max(_BELOW * float(np.min(natural, initial=high)), high / _WIDEST)
+    dt = 2.0 * np.pi / (_PER_PERIOD * high)
+    t = np.asarray(dt * np.arange(_SAMPLES), dtype=np.float64)
+    inputs = {
+        signal.name: log_sweep(t, 1.0, _ASIDE**i * low, _ASIDE**i * high)
+        for i, signal in enumerate(rig.inputs)
+    }
+    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
+    run = simulate(structure, values, Record("simulated sweep", dt, inputs, units, kind="sweep"))
+    rng = np.random.default_rng(0)
+    noisy = {
+        s.name: run[s.name] + _RELATIVE_NOISE * np.std(run[s.name]) * rng.standard_normal(t.size)
+        for s in rig.outputs
+    }
+    return run.with_signals(**noisy), low, high

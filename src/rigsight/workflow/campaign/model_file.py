@@ -14,20 +14,24 @@ from rigsight.discover.terms import known_terms
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold
-from rigsight.records.formats.known import file_size
 from rigsight.rigs import Rig, declared_rig
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
-from rigsight.workflow.campaign.campaign_file import value_message
-from rigsight.workflow.own.effect_names import effect_on
-from rigsight.workflow.own.own_rigs import known_rigs
+from rigsight.workflow.campaign.campaign_file import (
+    LARGEST_FILE,
+    Number,
+    Where,
+    checked_numbers,
+    first_errors,
+    value_message,
+)
+from rigsight.workflow.own.own_effects import effect_on
+from rigsight.workflow.own.own_rigs import known_rigs, text_of
 
 MODEL_FILE = "model.json"
 _MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
 
-_LARGEST_FILE = 10_000_000
-Number = Annotated[float, Field(allow_inf_nan=False)]
 _GROUPS = ("constants", "parameters", "effect_parameters")
 
 
@@ -87,8 +91,7 @@ def _model(
         table = ModelTable.model_validate(content)
     except ValidationError as error:
         reported = [_message(path, problem) for problem in map(dict, error.errors(include_url=False))]
-        more = f"\n(and {len(reported) - 5} more)" if len(reported) > 5 else ""
-        raise InputError("\n".join(reported[:5]) + more) from None
+        raise first_errors(reported) from None
     structure = _structure(path, table, _rig(path, table, own_rigs), own_effects)
     return Model(structure, _values(path, structure, table), table.hold)
 
@@ -195,25 +198,14 @@ def _values(path: Path, structure: Structure, table: ModelTable) -> dict[str, fl
     constants = [p.name for p in rig.constants]
     parameters = [p.name for p in rig.parameters]
     of_effects = [name for name in known if name not in (*constants, *parameters)]
-    values: dict[str, float] = {}
+    values = {name: p.default for name, p in known.items() if p.default is not None}
     missing: list[str] = []
     for group, names in zip(_GROUPS, (constants, parameters, of_effects), strict=True):
-        given: dict[str, float] = getattr(table, group)
-        for name in given:
-            if name not in names:
-                listed = ", ".join(names) or "none"
-                raise InputError(
-                    f"{path.name}: {group}.{name}: unknown to {_described(structure)}.{nearest(name, names)} Known: {listed}."
-                )
-        for name in names:
-            value = given.get(name, known[name].default)
-            if value is None:
-                missing.append(f"{group}.{name}")
-                continue
-            try:
-                values[name] = known[name].check(value)
-            except InputError as error:
-                raise InputError(f"{path.name}: {group}.{name}: {error}") from None
+        own = [known[name] for name in names]
+        values |= checked_numbers(
+            Where(path.name), (group,), _described(structure), own, getattr(table, group)
+        )
+        missing += [f"{group}.{name}" for name in names if name not in values]
     if missing:
         raise InputError(
             f"{path.name}: {_described(structure)} needs {', '.join(missing)}; give a value for each."
@@ -243,16 +235,7 @@ def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
 
 def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
     """Return the object that a file holds."""
-    try:
-        if file_size(path) > _LARGEST_FILE:
-            raise InputError(f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB, so it is not a {what}.")
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path.name} is not UTF-8 text (byte {error.start}), so it is not a {what}."
-        ) from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    text = text_of(path, f"a {what}", LARGEST_FILE, f", so it is not a {what}", "the file")
     try:
         data = json.loads(text, object_pairs_hook=_without_repeated_keys, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:

@@ -17,15 +17,18 @@ from rigsight.units import INPUT_UNIT
 from rigsight.workflow.campaign.campaign_file import (
     WHICH_RIG,
     Location,
+    Offsets,
     RecordTable,
     RigTable,
     Where,
+    checked_numbers,
+    checked_simulation,
     locate,
     read_campaign_table,
+    rig_named,
 )
-from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation, rig_named
 from rigsight.workflow.campaign.record_notes import is_in_units_of, record_notes
-from rigsight.workflow.own.effect_names import effect_on
+from rigsight.workflow.own.own_effects import effect_on
 from rigsight.workflow.own.own_rigs import known_rigs
 
 
@@ -64,30 +67,57 @@ def read_campaign(
     known_constants, parameters = checked_simulation(
         where, rig, modelled, table.rig.constants, table.rig.parameters, by_record
     )
-    if all(record.role != "estimation" for record in table.records):
-        raise InputError(
-            f'{where.at("records")}: none has role = "estimation", so nothing can be fitted. Give at least one record this role.'
-        )
+    check_roles(where, table.records)
     files = [file_inside(path, number, record, where) for number, record in enumerate(table.records, 1)]
     # A rig file says itself in which units its signals are.
     other = rotational(rig) if table.rig.model is not None else None
     with files_read_once():
         rig, read = _read_all(path, rig, other, table.records, files, where, table.rig.constants)
-    if table.offsets == "per_record":
-        outputs = [signal.name for signal in rig.outputs]
-        read = [(asked, record.with_free_offsets(outputs)) for asked, record in read]
+    title = table.title or readable(path.parent.resolve().name)
     records = _with_distinct_names(read)
-    constants, differing = of_first_record(rig, known_constants, records)
-    notes = [note for note in (differing, *record_notes(path.name, rig, records)) if note]
+    return campaign_of_records(
+        title, rig, known_constants, parameters, records, modelled, table.offsets, path
+    )
+
+
+def check_roles(where: Where, records: Sequence[RecordTable | Record]) -> None:
+    """Refuse records of which none may be fitted."""
+    if all(record.role != "estimation" for record in records):
+        raise InputError(
+            f'{where.at("records")}: none has role = "estimation", so nothing can be fitted. Give at least one record this role.'
+        )
+
+
+def campaign_of_records(
+    title: str,
+    rig: Rig,
+    known: Mapping[str, float],
+    parameters: Mapping[str, float],
+    records: Sequence[Record],
+    modelled: Sequence[Effect],
+    offsets: Offsets,
+    path: Path | None = None,
+) -> Campaign:
+    """Return checked records as a campaign; a note tells constants that only records give: they have those of the first."""
+    if offsets == "per_record":
+        outputs = [signal.name for signal in rig.outputs]
+        records = [record.with_free_offsets(outputs) for record in records]
+    first = {name: value for name, value in records[0].constants.items() if name not in known}
+    values, notes = {**known, **first}, []
+    if first:
+        listed = ", ".join(f"{name} = {value:g}" for name, value in first.items())
+        notes.append(
+            f"Each record has its own {', '.join(first)}; models are written with the values of the first record, {listed}."
+        )
     return Campaign(
-        title=table.title or readable(path.parent.resolve().name),
+        title=title,
         rig=rig,
-        constants=constants,
-        parameters=parameters,
-        records=records,
+        constants={constant.name: values[constant.name] for constant in rig.constants},
+        parameters=dict(parameters),
+        records=tuple(records),
         modelled=tuple(modelled),
         path=path,
-        notes=tuple(notes),
+        notes=(*notes, *record_notes(title if path is None else path.name, rig, records)),
     )
 
 
@@ -157,35 +187,23 @@ def _check_simulator(rig: Rig, table: RigTable, where: Where) -> None:
     )
 
 
-def of_first_record(
-    rig: Rig, known: Mapping[str, float], records: Sequence[Record]
-) -> tuple[dict[str, float], str]:
-    """Return all constants; one that only the records give has the value of the first record, which a note reports."""
-    first = {name: value for name, value in records[0].constants.items() if name not in known}
-    values = {**known, **first}
-    constants = {constant.name: values[constant.name] for constant in rig.constants}
-    if not first:
-        return constants, ""
-    listed = ", ".join(f"{name} = {value:g}" for name, value in first.items())
-    return (
-        constants,
-        f"Each record has its own {', '.join(first)}; models are written with the values of the first record, {listed}.",
-    )
-
-
 def _with_distinct_names(read: Sequence[tuple[RecordTable, Record]]) -> tuple[Record, ...]:
     """Give every record a unique name, which is its key in results."""
     taken = {asked.name for asked, _ in read if asked.name is not None}
-    named: list[Record] = []
-    used: set[str] = set()
+    named: dict[str, Record] = {}
     for asked, record in read:
-        name, count = record.name, 1
-        while name in used or (asked.name is None and name in taken):
-            count += 1
-            name = f"{record.name}_{count}"
-        used.add(name)
-        named.append(replace(record, name=name))
-    return tuple(named)
+        name = free_name(record.name, {*named, *(taken if asked.name is None else ())})
+        named[name] = replace(record, name=name)
+    return tuple(named.values())
+
+
+def free_name(name: str, taken: Collection[str]) -> str:
+    """Return a name, with a number behind it where others have it."""
+    free, count = name, 1
+    while free in taken:
+        count += 1
+        free = f"{name}_{count}"
+    return free
 
 
 def inside(path: Path, where: str, asked: str) -> Path:
@@ -214,8 +232,9 @@ def inside(path: Path, where: str, asked: str) -> Path:
 def file_inside(path: Path, number: int, record: RecordTable, where: Where | None = None) -> Path:
     """Return the file of a record."""
     # The message names the file by itself.
-    where = replace(where or Where(path.name), data={})
-    return inside(path, where.at("records", number - 1, "file"), record.file)
+    return inside(
+        path, replace(where or Where(path.name), data={}).at("records", number - 1, "file"), record.file
+    )
 
 
 def read_listed_record(
@@ -232,8 +251,9 @@ def read_listed_record(
     where = where or Where(path.name, {"records": [None] * (number - 1) + [{"file": record.file}]})
     own = ("records", number - 1)
     columns = _columns(path, where, own, rig, record)
-    constants = checked_numbers(where, (*own, "constants"), rig, rig.constants, record.constants)
+    constants = checked_numbers(where, (*own, "constants"), rig.name, rig.constants, record.constants)
     _check_inputs(where, own, rig, record)
+    gains = (c.name for c in rig.constants if INPUT_UNIT in c.unit and c.name in {*given, *constants})
     try:
         return read_stretches(
             file,
@@ -244,14 +264,7 @@ def read_listed_record(
                 columns=columns,
                 constants=constants,
                 constant_inputs=record.inputs,
-                gain=next(
-                    (
-                        c.name
-                        for c in rig.constants
-                        if INPUT_UNIT in c.unit and c.name in {*given, *constants}
-                    ),
-                    "",
-                ),
+                gain=next(gains, ""),
                 **{key: getattr(record, key) for key in _OF_RECORD},
             ),
         )
@@ -293,12 +306,8 @@ def _columns(
                 f"{here}: is not a signal of {rig.name}.{nearest(signal, known)} Signals: {', '.join(known)}."
             )
         try:
-            if isinstance(column, str | int):
-                columns[signal] = ColumnMapping(column)
-            else:
-                columns[signal] = ColumnMapping(
-                    column.name, column.scale, column.offset, column.unit, column.unwrap, column.time
-                )
+            given = {"name": column} if isinstance(column, str | int) else column.model_dump(exclude={"file"})
+            columns[signal] = ColumnMapping(**given)
         except InputError as error:
             raise InputError(f"{here}: {error}") from None
         if not isinstance(column, str | int) and column.file is not None:

@@ -23,8 +23,6 @@ _LEAST_RATIO = 30.0
 assumption; on nine campaigns, and 24 drawn ones of development seeds, ratios reached 6."""
 _Gain = tuple[Floats, Floats]
 """Frequencies at which an input drives, and the gains there."""
-
-
 _SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
 """Factors by which a stated amplitude may lie below and above half the input's range (one line of many; a step from rest)."""
 _RATES_APART = 100.0
@@ -63,17 +61,12 @@ def _sensors_missing(rig: Rig, records: Sequence[Record]) -> Iterator[str]:
 def _fitted_again(file: str, records: Sequence[Record]) -> Iterator[str]:
     for scored in (record for record in records if record.role == "validation"):
         for fitted in (record for record in records if record.role == "estimation"):
-            if _holds_same_samples(scored, fitted):
+            same = scored.signals.keys() == fitted.signals.keys()
+            if same and all(np.array_equal(own, fitted[name]) for name, own in scored.signals.items()):
                 yield (
                     f"{file}: the validation record '{scored.name}' has exactly the samples of '{fitted.name}', which is fitted: "
                     "it validates nothing. Name another file."
                 )
-
-
-def _holds_same_samples(record: Record, other: Record) -> bool:
-    return record.signals.keys() == other.signals.keys() and all(
-        np.array_equal(samples, other[name]) for name, samples in record.signals.items()
-    )
 
 
 def _other_holds(records: Sequence[Record]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Draft the entry of a measured file in a campaign, with comments on what was guessed."""
+"""Draft the entry of a measured file in a campaign, with comments on what was guessed: signals, kind, stretches of motion."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import label, maximum_filter1d, minimum_filter1d
 
 from rigsight.errors import InputError
 from rigsight.records import Kind, Role
 from rigsight.records.channel_summary import step_and_gaps
-from rigsight.records.channel_units import has_si, in_drive_unit, is_a
+from rigsight.records.channel_units import UnknownUnitError, factor, has_si, in_drive_unit, is_a
 from rigsight.records.clocks import increases, is_time
 from rigsight.records.formats.channel import Channel, ChannelFile, as_floats, as_stamps
 from rigsight.records.formats.known import LOGS
@@ -21,7 +24,6 @@ from rigsight.records.read_record import TIME
 from rigsight.records.record import Floats
 from rigsight.records.signals import repeated_period
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign.motion_stretches import moving_stretches
 from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, distinguishing, guess_file
 
 # Share of samples that equal the one before: above it the input rests but for a few jumps.
@@ -31,8 +33,6 @@ _MOST_JUMPS = 50
 _FEWEST_CROSSINGS = 12
 _STRETCHES = 5
 _RATIO = 1.5
-
-
 BLANK = '"FILL IN"'
 """Written where nothing could be guessed; a diagnosis refuses it and names the key."""
 _LISTED = 200
@@ -40,13 +40,24 @@ _EPISODE = "episode_index"
 """Column that shows a Parquet file to be a LeRobot data set."""
 _COARSE = 0.5
 """Sample time [s] from which a comment asks about the unit of time."""
-
-
 ASSUMED_HOLD = (
     'hold = "foh"  # assumed; "zoh" if a controller holds the input between samples, "band_limited" for a filtered analog '
     "signal: a wrong one looks like a delay of half a sample"
 )
 KNOWN_HOLD = 'hold = "zoh"  # the controller holds each command until the next one'
+_STEP = 0.02
+"""Time step at which channels are compared [s]."""
+_PAUSE, _SHORTEST = 1.0, 1.0
+"""Shortest pause and shortest motion [s]."""
+_LEAD = 1.0
+"""Rest in front of and behind a motion that belongs to its record, up to half a pause [s]: it shows the equilibrium, and motions
+begin slowly."""
+_HELD, _STILL = 1e-3, 1e-2
+"""Shares of their ranges that a command and a reading may change in a pause, beside their noise: a joint creeps to its rest."""
+_WIDTH = 7.0
+"""Width of a band in standard deviations that noise of a pause stays within."""
+_MOST_STEPS = 3_000_000
+"""Length of a log that is divided: 17 hours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +66,6 @@ class Proposal:
 
     file: str  # its name, as the campaign is to call it
     guess: FileGuess  # the probable channel of each signal
-    # What probably drove the rig.
-    kind: Kind
-    amplitude: float | None
     lines: tuple[str, ...]  # lines of TOML below ``role``, with what must be checked as comments
     n_blanks: int  # how many values are left to be filled in
     stretches: tuple[tuple[float, float], ...] = ()  # of a log of a robot: those in which it moves [s]
@@ -84,7 +92,7 @@ class Proposal:
         return "\n".join([*head, *held, *self.lines]) + "\n"
 
 
-def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None = None) -> Proposal:
+def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig]) -> Proposal:
     """Return how an open file is written into a campaign."""
     is_log = file.format in LOGS or any(channel.name == _EPISODE for channel in file.channels)
     guess = guess_file(file.channels, rigs, _rising(file.channels), is_log=is_log)
@@ -112,9 +120,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     if columns:
         lines += ["[records.columns]", *columns]
     stretches = tuple(_stretches(guess)) if is_log else ()
-    return Proposal(
-        name or path.name, guess, kind, amplitude, tuple(lines), timing_blanks + column_blanks, stretches
-    )
+    return Proposal(path.name, guess, tuple(lines), timing_blanks + column_blanks, stretches)
 
 
 def _stretches(guess: FileGuess) -> list[tuple[float, float]]:
@@ -133,8 +139,6 @@ def quoted(text: str) -> str:
 
 
 def _in_si(samples: Floats, guess: Guess) -> Floats:
-    from rigsight.records.channel_units import UnknownUnitError, factor
-
     if guess.unit is None:
         return samples
     if not has_si(guess.si):
@@ -146,10 +150,9 @@ def _in_si(samples: Floats, guess: Guess) -> Floats:
 
 
 def _rises(time: Channel) -> bool:
-    try:
+    with suppress(InputError):
         return step_and_gaps(as_stamps(time.load()))[0] is not None
-    except InputError:
-        return False
+    return False
 
 
 def _timing(guess: FileGuess, channels: Sequence[Channel], no_time: str) -> tuple[list[str], int]:
@@ -178,32 +181,26 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     lines, blanks = [], 0
     needed = _needed(guess)
     remaining = _remaining(guess, channels)
+    source = remaining or "no channel remains"
     for one in (guess.time, *guess.signals):
         if one.channel is not None and one.assumed:
-            (line,) = _column(one, guess.clocks)
+            line = _column(one, guess.clocks)
             mark = "; " if "  # " in line else "  # "
             lines.append(f"{line}{mark}guessed: {one.assumed}; check")
         elif one.channel is not None:
-            lines += _column(one, guess.clocks)
+            lines += filter(None, [_column(one, guess.clocks)])
         elif one.candidates:
             lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {_listed(one.candidates)}")
             blanks += 1
         elif one.signal in guess.rig.absent_inputs and not remaining:
             lines.append(f"# {one.signal} =    # {_unit_of(one)}not recorded: taken as 0 (no excitation)")
         elif one.signal in needed:
-            free = (
-                "; or remove this line if nothing drove the rig"
-                if one.signal in guess.rig.absent_inputs
-                else ""
-            )
-            lines.append(
-                f"{one.signal} = {BLANK}  # {_unit_of(one)}{remaining or 'no channel remains'}{free}"
-            )
+            may_rest = one.signal in guess.rig.absent_inputs
+            free = "; or remove this line if nothing drove the rig" if may_rest else ""
+            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{source}{free}")
             blanks += 1
         elif one.signal in distinguishing(guess.rig):
-            lines.append(
-                f"# {one.signal} =    # {_unit_of(one)}{remaining or 'no channel remains'}; or not recorded here"
-            )
+            lines.append(f"# {one.signal} =    # {_unit_of(one)}{source}; or not recorded here")
     reference = guess.reference.channel
     if reference is not None and reference.name != guess.reference.signal:
         lines.append(
@@ -248,58 +245,41 @@ def _coarse_step(time: Channel) -> float | None:
     return None
 
 
-def _with_time(line: str, guess: Guess, name: str, clocks: Mapping[str, str]) -> str:
-    """Return the line that maps a signal with the time that is its own."""
-    own = f"{{ name = {name}, time = {quoted(clocks[guess.signal])}"
-    if f"{{ name = {name}" in line:
-        return line.replace(f"{{ name = {name}", own, 1)
-    return line.replace(f"{guess.signal} = {name}", f"{guess.signal} = {own} }}", 1)
-
-
 def _unit_of(guess: Guess) -> str:
     return f"[{guess.si}], " if has_si(guess.si) else ""
 
 
-def _column(guess: Guess, clocks: Mapping[str, str]) -> list[str]:
-    """Return the line that maps a signal; empty if its channel has the name of the signal."""
+def _column(guess: Guess, clocks: Mapping[str, str]) -> str:
+    """Return the line that maps a signal, with its own time where it has one; empty if its channel has the name of the signal."""
     assert guess.channel is not None
-    name = quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)
+    keys = {"name": quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)}
     if guess.signal in clocks:
-        return [
-            _with_time(line, guess, name, clocks)
-            for line in _column(guess, {}) or [f"{guess.signal} = {name}"]
-        ]
-    if guess.unit is None:
-        needed = guess.channel.name != guess.signal
+        keys["time"] = quoted(clocks[guess.signal])
+    is_other_name, unit, remark = guess.channel.name != guess.signal, guess.unit, ""
+    if unit is None:
         if guess.signal == TIME and (step := _coarse_step(guess.channel)):
-            return [
-                f"t = {name}  # assumed in s, which gives a sample time of {step:.3g} s; is it in ms? check"
-            ]
-        remark = (
-            f"  # assumed in {guess.si}; check"
-            if has_si(guess.si)
-            else "  # unit unknown, used without conversion; check"
-        )
-        return [f"{guess.signal} = {name}{remark}"] if needed else []
-    if not has_si(guess.si):
-        found = in_drive_unit(guess.unit)
-        if found is None or found[0] == 1.0:
-            return [f"{guess.signal} = {name}  # in {guess.unit}, used without conversion"]
-        return [
-            f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}  # converted to {found[1]}; check gain"
-        ]
-    if not is_a(guess.unit, guess.si):
-        return [
-            f"{guess.signal} = {{ name = {name}, scale = 1.0 }}  # in {guess.unit}, used without conversion; "
-            f"{guess.signal} should be in {guess.si}: check"
-        ]
-    if guess.is_stated:
-        if guess.channel.name == guess.signal:
-            return []
-        return [f"{guess.signal} = {name}  # converted from {guess.unit}, as stated in the file"]
-    if guess.unit == guess.si:
-        return [f"{guess.signal} = {name}"] if guess.channel.name != guess.signal else []
-    return [f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}"]
+            remark = f"assumed in s, which gives a sample time of {step:.3g} s; is it in ms? check"
+        elif is_other_name and has_si(guess.si):
+            remark = f"assumed in {guess.si}; check"
+        elif is_other_name:
+            remark = "unit unknown, used without conversion; check"
+    elif not has_si(guess.si):
+        found = in_drive_unit(unit)
+        remark = f"in {unit}, used without conversion"
+        if found is not None and found[0] != 1.0:
+            keys["unit"], remark = quoted(unit), f"converted to {found[1]}; check gain"
+    elif not is_a(unit, guess.si):
+        keys["scale"] = "1.0"
+        remark = f"in {unit}, used without conversion; {guess.signal} should be in {guess.si}: check"
+    elif guess.is_stated:
+        remark = f"converted from {unit}, as stated in the file" if is_other_name else ""
+    elif unit != guess.si:
+        keys["unit"] = quoted(unit)
+    if not (is_other_name or remark or len(keys) > 1):
+        return ""
+    table = ", ".join(f"{key} = {value}" for key, value in keys.items())
+    value = keys["name"] if len(keys) == 1 else f"{{ {table} }}"
+    return f"{guess.signal} = {value}" + (f"  # {remark}" if remark else "")
 
 
 def guess_kind(samples: Floats) -> Kind:
@@ -335,3 +315,54 @@ def _is_sweep(samples: Floats) -> bool:
     rising = np.diff(distances) > 0.0
     ratio = max(distances[0], distances[-1]) / min(distances[0], distances[-1])
     return bool((rising.all() or not rising.any()) and ratio > _RATIO)
+
+
+def moving_stretches(commands: Sequence[Channel], readings: Sequence[Channel]) -> list[tuple[float, float]]:
+    """Return begin and end of each stretch of motion [s], by the time of the file; empty with fewer than two."""
+    each = [(channel, _HELD) for channel in commands] + [(channel, _STILL) for channel in readings]
+    series = [(*one, still) for channel, still in each if (one := _series(channel)) is not None]
+    if not series:
+        return []
+    begin = max(float(stamps[0]) for stamps, _, _ in series)
+    end = min(float(stamps[-1]) for stamps, _, _ in series)
+    if not 2.0 * _SHORTEST + _PAUSE < end - begin < _STEP * _MOST_STEPS:
+        return []
+    grid = np.arange(begin, end, _STEP)
+    resting = np.ones(grid.size, dtype=bool)
+    for stamps, samples, still in series:
+        band = _WIDTH * _noise(samples) + still * float(np.ptp(samples))
+        resting &= _resting(np.interp(grid, stamps, samples), band)
+    numbered, count = label(~resting)
+    places = [np.flatnonzero(numbered == number + 1) for number in range(count)]
+    moved = [(float(grid[own[0]]), float(grid[own[-1]])) for own in places if own.size * _STEP >= _SHORTEST]
+    if len(moved) < 2:
+        return []
+    halfway = [(last + first) / 2.0 for (_, last), (first, _) in pairwise(moved)]
+    return [
+        (max(first - _LEAD, before), min(last + _LEAD, behind))
+        for (first, last), before, behind in zip(moved, [begin, *halfway], [*halfway, end], strict=True)
+    ]
+
+
+def _series(channel: Channel) -> tuple[Floats, Floats] | None:
+    """Return time [s] and samples of a channel that has a time of its own; None for any other."""
+    if channel.axis is None or channel.n_samples < 2:
+        return None
+    samples, stamps = as_floats(channel.load()), channel.axis.stamps() * factor(channel.axis.unit, "s")
+    usable = np.isfinite(samples) & np.isfinite(stamps)
+    samples, stamps = samples[usable], stamps[usable]
+    ordered = stamps.size > 1 and bool(np.all(np.diff(stamps) >= 0.0))
+    return (stamps, samples) if ordered else None
+
+
+def _noise(samples: Floats) -> float:
+    """Return the standard deviation of white noise, which is all that most second differences show."""
+    bends = np.diff(samples, 2)
+    return float(np.median(np.abs(bends))) / 0.6745 / np.sqrt(6.0) if bends.size else 0.0
+
+
+def _resting(samples: Floats, band: float) -> NDArray[np.bool_]:
+    """Return where samples stay within a band for the length of a pause, shape (n_samples,)."""
+    width = round(_PAUSE / _STEP)
+    span = maximum_filter1d(samples, width) - minimum_filter1d(samples, width)
+    return np.asarray(maximum_filter1d((span <= band).astype(np.uint8), width), dtype=bool)

@@ -81,14 +81,12 @@ def guess_file(
     in_units = [found] if other is None else [found, _guess_rig(other, channels, rising, times, is_log)]
     in_units = [replace(one, reference=_guess_reference(one, channels)) for one in in_units]
     in_units = [replace(one, signals=_completed_by_unit(one, channels, times)) for one in in_units]
-    found = min(in_units, key=_units_that_do_not_fit)
-    return _with_clocks(found, channels, own)
 
+    def misfit(guess: FileGuess) -> tuple[int, int]:
+        units = [(one.unit, one.si) for one in guess.signals if one.unit is not None and has_si(one.si)]
+        return guess.open_questions, sum(not is_a(unit, si) for unit, si in units)
 
-def _units_that_do_not_fit(guess: FileGuess) -> tuple[int, int]:
-    """Return the sort key of the same rig in several units."""
-    units = [(one.unit, one.si) for one in guess.signals if one.unit is not None and has_si(one.si)]
-    return guess.open_questions, sum(not is_a(unit, si) for unit, si in units)
+    return _with_clocks(min(in_units, key=misfit), channels, own)
 
 
 def _with_clocks(found: FileGuess, channels: Sequence[Channel], own: Mapping[int, int]) -> FileGuess:
@@ -155,26 +153,28 @@ def _completed_by_unit(
     """Return the guesses; a signal without a match takes the only remaining channel with its unit, whatever its name."""
     # The only output without a channel also takes the only remaining channel without a unit; an input may have no channel.
     guesses = list(found.signals)
-    for i, guess in enumerate(guesses):
+
+    def free() -> list[Channel]:
         taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]
-        angles = [c for c in channels if c not in taken and closeness(c.name, _TURNING) >= _CLEAR]
+        return [c for c in channels if c not in taken]
+
+    for i, guess in enumerate(guesses):
+        angles = [c for c in free() if closeness(c.name, _TURNING) >= _CLEAR]
         # One moving mass may turn as well; only once its rig is chosen, because rigs of several motions have angles beside x.
         if found.rig.has_one_motion and guess.signal == _MOVING and not guess.is_clear and len(angles) == 1:
             guesses[i] = _of_channel(guess, angles[0])
     for i, guess in enumerate(guesses):
         if guess.is_clear or guess.candidates:
             continue
-        taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]
         # The input of a drive has the unit of its amplifier.
         units = [guess.si] if has_si(guess.si) else DRIVES
-        fitting = [c for c in channels if c not in taken and any(is_a(_unit_of(c) or "", u) for u in units)]
+        fitting = [c for c in free() if any(is_a(_unit_of(c) or "", u) for u in units)]
         rivals = [own for own in guesses if not own.is_clear and own.si == guess.si]
         if len(fitting) == len(rivals) == 1:
             guesses[i] = _of_channel(guess, fitting[0])
     needed = (*(signal.name for signal in found.rig.inputs), *found.rig.required_outputs)
     lacking = [i for i, own in enumerate(guesses) if own.signal in needed and own.channel is None]
-    taken = [found.time.channel, found.reference.channel, *times, *(own.channel for own in guesses)]
-    remaining = [c for c in channels if c not in taken]
+    remaining = free()
     if len(lacking) == len(remaining) == 1 and guesses[lacking[0]].signal in found.rig.required_outputs:
         own, alone = guesses[lacking[0]], remaining[0]
         unit = _unit_of(alone)
@@ -278,18 +278,17 @@ def _guess(
             if unit is not None and has_si(si):
                 score += _FITTING_UNIT if is_a(unit, si) else -_FITTING_UNIT
             scores.append((score, channel))
+    none = Guess(signal, si)
     if not scores:
-        return Guess(signal, si), 0.0
+        return none, 0.0
     best = max(score for score, _ in scores)
     closest = [channel for score, channel in scores if score == best]
-    if signal in _REGRESSION and _are_of_regression(channels):
-        return Guess(
-            signal, si, candidates=tuple(c.name for c in channels if c.name.lower() in _REGRESSION)
-        ), 0.0
     # With several groups, the time channel is the one in the group of the signals.
-    if len(closest) > 1 and not (signal == TIME and len({channel.short_name for channel in closest}) == 1):
-        return Guess(signal, si, candidates=tuple(channel.name for channel in closest)), 0.0
-    channel = closest[0]
-    if best < _CLEAR - _FITTING_UNIT:
-        return Guess(signal, si, candidates=(channel.name,)), 0.0
-    return _of_channel(Guess(signal, si), channel), best
+    is_one = len(closest) == 1 or (signal == TIME and len({channel.short_name for channel in closest}) == 1)
+    if signal in _REGRESSION and _are_of_regression(channels):
+        possible = [channel for channel in channels if channel.name.lower() in _REGRESSION]
+    elif not is_one or best < _CLEAR - _FITTING_UNIT:
+        possible = closest[:1] if is_one else closest
+    else:
+        return _of_channel(none, closest[0]), best
+    return replace(none, candidates=tuple(channel.name for channel in possible)), 0.0

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigsight.frequency.signal_pair import ratio_unit
 from rigsight.identify.identification import Identification, PathIdentification, RecordIdentification
 from rigsight.identify.linear_view import LinearView
 from rigsight.plot import (
@@ -17,7 +16,6 @@ from rigsight.plot import (
     AmplitudePoint,
     FittedCurve,
     Panel,
-    ResponseCell,
     amplitude_dependence,
     bode,
     overlaid_responses,
@@ -36,7 +34,7 @@ _FORMS = {"pt1": "PT1", "pt2": "PT2"}
 
 def identification_figures(identification: Identification) -> dict[str, tuple[str, str]]:
     """Return file name -> what the figure shows, and the figure as SVG."""
-    found: dict[str, tuple[str, str]] = {}
+    found: dict[str, tuple[str, Figure]] = {}
     by_record = _is_by_record(identification)
     for number, view in enumerate(() if by_record else identification.views, 1):
         if view.measured is not None:
@@ -44,25 +42,24 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
             what = (
                 "Responses of every sensor to every input, measured against the linearized model, 95 % bands"
             )
-            found[file] = (
-                f"{what}{_of_constants(view)}",
-                svg_text(view_figure(view, identification.units), file),
-            )
+            if view.constants:
+                what += f", records with {', '.join(f'{name} = {value:g}' for name, value in view.constants.items())}"
+            found[file] = (what, view_figure(view, identification.units))
     for record in identification.records if by_record else ():
         drawing = bode_figure(record, identification)
         if drawing is not None:
             file = _free_name("bode_" + re.sub(r"[^\w.-]+", "_", record.record.name), found)
             what = f"Bode plot of record '{record.record.name}', measured against fitted, 95 % bands"
-            found[file] = (what, svg_text(drawing, file))
+            found[file] = (what, drawing)
     drawing = responses_figure(identification) if by_record else None
     if drawing is not None:
         what = "Magnitudes of all records in one plot, measured and fitted (as Figures 5.6 and 5.7 of the thesis)"
-        found[RESPONSES_FILE] = (what, svg_text(drawing, RESPONSES_FILE))
+        found[RESPONSES_FILE] = (what, drawing)
     drawing = amplitudes_figure(identification)
     if drawing is not None:
         what = "Parameters of each record over its amplitude, with 95 % intervals (as Figures 5.8 and 5.9 of the thesis)"
-        found[AMPLITUDES_FILE] = (what, svg_text(drawing, AMPLITUDES_FILE))
-    return found
+        found[AMPLITUDES_FILE] = (what, drawing)
+    return {file: (what, svg_text(drawing, file)) for file, (what, drawing) in found.items()}
 
 
 def _is_by_record(identification: Identification) -> bool:
@@ -76,8 +73,8 @@ def bode_figure(record: RecordIdentification, identification: Identification) ->
     """Return the Bode plot of one record, measured against fitted; None where it has no frequency response."""
     chained = {path.source for path in record.paths} & {path.response for path in record.paths}
     if not (_is_by_record(identification) or chained):
-        measured = {(path.source, path.response): path for path in record.paths}
-        return _grid(measured, {}, identification.units) if measured else None
+        measured = {(path.source, path.response): path.measured for path in record.paths}
+        return response_grid(measured, {}, identification.units) if measured else None
     panels = _panels(record, identification)
     return bode(panels) if panels else None
 
@@ -96,63 +93,19 @@ def view_figure(view: LinearView, units: Mapping[str, str]) -> Figure:
     """Return the grid of the responses of every sensor to every input, measured against the linearized model."""
     assert view.measured is not None
     linear, measured = view.linearization, view.measured
-    paths = {
-        (source, response): PathIdentification(
-            source,
-            response,
-            measured=measured.found.get((source, response)),
-            problem=measured.problems.get((source, response), ""),
-        )
-        for response in linear.outputs
-        for source in linear.inputs
-    }
+    paths = [(source, response) for response in linear.outputs for source in linear.inputs]
     bands = [curve.omega for curve in measured.found.values()]
     omega = np.geomspace(min(b[0] for b in bands), max(b[-1] for b in bands), _GRID) if bands else np.zeros(0)
     model = {}
-    for row, response in enumerate(linear.outputs):
+    for row, response in enumerate(linear.outputs if omega.size else ()):
         for column, source in enumerate(linear.inputs):
             known = view.model.get((source, response))
-            if not omega.size:
-                continue
-            values = linear.frequency_response(omega)[:, row, column]
-            # Standard errors change slowly beside the response itself.
-            std = (
-                np.zeros(omega.size)
-                if known is None
-                else np.interp(omega, measured.found[source, response].omega, known[1])
-            )
+            values, std = linear.frequency_response(omega)[:, row, column], np.zeros(omega.size)
+            if known is not None:
+                # Standard errors change slowly beside the response itself.
+                std = np.interp(omega, measured.found[source, response].omega, known[1])
             model[source, response] = FittedCurve(omega, values, std, "linearized model")
-    return _grid(paths, model, units)
-
-
-def _grid(
-    paths: Mapping[tuple[str, str], PathIdentification],
-    model: Mapping[tuple[str, str], FittedCurve],
-    units: Mapping[str, str],
-) -> Figure:
-    sources = dict.fromkeys(source for source, _ in paths)
-    responses = dict.fromkeys(response for _, response in paths)
-    return response_grid(
-        [
-            [
-                ResponseCell(
-                    source,
-                    response,
-                    ratio_unit(units.get(response, ""), units.get(source, "")),
-                    paths[source, response].measured,
-                    model.get((source, response)),
-                    "not determined by these records" if paths[source, response].measured is None else "",
-                )
-                for source in sources
-            ]
-            for response in responses
-        ]
-    )
-
-
-def _of_constants(view: LinearView) -> str:
-    listed = ", ".join(f"{name} = {value:g}" for name, value in view.constants.items())
-    return f", records with {listed}" if listed else ""
+    return response_grid({path: measured.found.get(path) for path in paths}, model, units)
 
 
 def amplitudes_figure(identification: Identification) -> Figure | None:
@@ -161,7 +114,10 @@ def amplitudes_figure(identification: Identification) -> Figure | None:
         # Amplitudes of different inputs have no axis in common.
         return None
     parameters = _parameters(identification)
-    return amplitude_dependence(parameters, _amplitude_label(identification)) if parameters else None
+    source = identification.records[0].source
+    unit = identification.units.get(source, "")
+    label = f"amplitude of {source}" + (f" [{unit}]" if unit else "")
+    return amplitude_dependence(parameters, label) if parameters else None
 
 
 def _free_name(stem: str, taken: Iterable[str]) -> str:
@@ -175,7 +131,10 @@ def _free_name(stem: str, taken: Iterable[str]) -> str:
 
 
 def _panels(found: RecordIdentification, identification: Identification) -> list[Panel]:
-    label = _amplitude_text(found, identification)
+    unit = identification.units.get(found.source, "")
+    alone = [r for r in identification.records if math.isclose(r.amplitude, found.amplitude, rel_tol=1e-6)]
+    label = f"{found.amplitude:.3g} {unit}".strip()
+    label = label if len(alone) == 1 else f"{label}, {found.record.name}"
     return [
         Panel(f"{path.source} \u2192 {path.response}", path.measured, fitted_curve(path), label)
         for path in found.paths
@@ -208,24 +167,6 @@ def fitted_curve(path: PathIdentification) -> FittedCurve | None:
     return FittedCurve(omega, values, std, label)
 
 
-def _amplitude_text(found: RecordIdentification, identification: Identification) -> str:
-    unit = identification.units.get(found.source, "")
-    alone = [r for r in identification.records if math.isclose(r.amplitude, found.amplitude, rel_tol=1e-6)]
-    text = f"{found.amplitude:.3g} {unit}".strip()
-    return text if len(alone) == 1 else f"{text}, {found.record.name}"
-
-
-def _amplitude_label(identification: Identification) -> str:
-    source = identification.records[0].source
-    unit = identification.units.get(source, "")
-    return f"amplitude of {source}" + (f" [{unit}]" if unit else "")
-
-
-def _is_shown(record: RecordIdentification, name: str) -> bool:
-    """Return False for a parameter that a time-domain fit left at its start value."""
-    return record.own is None or math.isfinite(record.estimates[name][1])
-
-
 def _parameters(identification: Identification) -> list[AmplitudePanel]:
     joint = identification.joint
     names = dict.fromkeys(name for record in identification.records for name in record.estimates)
@@ -234,7 +175,8 @@ def _parameters(identification: Identification) -> list[AmplitudePanel]:
         points = tuple(
             AmplitudePoint(record.amplitude, record.record.kind, *record.estimates[name])
             for record in identification.records
-            if name in record.estimates and _is_shown(record, name)
+            # A fit over time may leave a parameter at its start value.
+            if name in record.estimates and (record.own is None or math.isfinite(record.estimates[name][1]))
         )
         if not points:
             continue

@@ -16,11 +16,11 @@ from rigsight.identify.hysteresis.calibration import free_parameters, special_st
 from rigsight.identify.identification import EffectScore, HysteresisIdentification, Identification
 from rigsight.metrics import nrmse, rms
 from rigsight.records import Record
-from rigsight.report.quantities import gap_percent
+from rigsight.report.labels import gap_percent
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.own.effect_names import effects_on
+from rigsight.workflow.own.own_effects import effects_on
 from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, Step
 
@@ -90,12 +90,8 @@ def with_hysteresis(
             n_jobs=n_jobs,
             progress=stage.finished,
         )
-        residuals = {
-            record.name: residual
-            for record, residual in zip(
-                fitted, calibration.fit.residuals, strict=bool(calibration.fit.residuals)
-            )
-        }
+        names, of_fit = [record.name for record in fitted], calibration.fit.residuals
+        residuals = dict(zip(names, of_fit, strict=bool(of_fit)))
         diverging = []
         for record in campaign.validation:
             residual = _validation_residual(
@@ -115,13 +111,19 @@ def with_hysteresis(
     )
     values = {**calibration.fit.values, **dict(calibration.fit.structure.fixed)}
     of_effects = [p for p in structure.parameters if p.name not in _of_rig(structure.rig)]
+    statement = _statement(structure.effect_names, calibration.fit, scores)
+    if diverging:
+        listed = " and ".join(f"'{name}'" for name in diverging)
+        statement += (
+            f" The calibrated model diverges on {listed} of the held-out records: no error is given there."
+        )
     found = HysteresisIdentification(
         effects=structure.effect_names,
         calibration=calibration,
         held={p.name: values[p.name] for p in of_effects if p.name not in calibration.fit.free},
         units={p.name: p.unit for p in structure.parameters},
         meanings={p.name: p.description for p in structure.parameters},
-        statement=_statement(structure.effect_names, calibration.fit, scores) + _unscored(diverging),
+        statement=statement,
         scores=scores,
     )
     model = Model.of(calibration.fit.structure, calibration.fit.values, campaign.estimation[0].hold)
@@ -206,10 +208,3 @@ def _statement(effects: Sequence[str], fit: FitResult, scores: Sequence[EffectSc
     if worst > _HARDLY:
         return f"{text} The effects explain hardly any of the error; 'rigsight diagnose' says what the rig lacks."
     return text if fit.success else f"{text} {doubt}"
-
-
-def _unscored(diverging: Sequence[str]) -> str:
-    if not diverging:
-        return ""
-    names = " and ".join(f"'{name}'" for name in diverging)
-    return f" The calibrated model diverges on {names} of the held-out records: no error is given there."

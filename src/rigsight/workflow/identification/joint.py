@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 
 import numpy as np
@@ -20,8 +20,7 @@ from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.record import Floats
 from rigsight.records.signals import roughness
-from rigsight.report.labels import sentence_case
-from rigsight.report.quantities import gap_percent
+from rigsight.report.labels import gap_percent, sentence_case
 from rigsight.simulate import Structure
 
 _DIFFERENT = 0.01
@@ -154,9 +153,9 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
     )
 
 
-def _moves(samples: Floats) -> bool:
-    """Return True if a fit that leaves no more than the noise of an output would follow it: at rest there is only noise."""
-    return roughness(samples) < UNSERVED * float(np.std(samples))
+def _is_unserved(relative: float, samples: Floats) -> bool:
+    """Return True if a fit does not follow an output that a fit down to its noise would: at rest there is only noise."""
+    return not relative < UNSERVED and roughness(samples) < UNSERVED * float(np.std(samples))
 
 
 def _leaves_motion(relative: float, samples: Floats) -> bool:
@@ -175,13 +174,17 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
     if not math.isfinite(fit.probability):
         return "There is no parameter that every record determines, so the records cannot be compared."
     by_name = {record.name: record for record in fitted}
-    unserved = [
-        f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
-        for score in scores
-        if score.role == "estimation"
-        for name in score.nrmse
-        if not score.nrmse[name] < UNSERVED and _moves(by_name[score.record][name])
-    ]
+
+    def errors(is_told: Callable[[float, Floats], bool]) -> list[str]:
+        return [
+            f"{gap_percent(error)} of {name} in '{score.record}'"
+            for score in scores
+            if score.role == "estimation"
+            for name, error in score.nrmse.items()
+            if is_told(error, by_name[score.record][name])
+        ]
+
+    unserved = errors(_is_unserved)
     if fit.probability >= _DIFFERENT and unserved:
         return (
             "The joint fit is too poor to judge whether one parameter set fits all records: its error is "
@@ -189,13 +192,7 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
         )
     if fit.probability >= _DIFFERENT:
         agree = f"equally large differences arise by chance with probability {fit.probability:.2g}"
-        left = [
-            f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
-            for score in scores
-            if score.role == "estimation"
-            for name in score.nrmse
-            if _leaves_motion(score.nrmse[name], by_name[score.record][name])
-        ]
+        left = errors(_leaves_motion)
         if not left:
             return f"One parameter set fits all {len(fitted)} estimation records: {agree}."
         return (

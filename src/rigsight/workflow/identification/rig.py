@@ -87,7 +87,10 @@ def identify_rig(
     # Threads suffice: linear algebra releases the GIL. Multithreaded linear algebra would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"):
         factor = campaign.open_factor
-        held = _held(campaign, records, factor)
+        held = held_parameters(campaign, records)
+        if factor is not None:
+            # Of parameters that are determined up to a common factor, one.
+            held[factor.held] = factor.value
         start, length = _begin(campaign, records, held)
         # A rig that drifts or diverges has no break frequency, or none of a stable form.
         has_forms = length is None and _has_forms(campaign)
@@ -102,16 +105,22 @@ def identify_rig(
             loose = _without_spring(campaign, options, n_jobs)
             if loose is not None:
                 return loose
+        windows = cut(records, length)
         # The search for a start knows terms of motions, and levels alone have none.
         if campaign.modelled or not rig.mechanism.coordinates:
-            windows = cut(records, length)
             start = start_with_effects(campaign, windows, start, held, _sizes(rig, windows))
-        swallowed = _swallowed(structure, cut(records, length), {**campaign.constants, **start}, held)
+        # Parameters that cannot be distinguished from sensor offsets that are free in each record.
+        values = {**campaign.constants, **start}
+        scales, asked = (
+            characteristic_scales(rig, windows, values),
+            [p.name for p in rig.parameters if p.name not in held],
+        )
+        swallowed = swallowed_by_offsets(structure, windows, scales, _sizes(rig, windows), values, asked)
         held |= {name: start[name] for name in swallowed}
         joint = identify_jointly(campaign, structure, found, start, held, length)
         stage.finished("one set for all records")
         errors = joint.fit.fit.standard_errors
-        known, joint = _with_errors(joint, structure, cut(records, length), factor)
+        known, joint = _with_errors(joint, structure, windows, factor)
         found = [_with_own(record, joint, campaign) for record in found]
         stage.finished("identifiability")
         views = tuple(_views(structure, joint.fit.fit.values, records, options, known))
@@ -120,7 +129,7 @@ def identify_rig(
     statement, changing = amplitude_dependence(found, units)
     reported = None
     if known is not None:
-        fit, windows = joint.fit, cut(records, length)
+        fit = joint.fit
         scales = characteristic_scales(rig, windows, fit.fit.values)
         remedies = helpful_sensors(structure, windows, scales, fit.noise, fit.fit)
         reported = replace(identifiability(known), remedies=remedies)
@@ -171,12 +180,6 @@ def _without_spring(campaign: Campaign, options: EstimationOptions, n_jobs: int)
     return replace(found, warnings=(note, *found.warnings))
 
 
-def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | None) -> dict[str, float]:
-    """Return parameters that these records do not determine; of parameters determined up to a common factor, one."""
-    held = held_parameters(campaign, records)
-    return held if factor is None else {**held, factor.held: factor.value}
-
-
 def _begin(
     campaign: Campaign, records: Sequence[Record], held: Mapping[str, float]
 ) -> tuple[dict[str, float], float | None]:
@@ -203,15 +206,6 @@ def _begin(
     ]
     best = int(np.argmin(costs))
     return starts[best], lengths[best]
-
-
-def _swallowed(
-    structure: Structure, windows: Sequence[Record], values: Mapping[str, float], held: Mapping[str, float]
-) -> tuple[str, ...]:
-    """Return the parameters that cannot be distinguished from sensor offsets that are free in each record."""
-    scales = characteristic_scales(structure.rig, windows, values)
-    asked = [p.name for p in structure.rig.parameters if p.name not in held]
-    return swallowed_by_offsets(structure, windows, scales, _sizes(structure.rig, windows), values, asked)
 
 
 def _cost(structure: Structure, values: Mapping[str, float], records: Sequence[Record]) -> float:

@@ -1,13 +1,17 @@
 """Checks by simulation that an effect vanishes at null, stays finite, generates no energy and is recovered by a fit.
 
-Effects are simulated on the rigs of `rigsight.workflow.own.effect_benches`. Each function returns a sentence that describes the
-error, or None.
+Each check returns a sentence that describes the error, or None. The benches are one mass with a spring, the running gear for
+lateral effects, an element for those of a prescribed motion, and a mass that follows its goal, with its controller as the force
+of a position drive and as the signal of a drive.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +21,9 @@ from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
 from rigsight.records.record import Floats
-from rigsight.rigs import Rig, Signal, joint_of
+from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, joint_of, rig_of_tables
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
-from rigsight.workflow.own.effect_benches import AXIS_BENCH, RESONANCE, Bench, bench_of
 
 PER_PERIOD = 200
 """Samples per period of a sine test."""
@@ -41,6 +44,78 @@ _NOISE_ALONE = 0.05
 _SIGMAS = 4.5
 _SEEN = 0.3
 """Largest relative standard error of a parameter that counts as determined."""
+RESONANCE = 10.0
+"""Angular frequency of the axis of the sine tests [rad/s]."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A rig with parameter values on which an effect is checked."""
+
+    # The rig and its numbers.
+    rig: Rig
+    values: dict[str, float]
+    output: str  # the output that the effect acts on
+    # The parameter values of the rig in the sweeps from which the effect must be recovered.
+    swept: dict[str, float]
+    free: tuple[str, ...]  # parameters of the rig that are fitted together with those of the effect
+
+
+AXIS_BENCH = Bench(
+    AXIS,
+    {"gain": 1.0, "m": 1.0, "d": 2.0, "k": RESONANCE**2, "x_off": 0.0, "force_off": 0.0},
+    "x",
+    {"gain": 2.0, "m": 1.5, "d": 4.0, "k": 300.0, "x_off": 1e-4, "force_off": 0.0},
+    ("m", "d", "k", "x_off"),
+)
+_GEAR_VALUES = {
+    "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98,
+    "psi_off": 1e-4, "y_off": 1e-4,
+}  # fmt: skip
+GEAR_BENCH = Bench(
+    RUNNING_GEAR, _GEAR_VALUES, "y", _GEAR_VALUES, ("J_z", "k_c", "k_d", "l_0", "c_y", "psi_off", "y_off")
+)
+_SERVO: dict[str, Any] = {
+    "name": "position_drive",
+    "summary": "A mass follows its goal.",
+    "inputs": {"goal": {"unit": "m"}},
+    "constants": {"m_l": {"unit": "kg", "default": 0.6}},
+    "parameters": {
+        "m": {"unit": "kg", "lower": 1e-6},
+        "d": {"unit": "N s/m", "lower": 0.0},
+        "k_p": {"unit": "N/m", "lower": 0.0},
+        "k_v": {"unit": "N s/m", "lower": 0.0},
+    },
+    "coordinates": {"q": {"unit": "m"}},
+    "energy": {"kinetic": "(m + m_l)*d(q)^2/2"},
+    "joints": {"guide": {"motion": "q", "damping": "d"}},
+    "drives": {
+        "motor": {"signal": "goal", "force": "k_p*(motor - q) - k_v*d(q)", "along": "q"},
+    },
+    "sensors": {"x": {"reads": "q", "unit": "m"}},
+}
+_LAW = {"motor": {"signal": "k_p*(goal - x) - k_v*speed", "force": "motor", "along": "q"}}
+_SENSORS = {**_SERVO["sensors"], "speed": {"reads": "d(q)", "unit": "m/s"}}
+_SERVO_VALUES = {"m_l": 0.6, "m": 0.4, "d": 1.0, "k_p": RESONANCE**2, "k_v": 3.0}
+_ELEMENT_VALUES = {"d": 2.0, "k": RESONANCE**2, "force_off": 0.0}
+ELEMENT_BENCH = Bench(ELEMENT, _ELEMENT_VALUES, "force", _ELEMENT_VALUES, ("d", "k", "force_off"))
+
+
+@cache
+def _with_controller() -> tuple[Bench, Bench]:
+    """Return the position drive, and the mass whose control law is the signal of its drive."""
+    of_law = {**_SERVO, "name": "control_law", "drives": _LAW, "sensors": _SENSORS}
+    rigs = rig_of_tables(_SERVO, "Position drive"), rig_of_tables(of_law, "Control law")
+    drive, law = (Bench(rig, _SERVO_VALUES, "x", _SERVO_VALUES, ("m", "d")) for rig in rigs)
+    return drive, law
+
+
+def bench_of(effect: Effect) -> Bench:
+    """Return the bench on which an effect is tried: the first that offers it."""
+    for bench in (AXIS_BENCH, GEAR_BENCH, ELEMENT_BENCH):
+        if bench.rig.offers(effect):
+            return bench
+    return next((bench for bench in _with_controller() if bench.rig.offers(effect)), GEAR_BENCH)
 
 
 def sine_record(
@@ -99,31 +174,33 @@ def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float
 
 def null_gives_the_rig(effect: Effect) -> str | None:
     """Check that its null values leave the rig exactly as it is."""
-    bench = bench_of(effect)
-    record = sine_record(FULL, 3, bench=bench)
     null = effect.null_values()
-    plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
-    with_effect = simulate(compose(bench.rig, [effect]), {**start_values(effect)[0], **null}, record)
-    if np.array_equal(with_effect[bench.output], plain):
+    with_effect, plain = _with_and_without(effect, null)
+    if np.array_equal(with_effect, plain):
         return None
-    changed = _difference(with_effect[bench.output], plain)
-
+    changed = _difference(with_effect, plain)
     return (
         f"with {_reported(null)} the simulation differs from that of the rig without the effect: {changed}."
     )
 
 
-def vanishes_continuously(effect: Effect) -> str | None:
-    """Check that close to its null values the response is close to that of the rig without the effect."""
+def _with_and_without(effect: Effect, values: dict[str, float]) -> tuple[Floats, Floats]:
+    """Return the motion in a sine test with an effect that has these values, and without it."""
     bench = bench_of(effect)
     record = sine_record(FULL, 3, bench=bench)
+    plain = simulate(compose(bench.rig), bench.values, record)
+    run = simulate(compose(bench.rig, [effect]), {**start_values(effect)[0], **values}, record)
+    return run[bench.output], plain[bench.output]
+
+
+def vanishes_continuously(effect: Effect) -> str | None:
+    """Check that close to its null values the response is close to that of the rig without the effect."""
     start = start_values(effect)[0]
     near = {
         name: null / 2.0 if abs(null) > 1e3 * abs(start[name]) else _close(null, start[name])
         for name, null in effect.null_values().items()
     }
-    plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
-    with_effect = simulate(compose(bench.rig, [effect]), {**start, **near}, record)[bench.output]
+    with_effect, plain = _with_and_without(effect, near)
     if np.max(np.abs(with_effect - plain)) <= _CONTINUOUS * np.max(np.abs(plain)):
         return None
     return (
@@ -230,7 +307,8 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
         **{p.name: p.held_at(size[p.name]) for p in effect.parameters if not p.fitted},
         **{p.name: p.starts[0] * size[p.name] for p in own},
     }
-    noise = {signal.name: _NOISE * scales[base] for signal, base in _bases(bench.rig)}
+    bases = ("x", "length") if bench.rig.is_driven else ("force",)
+    noise = {s.name: _NOISE * scales[base] for s, base in zip(bench.rig.outputs, bases, strict=False)}
     records = []
     for record in driven:
         simulated = simulate(structure, truth, record)
@@ -273,10 +351,6 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
                 f"instead of {truth[name]:.4g}."
             )
     return None
-
-
-def _bases(rig: Rig) -> list[tuple[Signal, str]]:
-    return list(zip(rig.outputs, ("x", "length") if rig.is_driven else ("force",), strict=False))
 
 
 CHECKS: tuple[Callable[[Effect], str | None], ...] = (

@@ -60,8 +60,8 @@ _WANTED = {
     },
 }
 """Annotation of a field -> what to give."""
-
-
+_NAME_ONE = ("post_yield_stiffness_ratio", "pulsation", "wave_number")
+"""Fields that may hold the name of a parameter."""
 _KINKS = (sp.Abs, sp.sign, canonical.positive_part)
 _SMOOTH = (
     sp.exp, sp.log, sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.sinh, sp.cosh, sp.tanh, sp.asinh,
@@ -109,22 +109,17 @@ def _parameter_faults(effect: Effect) -> Iterator[str]:
             yield f"parameter {p.name} has no description; give one."
         yield from _range_faults(p)
         yield from _dimension_faults(p)
-    for name in effect.special_cases:
+    named = [("special_cases", name) for name in effect.special_cases]
+    named += [("searched_as", name) for pair in effect.searched_as for name in (pair.first, pair.second)]
+    named += [("ordered", name) for pair in effect.ordered for name in pair]
+    named += [(field, getattr(effect, field)) for field in _NAME_ONE if getattr(effect, field) is not None]
+    for field, name in named:
         if name not in names:
-            yield f"special_cases names {name}, which is not a parameter.{nearest(name, names)}"
-    for searched in effect.searched_as:
-        for name in {searched.first, searched.second} - set(names):
-            yield f"searched_as names {name}, which is not a parameter.{nearest(name, names)}"
+            yield f"{field} names {name}, which is not a parameter.{nearest(name, names)}"
     dimensions = {p.name: p.dimension for p in effect.parameters}
-    for pair in effect.ordered:
-        for name in set(pair) - set(names):
-            yield f"ordered names {name}, which is not a parameter.{nearest(name, names)}"
-        if set(pair) <= set(names) and dimensions[pair[0]] != dimensions[pair[1]]:
-            yield f"ordered compares {pair[0]} with {pair[1]}, which has a different dimension."
-    for field in ("post_yield_stiffness_ratio", "pulsation", "wave_number"):
-        name = getattr(effect, field)
-        if name is not None and name not in names:
-            yield f"{field} names {name}, which is not a parameter.{nearest(str(name), names)}"
+    for first, second in effect.ordered:
+        if {first, second} <= set(names) and dimensions[first] != dimensions[second]:
+            yield f"ordered compares {first} with {second}, which has a different dimension."
     for start in effect.starts:
         for name in start.values.keys() - {*names, "k"}:
             yield f"a start gives a value to {name}, which is not a parameter.{nearest(name, names)}"
@@ -252,12 +247,8 @@ def _models() -> dict[type, type[BaseModel]]:
     return found
 
 
-def type_faults(effect: Effect) -> Iterator[str]:
+def type_faults(holder: object, declared: type = Effect, where: str = "") -> Iterator[str]:
     """Yield a sentence for each field of an effect, and of its parts, with a value of the wrong type."""
-    yield from _faults("", Effect, effect)
-
-
-def _faults(where: str, declared: type, holder: object) -> Iterator[str]:
     values = {field.name: getattr(holder, field.name) for field in fields(declared)}
     wrong: dict[str, object] = {}
     try:
@@ -268,14 +259,11 @@ def _faults(where: str, declared: type, holder: object) -> Iterator[str]:
     for field in fields(declared):
         value = values[field.name]
         if field.name in wrong:
-            got = wrong[field.name]
-            yield f"{where}{field.name} {'is' if got is value else 'contains'} {shown(got)}; give {_wanted(str(field.type))}."
+            got, annotation = wrong[field.name], str(field.type)
+            kind = annotation.removesuffix(" | None")
+            wanted = _WANTED[kind] if kind == annotation else f"{_WANTED[kind]}, or None"
+            yield f"{where}{field.name} {'is' if got is value else 'contains'} {shown(got)}; give {wanted}."
         for part in value if isinstance(value, tuple) else (value,):
-            for kind in _COMPONENTS:
-                if isinstance(part, kind):
-                    yield from _faults(f"{field.name}: ", kind, part)
-
-
-def _wanted(annotation: str) -> str:
-    kind = annotation.removesuffix(" | None")
-    return _WANTED[kind] if kind == annotation else f"{_WANTED[kind]}, or None"
+            for component in _COMPONENTS:
+                if isinstance(part, component):
+                    yield from type_faults(part, component, f"{field.name}: ")

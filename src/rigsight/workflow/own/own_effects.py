@@ -1,4 +1,4 @@
-"""Load a user's own effects from Python files and installed packages.
+"""Load a user's own effects from Python files and installed packages, and find the effect and the place that a name means.
 
 A file is executed, as code that the user chose to run; every `Effect` at its top level is taken.
 """
@@ -8,33 +8,29 @@ from __future__ import annotations
 import ast
 import importlib.metadata
 import textwrap
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from rigsight.campaign import Campaign
+from rigsight.diagnose import candidates_on
 from rigsight.discover.terms import known_terms
-from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.effects import AT, CATALOGUE, Effect, effect_named, kind_of, placed
 from rigsight.effects.effect import PARTS
-from rigsight.errors import InputError
+from rigsight.errors import InputError, nearest
+from rigsight.rigs import Rig
 from rigsight.simulate.printing.notation import text
 from rigsight.workflow.own.effect_checks import failed_checks
 from rigsight.workflow.own.effect_declaration import declaration_faults
-from rigsight.workflow.own.python_file import run_python_file
+from rigsight.workflow.own.own_rigs import run_python_file
 from rigsight.workflow.run.progress import Listener, Stage, silent
 
 ENTRY_POINTS = "rigsight.effects"
 """Entry point group of packages that bring effects; each entry is an `Effect` or a tuple of them."""
 CHECKING = "Checking own effects"
 _LONGEST_EQUATION = 160
+_Declared = tuple[Effect, str]
+"""An effect that is not in the catalogue, and the place of its declaration for messages."""
 _MISSING = "--effects expects a Python file. To try only one effect of the catalogue, use --effect NAME."
-
-
-@dataclass(frozen=True)
-class OwnEffect:
-    """An effect that is not in the catalogue, with the place of its declaration for messages."""
-
-    effect: Effect
-    declared: str
 
 
 def own_effects(
@@ -57,36 +53,32 @@ def own_effects(
     InputError
         Naming file and line, if a file cannot be run, declares no effect or a name twice, or an effect fails a check.
     """
-    found: list[OwnEffect] = []
+    found: list[_Declared] = []
     taken = {effect.name: "the catalogue" for effect in known_terms().values()}
     distinct = {Path(file).resolve(): Path(file) for file in files}.values()
-    for own in (*_installed(), *(own for path in distinct for own in _loaded(path))):
-        if any(own.effect is other.effect for other in found):
+    for effect, declared in (*_installed(), *(own for path in distinct for own in _loaded(path))):
+        if any(effect is other for other, _ in found):
             continue
-        faults = declaration_faults(own.effect)
-        if faults:
-            raise InputError(_message(own, faults))
-        if own.effect.name in taken:
+        _refuse(effect, declared, declaration_faults(effect))
+        if effect.name in taken:
             raise InputError(
-                f"{own.declared}: the effect name '{own.effect.name}' is used by {taken[own.effect.name]}; choose another."
+                f"{declared}: the effect name '{effect.name}' is used by {taken[effect.name]}; choose another."
             )
-        taken[own.effect.name] = own.declared
-        found.append(own)
+        taken[effect.name] = declared
+        found.append((effect, declared))
     if not found:
         return ()
     stage = Stage(CHECKING, len(found), listener)
-    for own in found:
-        for parent in own.effect.parents:
+    for effect, declared in found:
+        for parent in effect.parents:
             if parent not in taken:
                 raise InputError(
-                    f"{own.declared}: effect '{own.effect.name}' starts from '{parent}', which is not a known effect."
+                    f"{declared}: effect '{effect.name}' starts from '{parent}', which is not a known effect."
                 )
         if check:
-            broken = failed_checks(own.effect)
-            if broken:
-                raise InputError(_message(own, broken))
-            stage.finished(own.effect.name)
-    return tuple(own.effect for own in found)
+            _refuse(effect, declared, failed_checks(effect))
+            stage.finished(effect.name)
+    return tuple(effect for effect, _ in found)
 
 
 def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -105,17 +97,19 @@ def equation_text(effect: Effect) -> str:
     return textwrap.shorten(", ".join(lines).replace("*", " "), _LONGEST_EQUATION, placeholder=" ...")
 
 
-def _message(own: OwnEffect, faults: Sequence[str]) -> str:
-    start = f"{own.declared}: effect '{own.effect.name}': "
-    return "\n".join(f"{start}{fault}" for fault in faults[:5])
+def _refuse(effect: Effect, declared: str, faults: Sequence[str]) -> None:
+    """Refuse an effect with faults."""
+    if faults:
+        start = f"{declared}: effect '{effect.name}': "
+        raise InputError("\n".join(f"{start}{fault}" for fault in faults[:5]))
 
 
-def _loaded(path: Path) -> list[OwnEffect]:
+def _loaded(path: Path) -> list[_Declared]:
     """Run a Python file and return the effects that it declares, in the order of declaration."""
     module, tree = run_python_file(path, "the Python file with the effects", _MISSING)
     lines_of = _assignments(tree)
     declared = [
-        OwnEffect(value, f"{path.name}, line {lines_of[name]}" if name in lines_of else path.name)
+        (value, f"{path.name}, line {lines_of[name]}" if name in lines_of else path.name)
         for name, value in vars(module).items()
         if isinstance(value, Effect) and not any(value is effect for effect in CATALOGUE)
     ]
@@ -142,7 +136,7 @@ def _assignments(tree: ast.Module) -> dict[str, int]:
     return lines
 
 
-def _installed() -> list[OwnEffect]:
+def _installed() -> list[_Declared]:
     """Return the effects of installed packages."""
     found = []
     for entry in importlib.metadata.entry_points(group=ENTRY_POINTS):
@@ -160,5 +154,69 @@ def _installed() -> list[OwnEffect]:
                 raise InputError(
                     f"{declared}: is a {type(effect).__name__}, not an Effect. Fix or uninstall the package."
                 )
-            found.append(OwnEffect(effect, declared))
+            found.append((effect, declared))
+    return found
+
+
+def effects_on(rig: Rig, effects: Iterable[Effect], where: str) -> tuple[Effect, ...]:
+    """Return declared effects as they act on a rig."""
+    catalogue = {effect.name: effect for effect in CATALOGUE}
+    found = []
+    for effect in effects:
+        kind = kind_of(effect.name)
+        if effect.at is not None and kind not in catalogue:
+            _check_place(rig, effect, effect.at, where)
+            found.append(effect)
+        else:
+            known = {kind: effect} if effect.at is None else catalogue
+            found.append(effect_on(rig, effect.name, known, where))
+    return tuple(found)
+
+
+def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> Effect:
+    """Return the effect that a name means on a rig."""
+    kind, place = kind_of(name), name.partition(AT)[2]
+    if kind not in known:
+        raise InputError(f"{where}: '{kind}' is unknown.{nearest(kind, known)} Known: {', '.join(known)}.")
+    effect = known[kind]
+    if AT in name:
+        _check_place(rig, effect, place, where)
+        # On a rig of one motion, results name an effect without its place.
+        is_usual = rig.has_one_motion and place == rig.acts_at(effect)
+        return effect if is_usual else placed(effect, place)
+    if rig.has_one_motion:
+        return effect
+    at_places = [placed(effect, one) for one in rig.places(effect.place)]
+    offered = [one for one in at_places if rig.offers(one)]
+    if len(offered) > 1:
+        listed = ", ".join(one.name for one in offered)
+        raise InputError(f"{where}: '{kind}' can act at several places of {rig.name}; name one: {listed}.")
+    # If it applies nowhere, the composition raises the error.
+    return offered[0] if offered else effect
+
+
+def _check_place(rig: Rig, effect: Effect, place: str, where: str) -> None:
+    places = rig.places(effect.place)
+    if place not in places:
+        listed = ", ".join(places) or "none"
+        raise InputError(
+            f"{where}: '{kind_of(effect.name)}{AT}{place}': {rig.name} has no such place for it.{nearest(place, places)} "
+            f"Its places: {listed}."
+        )
+
+
+def candidates_of(campaign: Campaign, effects: Sequence[Effect]) -> list[Effect]:
+    """Return the candidates at every place of a campaign's rig."""
+    # An effect without a place is skipped if it does not apply; a place that was named must exist.
+    named = [effect for effect in effects if effect.at is None] + [
+        *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
+    ]
+    found = candidates_on(campaign.rig, named, campaign.modelled)
+    modelled = {kind_of(effect.name) for effect in campaign.modelled}
+    if named and not found and not any(kind_of(effect.name) in modelled for effect in named):
+        listed = ", ".join(f"'{effect.name}'" for effect in named)
+        raise InputError(
+            f"The candidates: {listed} cannot act on {campaign.rig.name}. "
+            "'rigsight effects' lists all with their kind of place."
+        )
     return found

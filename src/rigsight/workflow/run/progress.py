@@ -95,13 +95,13 @@ def log_lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time
     return say
 
 
-def json_lines(clock: Callable[[], float] = time.monotonic) -> Listener:
+def json_lines() -> Listener:
     """Return a listener that prints every step as a line of JSON, with the time [s] since it was made."""
-    begun = clock()
+    begun = time.monotonic()
 
     def say(step: Step) -> None:
         with contextlib.suppress(OSError):
-            sys.stderr.write(json.dumps({**vars(step), "seconds": round(clock() - begun, 3)}) + "\n")
+            sys.stderr.write(json.dumps({**vars(step), "seconds": round(time.monotonic() - begun, 3)}) + "\n")
 
     return say
 
@@ -127,27 +127,20 @@ class _Lasting:
 
 @contextlib.contextmanager
 def _bar() -> Iterator[Listener]:
+    from rich import progress as bar
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[detail]}"),
+        bar.TextColumn("{task.description}"),
+        bar.BarColumn(),
+        bar.MofNCompleteColumn(),
+        bar.TimeElapsedColumn(),
+        bar.TextColumn("left"),
+        bar.TimeRemainingColumn(),
+        bar.TextColumn("{task.fields[detail]}"),
     )
     # Single steps take minutes, so the remaining time is estimated from all of them.
-    with Progress(
+    with bar.Progress(
         *columns,
         console=Console(file=cast("IO[str]", _Lasting(sys.stderr)), force_terminal=True),
         transient=True,

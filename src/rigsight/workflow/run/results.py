@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import json
 import platform
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rigsight.errors import InputError, MachineError
+from rigsight.errors import InputError, MachineError, check_option
+
+if TYPE_CHECKING:
+    from rigsight.records import Record
 
 _REASONS = {
     errno.EACCES: "no permission to write there",
@@ -34,6 +38,9 @@ DIAGNOSIS_FILE, REPORT_FILE = "diagnosis.json", "report.html"
 """Results of a diagnosis; the bench reads one and links the other."""
 _VERSIONS_OF = ("rigsight", "numpy", "scipy")
 ELSEWHERE = "Name another place with --out."
+_DIGITS = 12
+_STAMPS_TO = 1e-4
+"""Of the sample time: how closely time is written, so that the file is evenly sampled when it is read again."""
 
 _noted: ContextVar[list[Path] | None] = ContextVar("folders with results", default=None)
 
@@ -170,3 +177,26 @@ def _reported(folder: Path, error: OSError, remedy: str = ELSEWHERE) -> InputErr
         return InputError(f"Cannot write results to {folder}: a file is in the way. Name another folder.")
     reason = _REASONS.get(error.errno or 0, error.strerror or str(error))
     return MachineError(f"Cannot write results to {folder}: {reason}. {remedy}")
+
+
+def write_picture(file: Path, draw: Callable[[str], str | bytes]) -> Path:
+    """Write what is drawn for the suffix of a file, once it is clear that the file can be written."""
+    suffix = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
+    check_target(file)
+    return write_together(file.parent, {file.name: draw(suffix)})[0]
+
+
+def csv_text(record: Record, names: Sequence[str]) -> str:
+    """Return the time and the named signals of a record, under their names, as a CSV file that can be read again."""
+    # Loaded where it is used: the command line imports this module at its start.
+    import numpy as np
+
+    from rigsight.records.read_record import TIME
+    from rigsight.records.stamps import digits_for
+
+    table = np.column_stack([record.t, *(record[name] for name in names)])
+    digits = [digits_for(float(record.t[-1]), _STAMPS_TO * record.dt, _DIGITS), *[_DIGITS] * len(names)]
+    formats, heads = [f"%.{n}g" for n in digits], ",".join([TIME, *names])
+    file = io.StringIO()
+    np.savetxt(file, table, fmt=formats, delimiter=",", header=heads, comments="")
+    return file.getvalue()
