@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigsight.identify.start.equation_error import solve_in_frequency, spectra_of
+from rigsight.identify.start.linear_start import solve_in_frequency, spectra_of
 from rigsight.records import Record
 
 

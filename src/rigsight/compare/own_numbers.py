@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigsight.compare.random_effects import Prediction
+from rigsight.compare.usual_gap import Prediction
 from rigsight.identify import (
     DEFAULT_ACCURACY,
     GreyBoxFit,

@@ -30,6 +30,13 @@ TAKES_PART = 0.05
 """Share of the largest change, or influence, from which a parameter is a member of a direction."""
 ROUNDING = 1e-9
 """Entry of a unit direction below which it is rounding error."""
+_OWN_SIZE = 0.5
+"""Value over its characteristic size from which a parameter of either sign is its own reference, as a stiffness that gives the
+records their size."""
+_FOLLOWED = 1e-10
+"""Share of the largest influence of initial states below which a combination of them has none."""
+_STOPPED = 0.1
+"""Distance to the bound over the step that is asked for: a search that could still move would not stop before most of it."""
 
 
 def marginal_errors(root: Floats) -> Floats:
@@ -112,13 +119,6 @@ def percent(error: float) -> str:
 def _power(text: str, power: int) -> str:
     whole = f"({text})" if any(sign in text for sign in " */") else text
     return whole if power == 1 else f"{whole}^{power}"
-
-
-_OWN_SIZE = 0.5
-"""Value over its characteristic size from which a parameter of either sign is its own reference, as a stiffness that gives the
-records their size."""
-_FOLLOWED = 1e-10
-"""Share of the largest influence of initial states below which a combination of them has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,10 +235,6 @@ def _coloring(root: Floats, result: FitResult, names: Sequence[str], sizes: Floa
         & (white > 0.0)
     )
     return max(float(np.median(reported[seen] / white[seen])), 1.0) if np.any(seen) else 1.0
-
-
-_STOPPED = 0.1
-"""Distance to the bound over the step that is asked for: a search that could still move would not stop before most of it."""
 
 
 @dataclass(frozen=True)

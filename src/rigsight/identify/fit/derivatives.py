@@ -30,6 +30,8 @@ _MARGIN = 3.0
 taken along it."""
 _SHARES = (1.0, 0.3, 0.1, 0.03)
 """Shares of a step; the largest that lowers the cost is taken, because the linearization may not hold for a whole step."""
+_FOLLOWED = 1e-9
+"""Share of the strongest direction below which a combination of initial states has no influence."""
 
 
 @dataclass(frozen=True)
@@ -130,10 +132,6 @@ def _of_record(evaluated: Problem, index: int, sensitivity: tuple[Floats, Floats
     (residual, slopes), n_free = sensitivity, evaluated.n_free
     measured = int(np.count_nonzero(evaluated.data.records[index].weights))
     return RecordDerivatives(residual, slopes[:, :n_free], slopes[:, n_free:], measured)
-
-
-_FOLLOWED = 1e-9
-"""Share of the strongest direction below which a combination of initial states has no influence."""
 
 
 class OneStep:

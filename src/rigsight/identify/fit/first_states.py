@@ -32,6 +32,7 @@ _MOST_EVALUATIONS = 100
 _HUGE = 1e6
 _OF_SIGNALS = (Place.ACTUATOR, Place.CONTROLLER, Place.SENSOR)
 _CONTROL = ("error", "command")
+_known: WeakKeyDictionary[Record, dict[tuple[RigEquations, int | None], Floats]] = WeakKeyDictionary()
 
 
 def first_state(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
@@ -84,9 +85,6 @@ def rig_state(
     if key not in known:
         known[key] = _rig_state(equations, record, values, resting, moving, 0.0)
     return known[key].copy()
-
-
-_known: WeakKeyDictionary[Record, dict[tuple[RigEquations, int | None], Floats]] = WeakKeyDictionary()
 
 
 def _rig_state(

@@ -12,11 +12,15 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.idle_threads import IdleThreads
-from rigsight.identify.fit.prior import Prior
 from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, Substeps, record_input, record_values, state_limits
 from rigsight.simulate.input_hold import HeldInput
+
+Result = TypeVar("Result")
+_LEAST_RANGE = 1e-9
+"""Smallest unit of a state with a limited range, relative to its size, because a play of zero has no range."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +98,6 @@ def fit_key(problem: Sequence[Any], theta: Floats, settings: Sequence[Any]) -> s
     digest.update(json.dumps([problem, settings]).encode())
     digest.update(theta.tobytes())
     return digest.hexdigest()
-
-
-Result = TypeVar("Result")
-
-_LEAST_RANGE = 1e-9
-"""Smallest unit of a state with a limited range, relative to its size, because a play of zero has no range."""
 
 
 @dataclass(frozen=True)
@@ -196,3 +194,23 @@ def free_names(structure: Structure, of_rig: Iterable[str]) -> list[str]:
         own = (structure.parameter_name(effect, p.name) for p in effect.parameters if p.fitted)
         names.update(name for name in own if name not in fixed)
     return [name for name in structure.names if name in names]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Costs d^T C d more per reading, in its squared noise, where the parameters differ by d from known values."""
+
+    names: tuple[str, ...]
+    values: Floats  # shape (n,), in units of the parameters
+    curvature: Floats  # C, shape (n, n), symmetric, in reciprocal units of two parameters
+
+    def add(
+        self, coordinates: Coordinates, theta: Floats, n_readings: int, normal: Floats, gradient: Floats
+    ) -> float:
+        """Add the normal equations of this cost in place to those of the first coordinates, and return the cost."""
+        at = [coordinates.structure.names.index(name) for name in self.names]
+        away = coordinates.to_parameters(theta)[at] - self.values
+        slopes, curvature = coordinates.derivatives(theta)[at], n_readings * self.curvature
+        normal[: theta.size, : theta.size] += slopes.T @ curvature @ slopes
+        gradient[: theta.size] += slopes.T @ curvature @ away
+        return float(away @ curvature @ away)

@@ -20,12 +20,25 @@ import numpy as np
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
+from rigsight.identify.fit.fit_data import (
+    FitData,
+    FitMemory,
+    FitResult,
+    Prior,
+    fit_key,
+    record_data,
+    record_digest,
+)
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Evaluation, Problem
-from rigsight.identify.fit.free_run import FreeRun, state_slopes
 from rigsight.identify.fit.idle_threads import IdleThreads
-from rigsight.identify.fit.prior import Prior
-from rigsight.identify.fit.search import FINE_TOLERANCE, VariableProjection, off_kinks, searched
+from rigsight.identify.fit.search import (
+    FINE_TOLERANCE,
+    FreeRun,
+    VariableProjection,
+    off_kinks,
+    searched,
+    state_slopes,
+)
 from rigsight.identify.fit.settled_states import SearchStart
 from rigsight.records.record import Floats, Record
 from rigsight.simulate import Structure, Substeps, simulate_outputs, structure_of_fit

@@ -27,6 +27,14 @@ RELEASE_GAIN = 1.01
 """Factor by which releasing a special value (an exponent of 1) must lower the cost for other starts to be tried."""
 BEYOND = 2.0
 """Factor of the special value that gives the other start."""
+_SUBSTEPS = 2
+_ROUGH_EVALUATIONS = 40
+_ROUGH_TOLERANCE = 1e-3
+_ROUGH_ACCURACY = 1e-3
+_HOPS = 4
+"""Number of fits started near the best one: with stiff loops the cost has many minima within a few percent of the truth."""
+_HOP = 0.1
+"""Relative size of such a step."""
 
 
 @dataclass(frozen=True)
@@ -61,16 +69,6 @@ class Calibration:
 def better(one: FitResult | None, other: FitResult) -> FitResult:
     """Return the fit with the lower cost."""
     return other if one is None or other.cost < one.cost else one
-
-
-_SUBSTEPS = 2
-_ROUGH_EVALUATIONS = 40
-_ROUGH_TOLERANCE = 1e-3
-_ROUGH_ACCURACY = 1e-3
-_HOPS = 4
-"""Number of fits started near the best one: with stiff loops the cost has many minima within a few percent of the truth."""
-_HOP = 0.1
-"""Relative size of such a step."""
 
 
 def calibrate_to_records(

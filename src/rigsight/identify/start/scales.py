@@ -30,6 +30,12 @@ _PIECES = (1, 20)
 piece starts from the measured state, because an unstable or drifting rig leaves the measured motion after some time."""
 _BEYOND = 3.0
 """Largest ratio of simulated to measured motion; a rig with estimated parameters at its resonance stays below."""
+_Signals = Mapping[str, list[Floats]]
+_LEAST_SHARE = 1e-3
+"""Share of the value at which a parameter is as important as any other term. A parameter below this share gets this size, because
+steps relative to its value would be lost in rounding."""
+_UNKNOWN = 1.0
+"""Size of a quantity that is zero everywhere."""
 
 
 def motion_in_record(
@@ -76,15 +82,6 @@ def _within_reach(
         for name, reading in zip(equations.sensor_names, shown, strict=True)
         if name in record
     )
-
-
-_Signals = Mapping[str, list[Floats]]
-
-_LEAST_SHARE = 1e-3
-"""Share of the value at which a parameter is as important as any other term. A parameter below this share gets this size, because
-steps relative to its value would be lost in rounding."""
-_UNKNOWN = 1.0
-"""Size of a quantity that is zero everywhere."""
 
 
 def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:

@@ -14,6 +14,8 @@ from rigsight.rigs import Coordinate, Rig, applied_symbol, has_short_inverse
 from rigsight.simulate.equations.elimination import acceleration_symbols
 from rigsight.units import size_of
 
+Bound = Callable[[sp.Expr], sp.Expr]
+
 
 class Kind(StrEnum):
     """Kinds of named values in the equations."""
@@ -244,9 +246,6 @@ class EquationTree:
             now = expression.args[0] if isinstance(expression, late) else expression
             values[symbol] = now.xreplace(values)
         return values
-
-
-Bound = Callable[[sp.Expr], sp.Expr]
 
 
 def equations_of_motion(
