@@ -41,9 +41,7 @@ _STOPPED = 0.1
 
 def marginal_errors(root: Floats) -> Floats:
     """Return the standard error of each coordinate, infinite if it has a component in an undetermined direction."""
-    _, singular, right = np.linalg.svd(root, full_matrices=True)
-    sizes = np.zeros(root.shape[1])
-    sizes[: singular.size] = singular
+    sizes, right = _directions(root)
     with np.errstate(divide="ignore", invalid="ignore"):
         parts = np.where(np.abs(right) > ROUNDING, np.abs(right) / sizes[:, None], 0.0)
     return np.asarray(np.sqrt(np.sum(parts**2, axis=0)))
@@ -57,10 +55,14 @@ def conditional_errors(root: Floats) -> Floats:
 
 def undetermined(root: Floats) -> Floats:
     """Return an orthonormal basis of the directions with a larger standard error than a poorly known parameter."""
-    _, singular, right = np.linalg.svd(root, full_matrices=True)
-    sizes = np.zeros(root.shape[1])
-    sizes[: singular.size] = singular
+    sizes, right = _directions(root)
     return np.asarray(right[sizes * POORLY_KNOWN < 1.0].T)
+
+
+def _directions(root: Floats) -> tuple[Floats, Floats]:
+    """Return the singular value of each direction of the coordinates, zero included, and the directions as rows."""
+    _, singular, right = np.linalg.svd(root, full_matrices=True)
+    return np.pad(singular, (0, root.shape[1] - singular.size)), right
 
 
 def sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]]:

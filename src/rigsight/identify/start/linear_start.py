@@ -69,23 +69,14 @@ def linear_start(
     driven = [record for record in records if not is_constant(record[rig.inputs[0].name])]
     if rig.is_driven and not driven:
         # A free decay consists only of end terms, which this method treats as transients to be removed.
-        return any_rig_start(rig, records, constants, {**_one_offset(rig), **known})
-    records = driven
-    first = _driven if rig.is_driven else _prescribed
-    found = first(rig, records, constants, known)
+        # A constant force is equivalent to a free rest position.
+        bias = rig.motion.bias.free_symbols if rig.motion.rest.free_symbols else ()
+        return any_rig_start(rig, records, constants, {**dict.fromkeys(map(str, bias), 0.0), **known})
+    found = (_driven if rig.is_driven else _prescribed)(rig, driven, constants, known)
     if rig.follower is not None:
-        found |= _followed(rig, rig.follower, records, constants, found)
-    parameters = {p.name: p for p in rig.parameters}
-    clipped = {
-        name: float(np.clip(value, parameters[name].lower, parameters[name].upper))
-        for name, value in found.items()
-    }
-    return {**clipped, **known}
-
-
-def _one_offset(rig: Rig) -> dict[str, float]:
-    """Return zero for a constant force that is equivalent to a free rest position."""
-    return dict.fromkeys(map(str, rig.motion.bias.free_symbols), 0.0) if rig.motion.rest.free_symbols else {}
+        found |= _followed(rig, rig.follower, driven, constants, found)
+    bounds = {p.name: (p.lower, p.upper) for p in rig.parameters}
+    return {**{name: float(np.clip(value, *bounds[name])) for name, value in found.items()}, **known}
 
 
 def _driven(
@@ -127,16 +118,16 @@ def _followed(
 ) -> dict[str, float]:
     """Return the parameters of the state that follows the motion."""
     motion, name = rig.outputs[0].name, follower.symbol.name
-    own = (
-        {symbol.name for symbol in (follower.gain * follower.creepage).free_symbols}
-        - set(constants)
-        - set(found)
-    )
-    own -= {rig.motion.displacement.name, name}
+    own = {symbol.name for symbol in (follower.gain * follower.creepage).free_symbols}
+    own -= {*constants, *found, rig.motion.displacement.name, name}
     seen = [record for record in records if name in record]
     if not seen:
         return {p: 0.0 if p in _offsets(follower) else _UNKNOWN for p in own}
-    slope, rate = first_order(seen, motion, name)
+    # The hold is that of the rig's input; a measured output that drives a later stage has no content above Nyquist.
+    smooth = [replace(record, hold="band_limited") for record in seen]
+    # ``y' = slope x - rate y``, written as ``tau y' + unity y = x``.
+    tau, unity = _equation_error(smooth, motion, name, (1, 0), 1.0)
+    slope, rate = float(abs(1.0 / tau)), float(abs(unity / tau) or 1.0)
     solved = _solved(follower.gain, slope, constants)
     solved |= _solved(follower.feedback, rate / slope, {**constants, **solved})
     static = evaluated(follower.static_gain, {**constants, **solved})
@@ -149,19 +140,13 @@ def _offsets(follower: Follower) -> set[str]:
 
 def _solved(expression: sp.Expr, value: float, known: Mapping[str, float]) -> dict[str, float]:
     """Return the unknown parameter with which an expression has a given value; several unknown ones are assumed to be equal."""
-    lacking = sorted(
-        (symbol for symbol in expression.free_symbols if symbol.name not in known),
-        key=lambda symbol: str(symbol.name),
-    )
+    given = {symbol: known[symbol.name] for symbol in expression.free_symbols if symbol.name in known}
+    lacking = sorted(expression.free_symbols - given.keys(), key=str)
     if not lacking:
         return {}
     unknown = sp.Symbol("unknown", real=True)
-    equation = expression.subs(
-        {symbol: known[symbol.name] for symbol in expression.free_symbols if symbol not in lacking}
-    )
-    solutions = [
-        s for s in sp.solve(equation.subs(dict.fromkeys(lacking, unknown)) - value, unknown) if s.is_real
-    ]
+    equation = expression.subs(given).subs(dict.fromkeys(lacking, unknown))
+    solutions = [s for s in sp.solve(equation - value, unknown) if s.is_real]
     return {symbol.name: float(solutions[-1]) if solutions else _UNKNOWN for symbol in lacking}
 
 
@@ -224,9 +209,8 @@ def second_order(
 ) -> tuple[float, float, float]:
     """Return the best-fitting inertia, damping and stiffness of ``m x'' + d x' + k x = gain u``."""
     orders = (2, 1, 0) if has_stiffness else (2, 1)
-    solution = _equation_error(records, source, response, orders, gain)
-    inertia, damping = solution[0], solution[1]
-    stiffness = solution[2] if has_stiffness else 0.0
+    inertia, damping, *rest = _equation_error(records, source, response, orders, gain)
+    stiffness = rest[0] if has_stiffness else 0.0
     turned = inertia <= 0.0
     inertia = abs(inertia) or 1.0
     if has_stiffness and (turned or (stiffness <= 0.0 and not any_stiffness)):
@@ -234,15 +218,6 @@ def second_order(
     if turned or not any_damping:
         damping = max(damping, 1e-4 * np.sqrt(stiffness * inertia) if stiffness > 0.0 else 0.0)
     return float(inertia), float(damping), float(stiffness)
-
-
-def first_order(records: Sequence[Record], source: str, response: str) -> tuple[float, float]:
-    """Return the best-fitting slope and rate of ``y' = slope x - rate y`` with a measured x."""
-    # The hold is that of the rig's input; a measured output that drives a later stage has no content above Nyquist.
-    smooth = [replace(record, hold="band_limited") for record in records]
-    tau, unity = _equation_error(smooth, source, response, (1, 0), 1.0)
-    slope, rate = 1.0 / tau, unity / tau
-    return float(abs(slope)), float(abs(rate) or 1.0)
 
 
 def _equation_error(
@@ -253,7 +228,7 @@ def _equation_error(
         _check_moves(records, name)
     blocks = [spectra_of(record, source, response) for record in records]
     terms = [[(order, block.response) for order in orders] for block in blocks]
-    return solve_in_frequency(blocks, terms, [gain * block.drive for block in blocks]).coefficients
+    return solve_in_frequency(blocks, terms, [gain * block.drive for block in blocks])
 
 
 @dataclass(frozen=True)
@@ -265,14 +240,6 @@ class Spectra:
     hold: NDArray[np.complex128]  # frequency response of the hold
     drive: NDArray[np.complex128]  # input, multiplied by the response of the hold
     response: NDArray[np.complex128]  # output
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Coefficients of the terms, and the remaining weighted error."""
-
-    coefficients: Floats
-    error: float
 
 
 def spectra_of(record: Record, source: str, response: str) -> Spectra:
@@ -297,25 +264,18 @@ def solve_in_frequency(
     blocks: Sequence[Spectra],
     terms: Sequence[Sequence[Term]],
     targets: Sequence[NDArray[np.complex128]],
-    denominators: Sequence[NDArray[np.complex128]] | None = None,
-) -> Solution:
+) -> Floats:
     """Solve ``sum_i a_i (j omega)^order_i F_i = target + transient`` over all records for the real a_i."""
     top = max(float(np.max(block.omega)) for block in blocks)
-    n_terms, n_transient = len(terms[0]), _TRANSIENT_ORDER + 1
-    weights = list(denominators or [np.ones_like(block.response) for block in blocks])
-    solution = np.zeros(n_terms + n_transient * len(blocks))
-    error = float("inf")
-    for _ in range(1 if denominators else _ITERATIONS):
-        previous = solution
-        solution, error = _weighted_solution(blocks, terms, targets, weights, top)
+    n_terms = len(terms[0])
+    weights = [np.ones_like(block.response) for block in blocks]
+    solution = np.zeros(n_terms)
+    for _ in range(_ITERATIONS):
+        previous, solution = solution, _weighted_solution(blocks, terms, targets, weights, top)
         if np.allclose(solution[:n_terms], previous[:n_terms], rtol=1e-6):
             break
-        if not denominators:
-            weights = [
-                _own_denominator(block, own, solution, top) for block, own in zip(blocks, terms, strict=True)
-            ]
-    orders = np.array([order for order, _ in terms[0]])
-    return Solution(solution[:n_terms] / top**orders, error)
+        weights = [_own_denominator(*own, solution, top) for own in zip(blocks, terms, strict=True)]
+    return np.asarray(solution[:n_terms] / top ** np.array([order for order, _ in terms[0]]))
 
 
 def _weighted_solution(
@@ -324,10 +284,10 @@ def _weighted_solution(
     targets: Sequence[NDArray[np.complex128]],
     weights: Sequence[NDArray[np.complex128]],
     top: float,
-) -> tuple[Floats, float]:
+) -> Floats:
     n_terms, n_transient = len(terms[0]), _TRANSIENT_ORDER + 1
     n_columns = n_terms + n_transient * len(blocks)
-    normal, right, energy = np.zeros((n_columns, n_columns)), np.zeros(n_columns), 0.0
+    normal, right = np.zeros((n_columns, n_columns)), np.zeros(n_columns)
     for index, (block, own, target, weight) in enumerate(zip(blocks, terms, targets, weights, strict=True)):
         s = 1j * block.omega / top
         columns = np.zeros((block.omega.size, n_columns), dtype=np.complex128)
@@ -339,12 +299,9 @@ def _weighted_solution(
         weighted, goal = columns / weight[:, None], target / weight
         normal += np.real(weighted.conj().T @ weighted)
         right += np.real(weighted.conj().T @ goal)
-        energy += float(np.sum(np.abs(goal) ** 2))
     # A term that is zero in all records, such as a stop that is never reached, has no scale, and gets no coefficient.
     size = np.sqrt(np.where(np.diag(normal) > 0.0, np.diag(normal), 1.0))
-    scaled = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-14)[0]
-    solution = scaled / size
-    return solution, float(np.sqrt(max(energy - float(solution @ right), 0.0)))
+    return np.asarray(np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-14)[0] / size)
 
 
 def _own_denominator(

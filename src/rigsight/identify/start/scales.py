@@ -94,11 +94,8 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
         own_sizes.append(own_size)
         for name, samples in found.items():
             signals.setdefault(name, []).append(samples)
-    scales: dict[str, float] = {}
     joints = {joint.name: _of_joint(joint.name, signals) for joint in rig.mechanism.joints}
-    first = next(
-        iter(joints.values()), {"x": _UNKNOWN, "force": _UNKNOWN, "drive": _UNKNOWN, "time": _UNKNOWN}
-    )
+    first = next(iter(joints.values()), dict.fromkeys(("x", "force", "drive", "time"), _UNKNOWN))
     sources = [size_of_signal(signals[f"input {s.name}"]) for s in rig.inputs]
     own_states = [f"value {state.name}" for state in rig.mechanism.states]
     length = size_of_signal(signals[own_states[0]]) if own_states else _UNKNOWN
@@ -116,7 +113,7 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
         slope = f"slope@{name}" if name in equations.sensor_names else f"change {name}"
         x = size_of_signal(signals[key])
         places[name] = {**plain, **_not_zero({"x": x, "time": _over(x, size_about_zero(signals[slope]))})}
-    scales |= plain
+    scales = dict(plain)
     for place, sizes in places.items():
         scales |= {f"{base}@{place}": size for base, size in sizes.items()}
     for name in equations.state_names:
