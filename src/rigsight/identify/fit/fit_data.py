@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.records.record import Floats, Record
-from rigsight.simulate import Structure, Substeps, record_input, record_values, state_limits
+from rigsight.simulate import (
+    Structure,
+    Substeps,
+    record_input,
+    record_values,
+    simulate_outputs,
+    simulate_sets,
+    state_limits,
+)
 from rigsight.simulate.input_hold import HeldInput
 
 Result = TypeVar("Result")
@@ -147,6 +155,16 @@ class FitData:
     def of_each_record(self, one: Callable[[int], Result]) -> list[Result]:
         """Return the results of a function for the index of each record, in their order."""
         return self.threads.results(one, [record.record.n_samples for record in self.records])
+
+    def simulated(self, record: RecordData, p: Floats, states: Floats, substeps: int | Substeps) -> Floats:
+        """Return the outputs of parameter sets on a record, see `simulate_sets`."""
+        n_samples = record.record.n_samples
+        return simulate_sets(self.structure, record.held, record.parameters(p), states, n_samples, substeps)
+
+    def accurate(self, record: RecordData, p: Floats, state: Floats, accuracy: float) -> Floats:
+        """Return the accurately simulated outputs of one parameter set on a record, shape (n_samples, n_outputs)."""
+        n_samples = record.record.n_samples
+        return simulate_outputs(self.structure, record.held, record.parameters(p), state, n_samples, accuracy)
 
     def state_sizes(self, p: Floats) -> Floats:
         """Return the unit of each initial state in the fit, shape (n_states, n_sets)."""

@@ -28,7 +28,6 @@ from rigsight.identify.fit.fit_data import FitData, weighted
 from rigsight.identify.fit.fit_problem import Evaluation, Problem
 from rigsight.identify.fit.settled_states import SearchStart
 from rigsight.records.record import Floats
-from rigsight.simulate import simulate_outputs, simulate_sets
 
 _DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)
 """Dampings of the Levenberg-Marquardt steps of an initial state that are tried at once, in units of the normalized equations."""
@@ -88,15 +87,12 @@ class VariableProjection(Problem):
 
     def jacobian(self, theta: Floats) -> Floats:
         """Return the derivatives of `residual`; the search continues from the point where they are requested."""
-        evaluation = self.at(theta)
+        self.at(theta)
         self.places = self._settled_at
-        root, _ = evaluation.compressed
-        return np.vstack([root, np.zeros(theta.size)])
+        return super().jacobian(theta)
 
-    def at(self, theta: Floats) -> Evaluation:
+    def _evaluation(self, theta: Floats) -> Evaluation:
         """Refit the initial states, then evaluate with their directions projected out of the derivatives."""
-        if self._last is not None and np.array_equal(self._last.theta, theta):
-            return self._last
         p = self.coordinates.to_parameters(theta)
         settled = self.data.of_each_record(lambda i: self._settled(i, p, self.places[i], _FEW_STEPS)[0])
         n = theta.size
@@ -110,10 +106,8 @@ class VariableProjection(Problem):
             cost += self.add_prior(theta, normal, gradient)
         if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
             cost = float("inf")
-        self._best = min(self._best, cost)
-        self._last, self._settled_at = Evaluation(theta.copy(), cost, normal, gradient), settled
-        self.n_evaluations += 1
-        return self._last
+        self._settled_at = settled
+        return Evaluation(theta, cost, normal, gradient)
 
     def settle_anew(self, theta: Floats) -> float:
         """Refit the initial states from several values of limited states, and return the cost."""
@@ -178,15 +172,10 @@ class VariableProjection(Problem):
         record = self.data.records[index]
         sets = np.repeat(record.parameters(p)[:, None], places.shape[1], axis=1)
         with np.errstate(all="ignore"):
-            out = simulate_sets(
-                self.data.structure,
-                record.held,
-                sets,
-                places * self.data.state_sizes(sets),
-                record.record.n_samples,
-                self.substeps[index],
+            states = places * self.data.state_sizes(sets)
+            first, against_first = weighted(
+                record, self.data.simulated(record, sets, states, self.substeps[index])
             )
-            first, against_first = weighted(record, out)
             return np.column_stack([first, first[:, None] + against_first])
 
 
@@ -270,10 +259,7 @@ def _evaluated(problem: Problem, place: Floats) -> Evaluation:
 
     def accurate(index: int) -> Floats:
         record = data.records[index]
-        n_samples = record.record.n_samples
-        own = record.parameters(p)
-        out = simulate_outputs(data.structure, record.held, own, states[index], n_samples, _EXACT)
-        return weighted(record, out[:, :, None])[0]
+        return weighted(record, data.accurate(record, p, states[index], _EXACT)[:, :, None])[0]
 
     residuals = data.of_each_record(accurate)
     for index, (_, derivative) in enumerate(problem.sensitivities(place)):

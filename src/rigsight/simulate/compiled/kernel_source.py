@@ -19,7 +19,6 @@ and constants are numbered.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Mapping, Sequence
 
 import sympy as sp
@@ -83,11 +82,11 @@ def accurate_integrator(equations: KernelEquations) -> str:
 
 def kernel_source(structure: Structure) -> str:
     """Return the C source of the kernels of a structure; equal structures give equal text."""
-    equations = KernelEquations(structure)
+    equations, bodies = KernelEquations(structure), structure.rig.mechanism.bodies
     text = equations.text("const double *p", [f"p[{i}]" for i in range(len(structure.parameters))])
     head = [
         _ENGINE.format(n_parameters=max(1, len(structure.parameters))),
-        bodies_text(structure),
+        "" if bodies is None else bodies.c_text,
         text,
         accurate_integrator(equations),
     ]
@@ -97,7 +96,7 @@ def kernel_source(structure: Structure) -> str:
     lanes = {
         "LANES": str(LANES),
         "TANGENTS": str(int(tangents)),
-        "LANE_SIMULATED": lane_bodies_text(structure),
+        "LANE_SIMULATED": "" if bodies is None else template("simulators", "lane_simulated.c.txt"),
         **equations.lane_fragments(),
     }
     parts = _LANES_OF_FRICTIONS if equations.has_several_frictions else _LANES
@@ -109,32 +108,6 @@ def kernel_source(structure: Structure) -> str:
             filled(template("simulate", "tangents.c.txt"), tangent_fragments(equations)) if tangents else "",
         ]
     )
-
-
-def bodies_text(structure: Structure) -> str:
-    """Return the C text of a structure's simulated bodies; empty if there are none."""
-    bodies = structure.rig.mechanism.bodies
-    return "" if bodies is None else bodies.c_text
-
-
-def lane_bodies_text(structure: Structure) -> str:
-    """Return the same for parameter sets side by side."""
-    if structure.rig.mechanism.bodies is None:
-        return ""
-    return template("simulators", "lane_simulated.c.txt")
-
-
-def include_folders(structure: Structure) -> tuple[str, ...]:
-    """Return the folders of the headers that `bodies_text` includes."""
-    bodies = structure.rig.mechanism.bodies
-    return () if bodies is None else bodies.program.include_folders
-
-
-def connect(structure: Structure, library: ctypes.CDLL) -> None:
-    """Give a loaded kernel the functions by which it calls another simulator."""
-    bodies = structure.rig.mechanism.bodies
-    if bodies is not None:
-        bodies.program.connect(library)
 
 
 def carries_tangents(equations: KernelEquations) -> bool:
