@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, sosfilt
 
-from rigsight.compare.suspects import place_of
+from rigsight.compare.own_numbers import place_of
 from rigsight.effects import Effect, effect_named, placed
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales

@@ -19,13 +19,13 @@ from rigsight.identify.hysteresis.calibration import (
     RELEASE_GAIN,
     Calibration,
     Minimum,
-    better,
+    SearchBox,
     checked_free,
+    search,
     special_structure,
     start_values,
 )
 from rigsight.identify.hysteresis.derived import derived_quantities
-from rigsight.identify.hysteresis.search import SearchBox, search
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.simulate import Structure
 
@@ -301,7 +301,7 @@ def _released(
     best = refined(structure, free, begin)
     if best.cost < settled.cost / RELEASE_GAIN:
         beyond = {**begin, **{name: BEYOND * value for name, value in special.items()}}
-        best = better(best, refined(structure, free, beyond))
+        best = min(best, refined(structure, free, beyond), key=lambda fit: fit.cost)
     return best
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales
-from rigsight.identify.fit.prior import Prior
+from rigsight.identify.fit.fit_data import Prior
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate

@@ -11,7 +11,7 @@ from rigsight.simulate import (
     FittedRecord,
     Substeps,
     compose,
-    normal_equations,
+    kernel_of,
     parameter_vector,
     record_input,
     simulate_sets,
@@ -60,7 +60,7 @@ def test_they_are_those_of_the_simulated_outputs(effect, n_sets, rng):
         expected.append(rows.T @ rows)
         fitted.append(FittedRecord(held, Substeps(2).per_piece(held.n_pieces), measured, weights))
         states.append(x0)
-    found = normal_equations(structure, fitted, p, np.array(states))
+    found = kernel_of(structure).normal_equations(fitted, p, np.array(states))
     size = np.sqrt(np.einsum("rii->ri", np.array(expected)))
     np.testing.assert_array_less(
         np.abs(found - expected), 1e-12 * size[:, :, None] * size[:, None, :] + 1e-300
@@ -76,7 +76,7 @@ def test_an_output_that_was_not_measured_counts_for_nothing(rng):
         FittedRecord(held, substeps, np.column_stack([measured[:, 0], other]), np.array([1.0, 0.0]))
         for other in (measured[:, 1], np.full(100, np.nan))
     ]
-    with_values, without = normal_equations(structure, both, p, np.array([x0, x0]))
+    with_values, without = kernel_of(structure).normal_equations(both, p, np.array([x0, x0]))
     np.testing.assert_array_equal(with_values, without)
     assert np.all(np.isfinite(without))
 
@@ -85,16 +85,10 @@ def test_a_set_that_diverges_spoils_no_other(rng):
     structure = compose(RUNNING_GEAR, [effect_named("cubic_stiffness")])
     held, p, x0 = drawn(structure, 200, 6, rng, 0.5)
     record = FittedRecord(held, Substeps(1).per_piece(held.n_pieces), np.zeros((200, 2)), np.ones(2))
-    sound = normal_equations(structure, [record], p, x0[None])[0]
+    sound = kernel_of(structure).normal_equations([record], p, x0[None])[0]
     p[structure.names.index("k_3"), 4] = -1e30
     x0[0, 4] = 1.0
-    spoiled = normal_equations(structure, [record], p, x0[None])[0]
+    spoiled = kernel_of(structure).normal_equations([record], p, x0[None])[0]
     others = [0, 1, 2, 3, 5]
     assert not np.any(np.isfinite(spoiled[4, [0, 4]]))
     np.testing.assert_array_equal(spoiled[np.ix_(others, others)], sound[np.ix_(others, others)])
-
-
-def test_what_a_late_sensor_shows_is_refused(rng):
-    structure = compose(RUNNING_GEAR, [effect_named("sensor_delay")])
-    with pytest.raises(ValueError, match="delayed sensor"):
-        normal_equations(structure, [], np.zeros((len(structure.names), 1)), np.zeros((0, 3, 1)))

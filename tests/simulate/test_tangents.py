@@ -16,12 +16,12 @@ from rigsight.simulate import (
     Structure,
     Substeps,
     compose,
+    kernel_of,
     parameter_vector,
     record_input,
     simulate_outputs,
     simulate_sets,
     simulate_tangents,
-    tangent_equations,
 )
 from rigsight.simulate.input_hold import HeldInput
 
@@ -133,7 +133,7 @@ def test_products_are_those_of_the_derivatives(effect: str, n_directions: int) -
         expected.append(rows.T @ rows)
         fitted.append(FittedRecord(held, Substeps(2).per_piece(held.n_pieces), measured, weights))
         states.append(x0)
-    found = tangent_equations(structure, fitted, p, dp, np.array(states), dx0)
+    found = kernel_of(structure).tangent_equations(fitted, p, dp, np.array(states), dx0)
     size = np.sqrt(np.einsum("rii->ri", np.array(expected)))
     np.testing.assert_array_less(
         np.abs(found - expected), 1e-12 * size[:, :, None] * size[:, None, :] + 1e-300
@@ -146,5 +146,7 @@ def test_a_motion_beyond_the_range_of_numbers_is_seen() -> None:
     dp, dx0 = directions(structure, p)
     p[structure.names.index("k_3")] = -1e30
     record = FittedRecord(held, Substeps(1).per_piece(held.n_pieces), np.zeros((200, 2)), np.ones(2))
-    products = tangent_equations(structure, [record], p, dp, np.ones((1, len(structure.states))), dx0)
+    products = kernel_of(structure).tangent_equations(
+        [record], p, dp, np.ones((1, len(structure.states))), dx0
+    )
     assert not np.isfinite(products[0, 0, 0])

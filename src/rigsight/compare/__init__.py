@@ -13,8 +13,10 @@ from rigsight.compare.on_one_record import compare_on_record as compare_on_recor
 from rigsight.compare.on_one_record import free_run as free_run
 from rigsight.compare.own_numbers import NumberCheck as NumberCheck
 from rigsight.compare.own_numbers import OwnNumber as OwnNumber
+from rigsight.compare.own_numbers import Suspect as Suspect
 from rigsight.compare.own_numbers import check_numbers as check_numbers
 from rigsight.compare.own_numbers import own_numbers as own_numbers
+from rigsight.compare.own_numbers import suspects as suspects
 from rigsight.compare.response_error import ResponseError as ResponseError
 from rigsight.compare.response_error import SignalPath as SignalPath
 from rigsight.compare.response_error import StepWindow as StepWindow
@@ -22,7 +24,5 @@ from rigsight.compare.response_error import response_error as response_error
 from rigsight.compare.response_error import response_floor as response_floor
 from rigsight.compare.response_error import signal_paths as signal_paths
 from rigsight.compare.response_error import step_window as step_window
-from rigsight.compare.suspects import Suspect as Suspect
-from rigsight.compare.suspects import suspects as suspects
 from rigsight.compare.usual_gap import KnownGap as KnownGap
 from rigsight.compare.usual_gap import UsualGap as UsualGap

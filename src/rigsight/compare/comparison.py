@@ -33,6 +33,13 @@ QUANTITIES: dict[Quantity, str] = {
 
 _SEGMENT = 256
 """Samples of a segment of Welch's method; a stretch that is shorter is one segment."""
+SCHEMA_VERSION = 1
+_HEAD = (
+    "model", "record", "role", "kind", "amplitude", "signal", "quantity", "unit", "value",
+    "noise_floor", "n_values", "best", "problem",
+)  # fmt: skip
+_EQUAL = 5e-4
+"""Relative difference below which two errors are the same: they read alike in three digits."""
 
 
 @dataclass(frozen=True)
@@ -86,15 +93,6 @@ class Floor:
             power += samples.size * np.interp(frequency, known[1:], density[1:])
         colored = np.fft.irfft(np.sqrt(power) * np.fft.rfft(white), n_samples)
         return np.asarray(self.std * colored / np.std(colored))
-
-
-SCHEMA_VERSION = 1
-_HEAD = (
-    "model", "record", "role", "kind", "amplitude", "signal", "quantity", "unit", "value",
-    "noise_floor", "n_values", "best", "problem",
-)  # fmt: skip
-_EQUAL = 5e-4
-"""Relative difference below which two errors are the same: they read alike in three digits."""
 
 
 @dataclass(frozen=True, eq=False)

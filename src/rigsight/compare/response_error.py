@@ -34,6 +34,14 @@ floor."""
 _POLES: Mapping[Method, int] = {"local_rational": 2, "local_polynomial": 0}
 """Degree of the denominator that a local model of several inputs has."""
 _PER_NEPER = 20.0 / math.log(10.0)
+DEFAULT_SECONDS = 4.0
+_BEFORE = 5.0
+"""Longest stretch before the step whose mean is the offset [s]."""
+_LEAST_BEFORE = 2
+_JUMP = 0.5
+"""Share of the largest change between samples that counts as the step."""
+_CHANCE = 1e-3
+"""Probability that noise alone counts as a step."""
 
 
 @dataclass(frozen=True)
@@ -247,16 +255,6 @@ def response_floor(
 def without_shares(response: FrequencyResponse) -> FrequencyResponse:
     """Return a response without what ties its lines: tens of megabytes that no error or picture reads."""
     return replace(response, noise_shares=None, noise_lines=None)
-
-
-DEFAULT_SECONDS = 4.0
-_BEFORE = 5.0
-"""Longest stretch before the step whose mean is the offset [s]."""
-_LEAST_BEFORE = 2
-_JUMP = 0.5
-"""Share of the largest change between samples that counts as the step."""
-_CHANCE = 1e-3
-"""Probability that noise alone counts as a step."""
 
 
 @dataclass(frozen=True)

@@ -185,24 +185,16 @@ def _spectra(record: Record, sources: Sequence[str], smooth: Sequence[str]) -> _
     omega = line_frequencies(n, mean.dt)
     # Averaging over periods lowers the noise by the square root of their number.
     scale = math.sqrt(max(n_periods, 1) * mean.dt / n)
-    inputs, excites = [], []
-    for source in sources:
-        moves = _moves(record, source)
+    moving, inputs, excites = [_moves(record, source) for source in sources], [], []
+    for source, moves in zip(sources, moving, strict=True):
         hold: Hold = "band_limited" if source in smooth else record.hold
         lines = np.fft.rfft(mean[source] - np.mean(mean[source]))[1 : omega.size + 1]
         inputs.append(scale * lines * hold_response(omega, mean.dt, hold) if moves else np.zeros_like(lines))
         width = min(2 * SPARE + 1, omega.size)
         power = np.convolve(np.abs(inputs[-1]) ** 2, np.full(width, 1.0 / width), mode="same")
         excites.append(excited(omega, power, None, "") if moves else np.zeros(omega.size, dtype=np.bool_))
-    return _Spectra(
-        mean,
-        omega,
-        np.array(inputs),
-        np.array([_moves(record, source) for source in sources]),
-        np.array(excites),
-        scale,
-        n_periods == 0,
-    )
+    every = np.array(inputs), np.array(moving), np.array(excites)
+    return _Spectra(mean, omega, *every, scale, n_periods == 0)
 
 
 def _long_enough(spectra: Sequence[_Spectra]) -> list[_Spectra]:

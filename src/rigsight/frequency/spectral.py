@@ -35,6 +35,10 @@ from rigsight.frequency.signal_pair import (
 from rigsight.records.record import Floats, Hold, Record
 
 Estimator = Literal["H1", "H2", "Hv"]
+_SMOOTHED = 15
+"""Lines over which the noise of local bands is averaged: one more band to each side, far less than a resonance is wide."""
+_ENDS = 15
+"""Points at either end whose mean phase the thesis takes as the phase reached there."""
 
 
 def averaged_response(
@@ -161,13 +165,6 @@ def _independent(window: Floats, step: int, n_segments: float) -> float:
         correlation = float(window[shift:] @ window[:-shift]) / power
         shared += 2.0 * (1.0 - shift / step / n_segments) * correlation**2
     return n_segments / (1.0 + max(shared, 0.0))
-
-
-_SMOOTHED = 15
-"""Lines over which the noise of local bands is averaged: one more band to each side, far less than a resonance is wide."""
-
-_ENDS = 15
-"""Points at either end whose mean phase the thesis takes as the phase reached there."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

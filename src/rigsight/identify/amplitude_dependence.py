@@ -33,11 +33,10 @@ def amplitude_dependence(
     if len(compared) < 2:
         return _why_not(records), ()
     parts = (_numbers(r) for _, group in compared for r in group)
-    names = [
-        name
-        for part in zip(*parts, strict=True)
-        for name in _shared_names([() if own is None else _determined(own) for own in part])
-    ]
+    names = []
+    for part in zip(*parts, strict=True):
+        first, *others = [[] if own is None else _determined(own) for own in part]
+        names += [name for name in first if all(name in other for other in others)]
     unit = units.get(compared[0][1][0].source, "")
     span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g} {unit}".rstrip()
     if not names:
@@ -165,10 +164,6 @@ def _driven_alike(found: RecordIdentification) -> tuple[str, ...]:
 
 def _has_numbers(found: RecordIdentification) -> bool:
     return found.own is not None or (bool(found.paths) and found.motion.physical is not None)
-
-
-def _shared_names(names: Sequence[Sequence[str]]) -> list[str]:
-    return [name for name in names[0] if all(name in other for other in names)]
 
 
 def _mean(estimates: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -33,6 +33,11 @@ _DRAWS = 3
 _SAME = 1e-9
 """Relative difference of rates that counts as rounding error."""
 _MASS = "[mass]"
+_CLEARLY = 5.0
+"""Standard errors from zero at which the stiffness is significant; large, because the residual is not white."""
+_LEAVES = 0.9
+"""Largest error with a spring, relative to that without, that contradicts a given stiffness of zero: other missing effects seem
+like a weak spring, and lower the error less."""
 
 
 @dataclass(frozen=True)
@@ -117,13 +122,6 @@ def _rest_makes_up(rig: Rig, records: Sequence[Record]) -> bool:
     moved = {str(symbol) for symbol in rig.motion.rest.free_symbols | rig.motion.bias.free_symbols}
     levels = {round(float(record[rig.inputs[0].name][0]), 12) for record in records}
     return bool(free & moved) and len(levels) == 1
-
-
-_CLEARLY = 5.0
-"""Standard errors from zero at which the stiffness is significant; large, because the residual is not white."""
-_LEAVES = 0.9
-"""Largest error with a spring, relative to that without, that contradicts a given stiffness of zero: other missing effects seem
-like a weak spring, and lower the error less."""
 
 
 def weighed_spring(

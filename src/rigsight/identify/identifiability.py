@@ -136,9 +136,14 @@ class _Quantity:
         return np.asarray(self.direction * self.power * (factor ** (1.0 / self.power) - 1.0))
 
 
-def _size_of_sum(value: float, first: _Quantity) -> float:
-    """Return the reference of relative changes of a sum: a sum that is zero by chance is as certain as its first term."""
-    return value if abs(value) > abs(first.size) else first.size
+def _sum(first: _Quantity, weight: float, second: _Quantity) -> _Quantity:
+    """Return ``first + weight second``."""
+    text = sum_text(first.text, weight, second.text, first.unit == second.unit)
+    value = first.value + weight * second.value
+    # A sum that is zero by chance is as certain as its first term.
+    size = value if abs(value) > abs(first.size) else first.size
+    members = (*first.members, *second.members)
+    return _Quantity(text, members, first.unit, value, size, first.direction * size / first.size)
 
 
 class _Search:
@@ -185,12 +190,8 @@ class _Search:
         if errors[index] < POORLY_KNOWN:
             return ""
         quantity = self._quantities.pop(index)
-        how = (
-            "it has no influence"
-            if errors[index] > _NO_INFLUENCE
-            else f"standard error {percent(errors[index])}"
-        )
-        return f"{quantity.text} is not determined ({how})."
+        none, how = errors[index] > _NO_INFLUENCE, f"standard error {percent(errors[index])}"
+        return f"{quantity.text} is not determined ({'it has no influence' if none else how})."
 
     def _pair(self) -> str:
         """Combine two quantities that compensate each other."""
@@ -211,7 +212,6 @@ class _Search:
         self, first: _Quantity, second: _Quantity, along_first: float, along_second: float
     ) -> tuple[_Quantity, str]:
         """Return the determined combination of two quantities that compensate each other: a product of powers, or a sum."""
-        members = (*first.members, *second.members)
         name = f"{first.text} and {second.text}"
         # A quantity that may be zero cannot be a factor.
         plain = all(quantity.size == quantity.value for quantity in (first, second))
@@ -224,18 +224,16 @@ class _Search:
             text = product_text([(first.text, a), (second.text, b)])
             value = first.value**a * second.value**b
             kind = "product" if b > 0 else "ratio"
+            members = (*first.members, *second.members)
             together = _Quantity(text, members, "", value, value, first.direction / a, a * first.power)
             return together, f"{name} only as their {kind} {text}."
         weight = -(first.size * along_first) / (second.size * along_second)
-        value = first.value + weight * second.value
-        size = _size_of_sum(value, first)
-        text = sum_text(first.text, weight, second.text, first.unit == second.unit)
+        together = _sum(first, weight, second)
         plain_sum = f"{first.text} + {second.text}", f"{first.text} - {second.text}"
-        kind = ("sum " if weight > 0.0 else "difference ") if text in plain_sum else ""
+        kind = ("sum " if weight > 0.0 else "difference ") if together.text in plain_sum else ""
         exact = self._change([first, second], [along_first, along_second], False) <= _UNCHANGED
         closely = "" if exact else ", close to these values"
-        words = f"{name} only as {'their ' if kind else ''}{kind}{text}{closely}."
-        return _Quantity(text, members, first.unit, value, size, first.direction * size / first.size), words
+        return together, f"{name} only as {'their ' if kind else ''}{kind}{together.text}{closely}."
 
     def _group(self, free: Floats) -> str:
         """Report quantities that can change together without a change of the outputs, and hold one of them."""
@@ -273,18 +271,8 @@ class _Search:
         slopes = [q.size * entry for q, entry in zip(members, along, strict=True)]
         # The text is clearest if the shared one is added to most of the others.
         shared = max(range(len(members)), key=lambda i: sum(slope * slopes[i] < 0.0 for slope in slopes))
-        held, made = members[shared], []
-        for q, slope in zip(members, slopes, strict=True):
-            if q is not held:
-                weight = -slope / slopes[shared]
-                text = sum_text(q.text, weight, held.text, q.unit == held.unit)
-                value = q.value + weight * held.value
-                size = _size_of_sum(value, q)
-                made.append(
-                    _Quantity(
-                        text, (*q.members, *held.members), q.unit, value, size, q.direction * size / q.size
-                    )
-                )
+        held, both = members[shared], zip(members, slopes, strict=True)
+        made = [_sum(q, -slope / slopes[shared], held) for q, slope in both if q is not held]
         self._quantities = [q for q in self._quantities if q not in members] + made
         return f"{listed([q.text for q in members])} only as {listed([q.text for q in made])}."
 

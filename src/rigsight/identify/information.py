@@ -30,13 +30,18 @@ TAKES_PART = 0.05
 """Share of the largest change, or influence, from which a parameter is a member of a direction."""
 ROUNDING = 1e-9
 """Entry of a unit direction below which it is rounding error."""
+_OWN_SIZE = 0.5
+"""Value over its characteristic size from which a parameter of either sign is its own reference, as a stiffness that gives the
+records their size."""
+_FOLLOWED = 1e-10
+"""Share of the largest influence of initial states below which a combination of them has none."""
+_STOPPED = 0.1
+"""Distance to the bound over the step that is asked for: a search that could still move would not stop before most of it."""
 
 
 def marginal_errors(root: Floats) -> Floats:
     """Return the standard error of each coordinate, infinite if it has a component in an undetermined direction."""
-    _, singular, right = np.linalg.svd(root, full_matrices=True)
-    sizes = np.zeros(root.shape[1])
-    sizes[: singular.size] = singular
+    sizes, right = _directions(root)
     with np.errstate(divide="ignore", invalid="ignore"):
         parts = np.where(np.abs(right) > ROUNDING, np.abs(right) / sizes[:, None], 0.0)
     return np.asarray(np.sqrt(np.sum(parts**2, axis=0)))
@@ -50,10 +55,14 @@ def conditional_errors(root: Floats) -> Floats:
 
 def undetermined(root: Floats) -> Floats:
     """Return an orthonormal basis of the directions with a larger standard error than a poorly known parameter."""
-    _, singular, right = np.linalg.svd(root, full_matrices=True)
-    sizes = np.zeros(root.shape[1])
-    sizes[: singular.size] = singular
+    sizes, right = _directions(root)
     return np.asarray(right[sizes * POORLY_KNOWN < 1.0].T)
+
+
+def _directions(root: Floats) -> tuple[Floats, Floats]:
+    """Return the singular value of each direction of the coordinates, zero included, and the directions as rows."""
+    _, singular, right = np.linalg.svd(root, full_matrices=True)
+    return np.pad(singular, (0, root.shape[1] - singular.size)), right
 
 
 def sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]]:
@@ -112,13 +121,6 @@ def percent(error: float) -> str:
 def _power(text: str, power: int) -> str:
     whole = f"({text})" if any(sign in text for sign in " */") else text
     return whole if power == 1 else f"{whole}^{power}"
-
-
-_OWN_SIZE = 0.5
-"""Value over its characteristic size from which a parameter of either sign is its own reference, as a stiffness that gives the
-records their size."""
-_FOLLOWED = 1e-10
-"""Share of the largest influence of initial states below which a combination of them has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,10 +237,6 @@ def _coloring(root: Floats, result: FitResult, names: Sequence[str], sizes: Floa
         & (white > 0.0)
     )
     return max(float(np.median(reported[seen] / white[seen])), 1.0) if np.any(seen) else 1.0
-
-
-_STOPPED = 0.1
-"""Distance to the bound over the step that is asked for: a search that could still move would not stop before most of it."""
 
 
 @dataclass(frozen=True)

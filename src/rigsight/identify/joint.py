@@ -86,8 +86,12 @@ def fit_jointly(
     """
     label = group_of or (lambda record: record.kind)
     groups = {name: [r for r in records if label(r) == name] for name in dict.fromkeys(map(label, records))}
-    if group_of is None:
-        _check_kinds(records, list(groups))
+    if group_of is None and len(groups) < 2:
+        found = f"all {len(records)} are of kind '{next(iter(groups))}'" if groups else "there are none"
+        raise InputError(
+            f"A joint fit compares records of different kinds, and {found}. Add steps to sweeps or sweeps to steps (Record.kind) "
+            "or use GreyBoxFit for one kind."
+        )
     _check_moves(structure, records)
     held = dict(known or {})
     begin = {**dict(start or {}), **constants, **held}
@@ -106,9 +110,8 @@ def fit_jointly(
     fit = GreyBoxFit(structure, records, scales, noise).fit(begin, free)
     if output_noise is None:
         for _ in range(_NOISE_ROUNDS):
-            found = _residual_noise(structure, fit, noise)
-            settled = all(abs(found[name] / noise[name] - 1.0) < _SETTLED for name in noise)
-            noise = found
+            before, noise = noise, _residual_noise(structure, fit, noise)
+            settled = all(abs(noise[name] / before[name] - 1.0) < _SETTLED for name in noise)
             fit = GreyBoxFit(structure, records, scales, noise).fit(fit.values, free, fit.initial_states)
             if settled:
                 break
@@ -117,27 +120,9 @@ def fit_jointly(
         alone = GreyBoxFit(structure, own, scales, noise).fit(fit.values, free)
         kinds.append(KindFit(kind, alone, _shift(alone, fit)))
     probability, differing = _same_set(kinds)
-    return JointFit(
-        fit,
-        noise,
-        tuple(kinds),
-        probability,
-        _statement(
-            "Records" if group_of else " and ".join(f"{k.kind}s" for k in kinds),
-            probability,
-            differing,
-            fit,
-        ),
-    )
-
-
-def _check_kinds(records: Sequence[Record], kinds: Sequence[str]) -> None:
-    if len(kinds) < 2:
-        found = f"all {len(records)} are of kind '{kinds[0]}'" if kinds else "there are none"
-        raise InputError(
-            f"A joint fit compares records of different kinds, and {found}. Add steps to sweeps or sweeps to steps (Record.kind) "
-            "or use GreyBoxFit for one kind."
-        )
+    compared = "Records" if group_of else " and ".join(f"{k.kind}s" for k in kinds)
+    statement = _statement(compared, probability, differing, fit)
+    return JointFit(fit, noise, tuple(kinds), probability, statement)
 
 
 def _check_moves(structure: Structure, records: Sequence[Record]) -> None:
@@ -170,12 +155,8 @@ def _residual_noise(structure: Structure, fit: FitResult, noise: Mapping[str, fl
 
 
 def _shift(alone: FitResult, joint: FitResult) -> dict[str, float]:
-    shift = {}
-    for name in joint.free:
-        error = alone.standard_errors[name]
-        known = 0.0 < error < np.inf
-        shift[name] = (alone.values[name] - joint.values[name]) / error if known else float("nan")
-    return shift
+    errors = {n: e if 0.0 < e < np.inf else float("nan") for n, e in alone.standard_errors.items()}
+    return {name: (alone.values[name] - joint.values[name]) / errors[name] for name in joint.free}
 
 
 def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
@@ -184,11 +165,8 @@ def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
     free = kinds[0].fit.free
     usable = [
         i
-        for i in range(len(free))
-        if all(
-            np.isfinite(k.fit.covariance[i, i]) and 0.0 < k.fit.standard_errors[free[i]] < np.inf
-            for k in kinds
-        )
+        for i, name in enumerate(free)
+        if all(np.isfinite(k.fit.covariance[i, i]) and np.isfinite(k.shift[name]) for k in kinds)
     ]
     if len(kinds) < 2 or not usable or not all(k.fit.residuals for k in kinds):
         return float("nan"), ()

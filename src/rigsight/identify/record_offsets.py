@@ -22,6 +22,9 @@ _LEAST_TOLD = 1e-6
 _NOTHING = 1e-6
 """Share of the information on a parameter that counts as rounding error: information contains squares of derivatives, which are
 accurate to a thousandth."""
+OFFSETS_MEND = (
+    'If the sensor was zeroed between records, write offsets = "per_record" at the top of campaign.toml.'
+)
 
 
 @dataclass(frozen=True)
@@ -43,11 +46,6 @@ class DifferingMeans:
             f"than by chance (probability {chance}), as if the offset of the sensor, or a constant force, "
             "differed from record to record."
         )
-
-
-OFFSETS_MEND = (
-    'If the sensor was zeroed between records, write offsets = "per_record" at the top of campaign.toml.'
-)
 
 
 def differing_means(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -55,8 +55,11 @@ class RigEquations:
         shown = tuple(Output(f"state {symbol.name}", (symbol,)) for symbol in own)
         self.structure = replace(alone, tree=replace(alone.tree, outputs=(*alone.tree.outputs, *shown)))
         self.n_coordinates = len(free)
+        self.inputs = [s for i in range(len(rig.inputs)) for s in input_symbols(i)]
+        """Symbols of the inputs, each with its first and second time derivative."""
         self.sensor_names = tuple(sensor.name for sensor in mechanism.sensors)
         self.state_names = tuple(symbol.name for symbol in own)
+        self._functions: dict[str, Any] = {}
 
     @property
     def n_states(self) -> int:
@@ -100,7 +103,7 @@ class RigEquations:
         if n == 0:
             return np.zeros((0, z.shape[1]))
         mass = self.mass(z, u, p)
-        forces = np.moveaxis(self._evaluated(self._forces, z, u, p), 0, 1)
+        forces = np.moveaxis(self._values("forces", z, u, p), 0, 1)
         with np.errstate(all="ignore"):
             solved = np.linalg.solve(mass, forces[:, :, None])
         return np.asarray(solved[:, :, 0].T, dtype=np.float64)
@@ -108,46 +111,43 @@ class RigEquations:
     def mass(self, z: Floats, u: Floats, p: Floats) -> Floats:
         """Return the mass matrix, shape (n_samples, n_coordinates, n_coordinates)."""
         n = self.n_coordinates
-        return np.moveaxis(self._evaluated(self._mass, z, u, p).reshape(n, n, z.shape[1]), 2, 0)
+        return np.moveaxis(self._values("mass", z, u, p).reshape(n, n, z.shape[1]), 2, 0)
 
     def rates(self, z: Floats, u: Floats, p: Floats) -> Floats:
         """Return the time derivatives of the states, shape (n_states, n_samples)."""
         n = self.n_coordinates
-        own = self._evaluated(self._own_rates, z, u, p)
+        own = self._values("own rates", z, u, p)
         return np.concatenate([z[n : 2 * n], self.accelerations(z, u, p), own])
 
     def readings(self, z: Floats, u: Floats, p: Floats) -> Floats:
         """Return the readings of the rig's sensors, shape (n_sensors, n_samples)."""
-        return self._evaluated(self._readings, z, u, p)
+        return self._values("readings", z, u, p)
 
     def reading_slopes(self, z: Floats, u: Floats, p: Floats) -> Floats:
         """Return the time derivatives of the readings, shape (n_sensors, n_samples)."""
-        n_sensors = len(self.sensor_names)
-        by_state = self._evaluated(self._by_state, z, u, p).reshape(n_sensors, self.n_states, z.shape[1])
-        by_input = self._evaluated(self._by_input, z, u, p).reshape(n_sensors, u.shape[0], z.shape[1])
-        own = np.einsum("ijk,jk->ik", by_state, self.rates(z, u, p))
-        return np.asarray(own + np.einsum("ijk,jk->ik", by_input, _input_rates(u)))
+        by_input = self._values("by input", z, u, p).reshape(len(self.sensor_names), *u.shape)
+        own = np.einsum("ijk,jk->ik", self.readings_by_state(z, u, p), self.rates(z, u, p))
+        # The third derivative of an input is unknown.
+        rising = np.zeros_like(u)
+        rising[0::3], rising[1::3] = u[1::3], u[2::3]
+        return np.asarray(own + np.einsum("ijk,jk->ik", by_input, rising))
 
     def readings_by_state(self, z: Floats, u: Floats, p: Floats) -> Floats:
         """Return the derivatives of the readings by the states, shape (n_sensors, n_states, n_samples)."""
-        return self._evaluated(self._by_state, z, u, p).reshape(
-            len(self.sensor_names), self.n_states, z.shape[1]
-        )
+        return self._values("by state", z, u, p).reshape(len(self.sensor_names), self.n_states, z.shape[1])
 
     def at_places(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
         """Return motion and forces of joints and drives, shape (n_samples,) each."""
         # ``motion@J`` (from rest), ``rate@J``, ``spring@J``, ``damper@J``, ``own@J`` (other resisting forces) of a joint,
         # ``signal@D`` and ``force@D`` of a drive, ``error@D`` and ``command@D`` of its controller.
-        rows = self._evaluated(self._of_places[1], z, u, p)
-        return dict(zip(self._of_places[0], rows, strict=True))
+        return dict(zip(self._of_places, self._values("of places", z, u, p), strict=True))
 
     def slopes_along(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
         """Return the derivatives of the motion of each joint and of each drive by the degrees of freedom."""
         # Shape (n_coordinates, n_samples) each.
         mechanism = self.rig.mechanism
         places = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
-        shape = (len(places), self.n_coordinates, z.shape[1])
-        rows = np.reshape(self._evaluated(self._along, z, u, p), shape)
+        rows = np.reshape(self._values("along", z, u, p), (len(places), self.n_coordinates, z.shape[1]))
         return dict(zip(places, rows, strict=True))
 
     def changes_of_equations(
@@ -165,15 +165,36 @@ class RigEquations:
         by_parameter = rows_of(slopes(*arguments), z.shape[1])
         return np.array(largest), by_parameter.reshape(len(ends), p.size, z.shape[1])
 
-    def _evaluated(self, function: Any, z: Floats, u: Floats, p: Floats) -> Floats:
+    def _values(self, what: str, z: Floats, u: Floats, p: Floats) -> Floats:
+        """Return the values of some expressions; their function is made when it is first needed."""
+        if what not in self._functions:
+            self._functions[what] = self._function(self._expressions(what))
         with np.errstate(all="ignore"):
-            return rows_of(function(*z, *u, 0.0, *p), z.shape[1])
+            return rows_of(self._functions[what](*z, *u, 0.0, *p), z.shape[1])
+
+    def _expressions(self, what: str) -> list[sp.Expr]:
+        tree, mechanism = self.structure.tree, self.rig.mechanism
+        moved = [*(joint.motion for joint in mechanism.joints), *(drive.along for drive in mechanism.drives)]
+
+        def slopes(of: Sequence[sp.Expr], by: Sequence[sp.Symbol]) -> list[sp.Expr]:
+            return [derivative(expression, symbol) for expression in of for symbol in by]
+
+        expressions: dict[str, Callable[[], list[sp.Expr]]] = {
+            "mass": lambda: self.mass_entries,
+            "forces": lambda: self.forces,
+            "own rates": lambda: [tree.flattened(state.rate) for state in tree.states],
+            "readings": lambda: self._sensor_expressions,
+            "by state": lambda: slopes(self._sensor_expressions, self.structure.states),
+            "by input": lambda: slopes(self._sensor_expressions, self.inputs),
+            "of places": lambda: self._bound(list(self._of_places.values())),
+            "along": lambda: self._bound(slopes(moved, [c.symbol for c in mechanism.free])),
+        }
+        return expressions[what]()
 
     @cached_property
     def arguments(self) -> list[sp.Symbol]:
         """Symbols of states, inputs with their derivatives, time and parameters, in the order of the functions' arguments."""
-        inputs = [s for i in range(len(self.rig.inputs)) for s in input_symbols(i)]
-        return [*self.structure.states, *inputs, TIME, *self.structure.parameter_symbols]
+        return [*self.structure.states, *self.inputs, TIME, *self.structure.parameter_symbols]
 
     @cached_property
     def momenta_and_forces(self) -> tuple[list[sp.Expr], list[sp.Expr]]:
@@ -236,58 +257,22 @@ class RigEquations:
         return both.function([*self.arguments, *further], [FUNCTIONS, "numpy"])
 
     @cached_property
-    def _mass(self) -> Any:
-        return self._function(self.mass_entries)
-
-    @cached_property
-    def _forces(self) -> Any:
-        return self._function(self.forces)
-
-    @cached_property
-    def _own_rates(self) -> Any:
-        tree = self.structure.tree
-        return self._function([tree.flattened(state.rate) for state in tree.states])
-
-    @cached_property
     def _sensor_expressions(self) -> list[sp.Expr]:
         return list(self.structure.outputs[: len(self.sensor_names)])
 
     @cached_property
-    def _readings(self) -> Any:
-        return self._function(self._sensor_expressions)
-
-    @cached_property
-    def _by_state(self) -> Any:
-        return self._function(
-            [derivative(e, symbol) for e in self._sensor_expressions for symbol in self.structure.states]
-        )
-
-    @cached_property
-    def _by_input(self) -> Any:
-        inputs = [s for i in range(len(self.rig.inputs)) for s in input_symbols(i)]
-        return self._function([derivative(e, symbol) for e in self._sensor_expressions for symbol in inputs])
-
-    @cached_property
-    def _of_places(self) -> tuple[list[str], Any]:
+    def _of_places(self) -> dict[str, sp.Expr]:
         mechanism = self.rig.mechanism
         wanted: dict[str, sp.Expr] = {}
         for joint in mechanism.joints:
-            wanted |= _of_joint(joint, self.rig)
+            motions = {"motion": joint.motion - joint.rest, "rate": mechanism.rate(joint.motion)}
+            forces = dict(zip(("spring", "damper", "own"), _resisting(joint, self.rig), strict=True))
+            wanted |= {f"{what}@{joint.name}": own for what, own in {**motions, **forces}.items()}
         for drive in mechanism.drives:
             wanted |= {f"signal@{drive.name}": drive.signal, f"force@{drive.name}": drive.force}
         for name, law in self.rig.controllers.items():
-            wanted |= {
-                f"error@{name}": law.error,
-                f"command@{name}": law.command,
-            }
-        return list(wanted), self._function(self._bound(list(wanted.values())))
-
-    @cached_property
-    def _along(self) -> Any:
-        mechanism = self.rig.mechanism
-        moved = [*(joint.motion for joint in mechanism.joints), *(drive.along for drive in mechanism.drives)]
-        slopes = [derivative(motion, c.symbol) for motion in moved for c in mechanism.free]
-        return self._function(self._bound(slopes))
+            wanted |= {f"error@{name}": law.error, f"command@{name}": law.command}
+        return wanted
 
     def _bound(self, expressions: list[sp.Expr]) -> list[sp.Expr]:
         structure = self.structure
@@ -320,17 +305,6 @@ class RigEquations:
         return together, slopes, [int(end) for end in ends]
 
 
-def _of_joint(joint: Joint, rig: Rig) -> dict[str, sp.Expr]:
-    spring, damper, own = _resisting(joint, rig)
-    return {
-        f"motion@{joint.name}": joint.motion - joint.rest,
-        f"rate@{joint.name}": rig.mechanism.rate(joint.motion),
-        f"spring@{joint.name}": spring,
-        f"damper@{joint.name}": damper,
-        f"own@{joint.name}": own,
-    }
-
-
 def _resisting(joint: Joint, rig: Rig) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     """Return the forces that resist the motion of a joint: spring, damper, and its own force."""
     spring = joint.stiffness * (joint.motion - joint.rest)
@@ -343,10 +317,3 @@ def rows_of(values: Any, n_samples: int) -> Floats:
     for row, value in zip(found, values, strict=True):
         row[:] = value
     return found
-
-
-def _input_rates(u: Floats) -> Floats:
-    """Return the time derivatives of inputs and their derivatives; zero for the third derivative, which is unknown."""
-    rates = np.zeros_like(u)
-    rates[0::3], rates[1::3] = u[1::3], u[2::3]
-    return rates

@@ -2,6 +2,7 @@
 
 from rigsight.libraries import cache_folder as cache_folder
 from rigsight.simulate.compiled.kernel import FittedRecord as FittedRecord
+from rigsight.simulate.compiled.kernel import kernel_of as kernel_of
 from rigsight.simulate.equations.composition import compose as compose
 from rigsight.simulate.equations.composition import structure_named as structure_named
 from rigsight.simulate.equations.composition import structure_of_fit as structure_of_fit
@@ -15,11 +16,9 @@ from rigsight.simulate.side_by_side import carries_tangents as carries_tangents
 from rigsight.simulate.side_by_side import choose_substeps as choose_substeps
 from rigsight.simulate.side_by_side import differs_at_events as differs_at_events
 from rigsight.simulate.side_by_side import has_dry_friction as has_dry_friction
-from rigsight.simulate.side_by_side import normal_equations as normal_equations
 from rigsight.simulate.side_by_side import simulate_sets as simulate_sets
 from rigsight.simulate.side_by_side import simulate_tangents as simulate_tangents
 from rigsight.simulate.side_by_side import state_limits as state_limits
-from rigsight.simulate.side_by_side import tangent_equations as tangent_equations
 from rigsight.simulate.simulation import parameter_vector as parameter_vector
 from rigsight.simulate.simulation import record_input as record_input
 from rigsight.simulate.simulation import record_values as record_values

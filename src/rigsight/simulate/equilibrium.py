@@ -111,16 +111,13 @@ def _quiet_parameters(structure: Structure, p: Floats, critical_damping: float) 
     damping = structure.names.index(structure.rig.motion.damping.name)
     quiet[damping] = max(p[damping], critical_damping)
     for effect in structure.effects:
-        if effect.delay is not None:
-            for own_name, null in effect.null_values().items():
-                name = structure.parameter_name(effect, own_name)
-                if name in structure.names:
-                    quiet[structure.names.index(name)] = null
+        silent = dict(effect.null_values()) if effect.delay is not None else {}
         if effect.place is Place.DISTURBANCE:
-            for parameter in effect.parameters:
-                name = structure.parameter_name(effect, parameter.name)
-                if name in structure.names:
-                    quiet[structure.names.index(name)] = 0.0
+            silent |= {parameter.name: 0.0 for parameter in effect.parameters}
+        for own_name, value in silent.items():
+            name = structure.parameter_name(effect, own_name)
+            if name in structure.names:
+                quiet[structure.names.index(name)] = value
     return quiet
 
 
@@ -240,7 +237,9 @@ def _balance_of(structure: Structure) -> _Balance:
     before = [sp.Symbol(f"before {i}", real=True) for i in range(len(structure.states))]
     residuals, memories = residuals_at_rest(structure, before, limited, signs)
     turned = [speed.xreplace(_moved(structure, before)) for speed in frozen.speeds(structure)]
-    arguments = _arguments(structure, before, len(frozen.frictions))
+    inputs = [input_symbols(i)[0] for i in range(len(structure.rig.inputs))]
+    multipliers = [FrozenStructure.friction_sign(i) for i in range(len(frozen.frictions))]
+    arguments = [list(structure.parameter_symbols), inputs, list(structure.states), before, multipliers]
     functions = [
         {"positive_part": lambda x: max(x, 0.0), "limited": lambda x, end: min(max(x, -end), end)},
         "numpy",
@@ -307,12 +306,6 @@ def _moved(structure: Structure, before: Sequence[sp.Expr]) -> dict[sp.Expr, sp.
     motion = structure.tree.motion
     pairs = zip(motion.velocities, motion.coordinates, before, strict=False)
     return {**_steady(structure), **{velocity: now - then for velocity, now, then in pairs}}
-
-
-def _arguments(structure: Structure, before: Sequence[sp.Symbol], n_frictions: int) -> list[list[sp.Symbol]]:
-    inputs = [input_symbols(i)[0] for i in range(len(structure.rig.inputs))]
-    signs = [FrozenStructure.friction_sign(i) for i in range(n_frictions)]
-    return [list(structure.parameter_symbols), inputs, list(structure.states), list(before), signs]
 
 
 def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.records.record import Floats
-from rigsight.simulate.compiled.kernel import FittedRecord, kernel_of
+from rigsight.simulate.compiled.kernel import kernel_of
 from rigsight.simulate.equations.kinks import freeze
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
@@ -48,42 +46,18 @@ def simulate_sets(
     """
     held, p = read_ahead(structure, held, p)
     if structure.late_inputs is None:
-        return _one_by_one(structure, held, p, initial_states, n_samples)
+        # Each needs a history of its own.
+        sets, tolerance = [], LOCAL_PER_GLOBAL * DEFAULT_ACCURACY
+        for own, state in zip(p.T, initial_states.T, strict=True):
+            begin = state_vector(structure, state)
+            status, out, _ = kernel_of(structure).simulate_one(held, own, begin, tolerance, n_samples)
+            sets.append(out if status == 0 else np.full_like(out, np.nan))
+        return as_measured(structure, p, np.stack(sets, axis=2), held)
     steps = Substeps.per_piece(
         substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
     )
     out = kernel_of(structure).simulate_lanes(held, p, initial_states, steps, n_samples)
     return as_measured(structure, p, out, held)
-
-
-def _one_by_one(
-    structure: Structure, held: HeldInput, p: Floats, initial_states: Floats, n_samples: int
-) -> Floats:
-    """Return the outputs of sets that each need a history of their own, shape (n_samples, n_outputs, n_sets)."""
-    sets = []
-    for own, state in zip(p.T, initial_states.T, strict=True):
-        status, out, _ = kernel_of(structure).simulate_one(
-            held, own, state_vector(structure, state), LOCAL_PER_GLOBAL * DEFAULT_ACCURACY, n_samples
-        )
-        sets.append(out if status == 0 else np.full_like(out, np.nan))
-    return as_measured(structure, p, np.stack(sets, axis=2), held)
-
-
-def normal_equations(
-    structure: Structure, records: Sequence[FittedRecord], p: Floats, initial_states: Floats
-) -> Floats:
-    """Return the products of weighted residuals and differences that least squares need, shape (n_records, n_sets, n_sets).
-
-    Outputs are not stored: for many records and sets, moving them through memory would take longer than computing them.
-    Parameters have the shape (n_parameters, n_sets), initial states (n_records, n_states, n_sets). The kernel has no tangents,
-    and a ValueError is raised for a delayed sensor, because its reading is interpolated afterwards, or if another signal than an
-    input is delayed.
-    """
-    if structure.is_shifted or structure.late_inputs is None:
-        raise ValueError(
-            "The reading of a delayed sensor is available only after the whole record has been simulated."
-        )
-    return kernel_of(structure).normal_equations(records, p, initial_states)
 
 
 def carries_tangents(structure: Structure) -> bool:
@@ -103,23 +77,6 @@ def has_dry_friction(structure: Structure) -> bool:
     return bool(freeze(structure).frictions)
 
 
-def tangent_equations(
-    structure: Structure,
-    records: Sequence[FittedRecord],
-    p: Floats,
-    dp: Floats,
-    initial_states: Floats,
-    initial_slopes: Floats,
-) -> Floats:
-    """Return the products of weighted residuals and their derivatives that a least-squares step needs for some records.
-
-    Their shape is (n_records, 1 + n_directions, 1 + n_directions). Parameters have the shape (n_parameters,), their derivatives
-    along each direction (n_parameters, n_directions), initial states (n_records, n_states) and their derivatives, the same for
-    all records, (n_states, n_directions). The kernel must have tangents.
-    """
-    return kernel_of(structure).tangent_equations(records, p, dp, initial_states, initial_slopes)
-
-
 def simulate_tangents(
     structure: Structure,
     held: HeldInput,
@@ -133,7 +90,8 @@ def simulate_tangents(
     """Simulate one parameter set with its derivatives along any directions of parameters and initial states.
 
     The derivatives of the equations are integrated with the motion, including the reversal of a velocity under dry friction and
-    the jump of a delayed held input. No difference step has to be chosen. Shapes are those of `tangent_equations` for one record;
+    the jump of a delayed held input. No difference step has to be chosen. Shapes are those of `Kernel.tangent_equations` for one
+    record;
     that of the result is (n_samples, n_outputs, 1 + n_directions): the outputs, then their derivatives.
     """
     steps = Substeps.per_piece(

@@ -52,17 +52,14 @@ def record_input(structure: Structure, record: Record) -> HeldInput:
             return hold_accelerated_motion(*accelerated_motion(record[name], record.dt), record.dt)
         return hold_motion(*smooth_motion(record[name], record.dt), record.dt)
 
+    def observed(sensor: str) -> HeldInput:
+        if sensor not in record:
+            return hold_input(np.zeros(record.n_samples), record.dt, "foh")
+        return hold_motion(*smooth_motion(record[sensor], record.dt), record.dt)
+
     return together(
-        [held(index, name) for index, name in enumerate(mechanism.inputs)]
-        + [_observed(record, sensor) for sensor in structure.observed]
+        [*(held(*each) for each in enumerate(mechanism.inputs)), *map(observed, structure.observed)]
     )
-
-
-def _observed(record: Record, sensor: str) -> HeldInput:
-    """Return the measured motion that an observer follows; zero if the record does not contain the sensor."""
-    if sensor not in record:
-        return hold_input(np.zeros(record.n_samples), record.dt, "foh")
-    return hold_motion(*smooth_motion(record[sensor], record.dt), record.dt)
 
 
 def simulate(
@@ -227,20 +224,14 @@ def as_measured(structure: Structure, p: Floats, out: Floats, held: HeldInput) -
     late = [(i, delay) for i, delay in enumerate(structure.shown_late) if delay is not None]
     for column, (output, delay) in enumerate(late, len(structure.outputs)):
         values = at_parameters(structure, delay, p)
-        delays = np.broadcast_to(values, p.shape[1])
-        visible[:, output] = _shifted(out[:, output], out[:, column] * dt, delays / dt)
+        delays, rise = np.broadcast_to(values, p.shape[1]) / dt, out[:, column] * dt
+        for i, own in enumerate(delays):
+            visible[:, output, i] = _delayed(out[:, output, i].copy(), rise[:, i].copy(), float(own))
     return visible
 
 
-def _shifted(value: Floats, rise: Floats, delays: Floats) -> Floats:
-    """Return values, shape (n_samples, n_sets), delayed by numbers of samples (n_sets,); `rise` is their slope per sample."""
-    shifted = np.empty_like(value)
-    for i, delay in enumerate(delays):
-        shifted[:, i] = _delayed(value[:, i].copy(), rise[:, i].copy(), float(delay))
-    return shifted
-
-
 def _delayed(value: Floats, rise: Floats, delay: float) -> Floats:
+    """Return values, shape (n_samples,), delayed by a number of samples; `rise` is their slope per sample."""
     if not np.isfinite(delay):
         return np.full_like(value, np.nan)
     n_samples = value.size

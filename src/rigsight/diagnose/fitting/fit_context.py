@@ -12,7 +12,7 @@ from rigsight.diagnose.policy import HORIZON
 from rigsight.effects import Effect, Place, placed
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads, free_names
-from rigsight.identify.fit.prior import Prior
+from rigsight.identify.fit.fit_data import Prior
 from rigsight.identify.fit.windows import cut, strongest
 from rigsight.inverse import NumbersBeside
 from rigsight.records.record import Floats, Record

@@ -78,17 +78,10 @@ class Coordinates:
         chosen = [parameters[name] for name in free]
         scale = np.array([characteristic_value(p.dimension, scales) for p in chosen])
         logarithmic = np.array([p.logarithmic for p in chosen], dtype=bool)
-        bounds = [_bounds(p, s) for p, s in zip(chosen, scale, strict=True)]
         # From negative stiffness, with which a simulation diverges, a search seldom returns: the start has the right sign.
         returning = [name in structure.rig.usually_positive and values[name] > 0.0 for name in free]
-        lower = np.array(
-            [
-                max(b[0], 0.0) if keeps and not p.logarithmic else b[0]
-                for b, p, keeps in zip(bounds, chosen, returning, strict=True)
-            ],
-            dtype=np.float64,
-        )
-        upper = np.array([b[1] for b in bounds], dtype=np.float64)
+        bounds = [_bounds(*own) for own in zip(chosen, scale, returning, strict=True)]
+        lower, upper = np.array(bounds, dtype=np.float64).reshape(-1, 2).T.copy()
         pairs = []
         searched = [(effect, pair) for effect in structure.effects for pair in effect.searched_as]
         for effect, pair in searched:
@@ -230,9 +223,9 @@ def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
     return None
 
 
-def _bounds(parameter: Parameter, scale: float) -> tuple[float, float]:
+def _bounds(parameter: Parameter, scale: float, is_returning: bool) -> tuple[float, float]:
     low = max(parameter.lower / scale, parameter.search[0])
     high = min(parameter.upper / scale, parameter.search[1])
     if parameter.logarithmic:
         return float(np.log(max(low, 1e-12))), float(np.log(min(high, 1e12)))
-    return low, high
+    return max(low, 0.0) if is_returning else low, high

@@ -30,6 +30,8 @@ _MARGIN = 3.0
 taken along it."""
 _SHARES = (1.0, 0.3, 0.1, 0.03)
 """Shares of a step; the largest that lowers the cost is taken, because the linearization may not hold for a whole step."""
+_FOLLOWED = 1e-9
+"""Share of the strongest direction below which a combination of initial states has no influence."""
 
 
 @dataclass(frozen=True)
@@ -94,15 +96,11 @@ def own_derivatives(
         size[size == 0.0] = 1.0
         smallest = max(_LEAST_SLOPE, _MARGIN * evaluated.derivative_error)
         scaled = slopes / size
-        step = (
-            -np.linalg.pinv(scaled.T @ scaled, rcond=smallest**2, hermitian=True)
-            @ (scaled.T @ residual)
-            / size
-        )
+        inverse = np.linalg.pinv(scaled.T @ scaled, rcond=smallest**2, hermitian=True)
+        step = -inverse @ (scaled.T @ residual) / size
         promised = float(residual @ residual) - float(np.sum((residual + slopes @ step) ** 2))
         if not promised > worth_a_step * float(residual @ residual):
             break
-        ahead = None
         for share in _SHARES:
             there = theta + share * step
             there[:n_free] = np.clip(there[:n_free], coordinates.lower, coordinates.upper)
@@ -110,11 +108,10 @@ def own_derivatives(
             # A motion that diverges is no improvement.
             with np.errstate(over="ignore", invalid="ignore"):
                 if float(tried[0] @ tried[0]) < float(residual @ residual):
-                    ahead = tried
                     break
-        if ahead is None:
+        else:
             break
-        theta, (residual, slopes) = there, ahead
+        theta, (residual, slopes) = there, tried
     if theta is start:
         return None
     p = coordinates.to_parameters(theta[:n_free])
@@ -132,10 +129,6 @@ def _of_record(evaluated: Problem, index: int, sensitivity: tuple[Floats, Floats
     return RecordDerivatives(residual, slopes[:, :n_free], slopes[:, n_free:], measured)
 
 
-_FOLLOWED = 1e-9
-"""Share of the strongest direction below which a combination of initial states has no influence."""
-
-
 class OneStep:
     """Gauss-Newton steps from the end of a fit with standard errors; initial states and offsets are free as there."""
 
@@ -149,7 +142,7 @@ class OneStep:
         for _, derivative in central_sensitivities(problem, theta):
             if not np.all(np.isfinite(derivative)):
                 raise SimulationError("The derivatives of the fit overflow.")
-            basis = _basis(derivative[:, n_free:])
+            basis = orthonormal_basis(derivative[:, n_free:], _FOLLOWED)
             own = derivative[:, :n_free]
             self._followed.append(basis)
             self._rows.append(own - basis @ (basis.T @ own))
@@ -206,11 +199,11 @@ class OneStep:
         return stacked
 
 
-def _basis(columns: Floats) -> Floats:
-    """Return an orthonormal basis of the span of the columns, shape (n, rank)."""
+def orthonormal_basis(columns: Floats, least: float) -> Floats:
+    """Return an orthonormal basis of the columns' span, shape (n, rank), without what is below a share of the strongest."""
     size = np.linalg.norm(columns, axis=0)
-    remainder, singular, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
-    return np.asarray(remainder[:, singular > _FOLLOWED * np.max(singular, initial=0.0)])
+    base, singular, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+    return np.asarray(base[:, singular > least * np.max(singular, initial=0.0)])
 
 
 def place_of_fit(

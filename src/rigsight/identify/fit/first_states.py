@@ -7,7 +7,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.effects import Place, State
@@ -17,6 +16,7 @@ from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure
+from rigsight.simulate.equations.derivatives import declared_start
 from rigsight.units import parse_dimension
 
 _FIRST_SAMPLES = 7
@@ -32,6 +32,7 @@ _MOST_EVALUATIONS = 100
 _HUGE = 1e6
 _OF_SIGNALS = (Place.ACTUATOR, Place.CONTROLLER, Place.SENSOR)
 _CONTROL = ("error", "command")
+_known: WeakKeyDictionary[Record, dict[tuple[RigEquations, int | None], Floats]] = WeakKeyDictionary()
 
 
 def first_state(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
@@ -55,9 +56,8 @@ def state_at_rest(structure: Structure, record: Record, guess: Floats, values: M
         own = rig_state(equations, record, values, resting=count)
         state[: own.size] = own
         return state
-    record = _without(
-        record, dict(zip(structure.offsets, guess[guess.size - len(structure.offsets) :], strict=True))
-    )
+    offsets = guess[guess.size - len(structure.offsets) :]
+    record = _without(record, dict(zip(structure.offsets, offsets, strict=True)))
     state[0], state[1] = float(np.mean(record[rig.outputs[0].name][:count])), 0.0
     for i, name in enumerate(structure.state_names):
         if name in record and i > 1:
@@ -86,9 +86,6 @@ def rig_state(
     return known[key].copy()
 
 
-_known: WeakKeyDictionary[Record, dict[tuple[RigEquations, int | None], Floats]] = WeakKeyDictionary()
-
-
 def _rig_state(
     equations: RigEquations,
     record: Record,
@@ -103,7 +100,7 @@ def _rig_state(
     """
     p = equations.parameters(values, record)
     u = equations.inputs_of(record.slice(0, min(record.n_samples, _FIRST_SAMPLES)))[1][:, :1]
-    begin = _declared(equations, p)
+    begin = declared_start(equations.structure, p)
     if pull > 0.0:
         begin = _equilibrium(equations, begin, u, p)
     seen = [i for i, name in enumerate(equations.sensor_names) if name in record]
@@ -170,9 +167,8 @@ def _guessed_offsets(structure: Structure, record: Record, values: Mapping[str, 
     elif stiffness > 0.0:
         levels = {response: rest + (evaluated(motion.drive_gain, values) * mean[source] + bias) / stiffness}
     else:
-        return dict.fromkeys(
-            structure.offsets, 0.0
-        )  # without a spring it cannot be distinguished from the position
+        # Without a spring it cannot be distinguished from the position.
+        return dict.fromkeys(structure.offsets, 0.0)
     if rig.follower is not None:
         follower = rig.follower
         own = {**values, follower.symbol.name: 0.0}
@@ -187,14 +183,6 @@ def _without(record: Record, offsets: Mapping[str, float]) -> Record:
     return record.with_signals(**own) if own else record
 
 
-def _declared(equations: RigEquations, p: Floats) -> Floats:
-    """Return the declared start, zero for states without one."""
-    state, values = np.zeros(equations.n_states), dict(zip(equations.structure.names, p, strict=True))
-    for symbol, expression in equations.rig.mechanism.initial.items():
-        state[equations.state_names.index(symbol.name)] = evaluated(expression, values)
-    return state
-
-
 def _equilibrium(equations: RigEquations, declared: Floats, u: Floats, p: Floats) -> Floats:
     """Return the equilibrium under an input closest to the declared start; what is declared or without a force stays there."""
     n, state = equations.n_coordinates, declared.copy()
@@ -203,12 +191,13 @@ def _equilibrium(equations: RigEquations, declared: Floats, u: Floats, p: Floats
     held[[equations.state_names.index(symbol.name) for symbol in equations.rig.mechanism.initial]] = False
     resting = state.copy()
     resting[n : 2 * n] = 0.0
+    # Two of three rows are derivatives of inputs.
+    steady = np.where((np.arange(u.shape[0]) % 3 > 0)[:, None], 0.0, u)
 
     def unbalanced(place: Floats) -> Floats:
         z = resting.copy()
         z[held] = place
-        rates = equations.rates(z[:, None], np.where(_is_rate(u), 0.0, u), p)[n:, 0]
-        return _finite(rates)
+        return _finite(equations.rates(z[:, None], steady, p)[n:, 0])
 
     if np.any(held):
         found = least_squares(unbalanced, state[held], x_scale="jac", max_nfev=_MOST_EVALUATIONS)
@@ -220,11 +209,6 @@ def _equilibrium(equations: RigEquations, declared: Floats, u: Floats, p: Floats
 def _finite(values: Floats) -> Floats:
     """Return values with NaN and infinity replaced by large values."""
     return np.nan_to_num(values, nan=_HUGE, posinf=_HUGE, neginf=-_HUGE)
-
-
-def _is_rate(u: Floats) -> NDArray[np.bool_]:
-    """Return True for the rows of `u` that are derivatives of inputs."""
-    return (np.arange(u.shape[0]) % 3 > 0)[:, None]
 
 
 def _level_and_slope(signal: Floats, dt: float, resting: int | None) -> tuple[float, float]:

@@ -12,11 +12,23 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.idle_threads import IdleThreads
-from rigsight.identify.fit.prior import Prior
 from rigsight.records.record import Floats, Record
-from rigsight.simulate import Structure, Substeps, record_input, record_values, state_limits
+from rigsight.simulate import (
+    Structure,
+    Substeps,
+    record_input,
+    record_values,
+    simulate_outputs,
+    simulate_sets,
+    state_limits,
+)
 from rigsight.simulate.input_hold import HeldInput
+
+Result = TypeVar("Result")
+_LEAST_RANGE = 1e-9
+"""Smallest unit of a state with a limited range, relative to its size, because a play of zero has no range."""
 
 
 @dataclass(frozen=True)
@@ -96,12 +108,6 @@ def fit_key(problem: Sequence[Any], theta: Floats, settings: Sequence[Any]) -> s
     return digest.hexdigest()
 
 
-Result = TypeVar("Result")
-
-_LEAST_RANGE = 1e-9
-"""Smallest unit of a state with a limited range, relative to its size, because a play of zero has no range."""
-
-
 @dataclass(frozen=True)
 class RecordData:
     """One record in the form that a fit needs."""
@@ -150,6 +156,16 @@ class FitData:
         """Return the results of a function for the index of each record, in their order."""
         return self.threads.results(one, [record.record.n_samples for record in self.records])
 
+    def simulated(self, record: RecordData, p: Floats, states: Floats, substeps: int | Substeps) -> Floats:
+        """Return the outputs of parameter sets on a record, see `simulate_sets`."""
+        n_samples = record.record.n_samples
+        return simulate_sets(self.structure, record.held, record.parameters(p), states, n_samples, substeps)
+
+    def accurate(self, record: RecordData, p: Floats, state: Floats, accuracy: float) -> Floats:
+        """Return the accurately simulated outputs of one parameter set on a record, shape (n_samples, n_outputs)."""
+        n_samples = record.record.n_samples
+        return simulate_outputs(self.structure, record.held, record.parameters(p), state, n_samples, accuracy)
+
     def state_sizes(self, p: Floats) -> Floats:
         """Return the unit of each initial state in the fit, shape (n_states, n_sets)."""
         # A state with a limited range is fitted in units of that range, which may depend on the parameters: beyond its ends the
@@ -196,3 +212,23 @@ def free_names(structure: Structure, of_rig: Iterable[str]) -> list[str]:
         own = (structure.parameter_name(effect, p.name) for p in effect.parameters if p.fitted)
         names.update(name for name in own if name not in fixed)
     return [name for name in structure.names if name in names]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Costs d^T C d more per reading, in its squared noise, where the parameters differ by d from known values."""
+
+    names: tuple[str, ...]
+    values: Floats  # shape (n,), in units of the parameters
+    curvature: Floats  # C, shape (n, n), symmetric, in reciprocal units of two parameters
+
+    def add(
+        self, coordinates: Coordinates, theta: Floats, n_readings: int, normal: Floats, gradient: Floats
+    ) -> float:
+        """Add the normal equations of this cost in place to those of the first coordinates, and return the cost."""
+        at = [coordinates.structure.names.index(name) for name in self.names]
+        away = coordinates.to_parameters(theta)[at] - self.values
+        slopes, curvature = coordinates.derivatives(theta)[at], n_readings * self.curvature
+        normal[: theta.size, : theta.size] += slopes.T @ curvature @ slopes
+        gradient[: theta.size] += slopes.T @ curvature @ away
+        return float(away @ curvature @ away)

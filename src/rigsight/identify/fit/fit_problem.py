@@ -24,10 +24,8 @@ from rigsight.simulate import (
     carries_tangents,
     choose_substeps,
     differs_at_events,
-    normal_equations,
-    simulate_sets,
+    kernel_of,
     simulate_tangents,
-    tangent_equations,
 )
 
 MOST_SUBSTEPS = 16
@@ -89,7 +87,8 @@ class Problem:
         self.n_free = len(coordinates.free)
         self.n_evaluations = 0
         self.substeps = [Substeps(MOST_SUBSTEPS)] * len(data.records)
-        self._fitted: list[tuple[Substeps, FittedRecord]] = []
+        self._fitted: list[FittedRecord] = []
+        self._fitted_with: list[Substeps] = []
         self._last: Evaluation | None = None
         self._best = float("inf")
 
@@ -101,21 +100,14 @@ class Problem:
 
     def choose_substeps(self, theta: Floats) -> None:
         """Choose the substeps of each record that give the requested accuracy at these coordinates."""
-        p = self.coordinates.to_parameters(theta[: self.n_free])
+        data, p = self.data, self.coordinates.to_parameters(theta[: self.n_free])
         states = self.states(theta)
 
         def chosen(index: int) -> Substeps:
-            record = self.data.records[index]
+            own, n = data.records[index], data.records[index].record.n_samples
+            at = own.parameters(p), states[index]
             try:
-                return choose_substeps(
-                    self.data.structure,
-                    record.held,
-                    record.parameters(p),
-                    states[index],
-                    record.record.n_samples,
-                    self.data.accuracy,
-                    MOST_SUBSTEPS,
-                )
+                return choose_substeps(data.structure, own.held, *at, n, data.accuracy, MOST_SUBSTEPS)
             except SimulationError:
                 return Substeps(MOST_SUBSTEPS)
 
@@ -127,14 +119,13 @@ class Problem:
         within_reach = self._removable(theta)
         self.substeps = [n.with_most(min(2 * n, MOST_SUBSTEPS)) for n in before]
         self._last = None
-        if self.substeps != before and self._removable(theta) > within_reach + self._worth_refining(theta):
-            self._best = float("inf")
-            return True
+        if self.substeps != before:
+            is_far = self.at(theta).cost > _FAR**2 * self.data.n_readings
+            if self._removable(theta) > within_reach + (_MOST_WORTH if is_far else _WORTH_REFINING):
+                self._best = float("inf")
+                return True
         self.substeps, self._last = before, None
         return False
-
-    def _worth_refining(self, theta: Floats) -> float:
-        return _MOST_WORTH if self.at(theta).cost > _FAR**2 * self.data.n_readings else _WORTH_REFINING
 
     def _removable(self, theta: Floats) -> float:
         """Return the share of the cost by which a full Gauss-Newton step would lower it in the linear approximation."""
@@ -162,8 +153,13 @@ class Problem:
 
     def at(self, theta: Floats) -> Evaluation:
         """Evaluate, or return the last evaluation if it was here."""
-        if self._last is not None and np.array_equal(self._last.theta, theta):
-            return self._last
+        if self._last is None or not np.array_equal(self._last.theta, theta):
+            self._last = self._evaluation(theta.copy())
+            self._best = min(self._best, self._last.cost)
+            self.n_evaluations += 1
+        return self._last
+
+    def _evaluation(self, theta: Floats) -> Evaluation:
         # A diverging simulation overflows here; the check below detects it.
         with np.errstate(over="ignore", invalid="ignore"):
             products = np.array(self._products(theta))
@@ -172,17 +168,13 @@ class Problem:
             cost += self.add_prior(theta, normal, gradient)
         if not (cost < _DIVERGED and np.all(np.abs(normal) < _DIVERGED)):
             cost = float("inf")
-        self._best = min(self._best, cost)
-        self._last = Evaluation(theta.copy(), cost, normal, gradient)
-        self.n_evaluations += 1
-        return self._last
+        return Evaluation(theta, cost, normal, gradient)
 
     def add_prior(self, theta: Floats, normal: Floats, gradient: Floats) -> float:
         """Add to the normal equations what is known beside the records, and return its cost."""
         prior = self.data.prior
-        if (
-            prior is None or not self.n_free
-        ):  # beside initial states alone it would only hide how far they are from settled
+        # Beside initial states alone it would only hide how far they are from settled.
+        if prior is None or not self.n_free:
             return 0.0
         return prior.add(self.coordinates, theta[: self.n_free], self.data.n_readings, normal, gradient)
 
@@ -214,16 +206,8 @@ class Problem:
             def tangents(index: int) -> tuple[Floats, Floats]:
                 own, n = data.records[index], data.records[index].record.n_samples
                 with np.errstate(all="ignore"):
-                    out = simulate_tangents(
-                        data.structure,
-                        own.held,
-                        own.parameters(p),
-                        dp,
-                        x0[index],
-                        dx0,
-                        n,
-                        self.substeps[index],
-                    )
+                    at = own.parameters(p), dp, x0[index], dx0
+                    out = simulate_tangents(data.structure, own.held, *at, n, self.substeps[index])
                     # `weighted` expects outputs of sets, here of sets that differ by a unit step.
                     out[:, :, 1:] += out[:, :, :1]
                     return weighted(own, out)
@@ -273,14 +257,15 @@ class Problem:
         if data.structure.is_shifted or data.structure.late_inputs is None:
             columns = [np.column_stack(parts) for parts in self.sensitivities(theta)]
             return [np.asarray(own.T @ own) for own in columns]
+        kernel = kernel_of(data.structure)
         fitted, lengths = self._fitted_records(), [record.record.n_samples for record in data.records]
         if carries_tangents(data.structure):
             p, dp, x0, dx0 = self._place(theta)
             return data.threads.results_of_shares(
                 self._of_equal_rigs(
                     p,
-                    lambda own, share: tangent_equations(
-                        data.structure, [fitted[i] for i in share], own, dp, x0[share], dx0
+                    lambda own, share: kernel.tangent_equations(
+                        [fitted[i] for i in share], own, dp, x0[share], dx0
                     ),
                 ),
                 lengths,
@@ -289,9 +274,7 @@ class Problem:
         products = data.threads.results_of_shares(
             self._of_equal_rigs(
                 sets,
-                lambda own, share: normal_equations(
-                    data.structure, [fitted[i] for i in share], own, states[share]
-                ),
+                lambda own, share: kernel.normal_equations([fitted[i] for i in share], own, states[share]),
             ),
             lengths,
         )
@@ -317,28 +300,16 @@ class Problem:
 
     def _fitted_records(self) -> list[FittedRecord]:
         # Substeps with equal numbers may have different needs, so they are compared by identity.
-        if [id(substeps) for substeps, _ in self._fitted] != [id(substeps) for substeps in self.substeps]:
+        if list(map(id, self._fitted_with)) != list(map(id, self.substeps)):
+            self._fitted_with = list(self.substeps)
             self._fitted = [
-                (
-                    substeps,
-                    FittedRecord(
-                        record.held, substeps.per_piece(record.held.n_pieces), record.measured, record.weights
-                    ),
-                )
-                for substeps, record in zip(self.substeps, self.data.records, strict=True)
+                FittedRecord(own.held, steps.per_piece(own.held.n_pieces), own.measured, own.weights)
+                for steps, own in zip(self.substeps, self.data.records, strict=True)
             ]
-        return [fitted for _, fitted in self._fitted]
+        return self._fitted
 
     def _differences(self, index: int, p: Floats, x0: Floats) -> tuple[Floats, Floats]:
         """Return weighted residuals (n,) of the first set, and its outputs minus those of each other (n, n_sets - 1)."""
         record = self.data.records[index]
         with np.errstate(all="ignore"):
-            out = simulate_sets(
-                self.data.structure,
-                record.held,
-                record.parameters(p),
-                x0,
-                record.record.n_samples,
-                self.substeps[index],
-            )
-            return weighted(record, out)
+            return weighted(record, self.data.simulated(record, p, x0, self.substeps[index]))

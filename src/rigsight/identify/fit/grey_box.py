@@ -20,15 +20,28 @@ import numpy as np
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.fit.fit_data import FitData, FitMemory, FitResult, fit_key, record_data, record_digest
+from rigsight.identify.fit.fit_data import (
+    FitData,
+    FitMemory,
+    FitResult,
+    Prior,
+    fit_key,
+    record_data,
+    record_digest,
+)
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Evaluation, Problem
-from rigsight.identify.fit.free_run import FreeRun, state_slopes
 from rigsight.identify.fit.idle_threads import IdleThreads
-from rigsight.identify.fit.prior import Prior
-from rigsight.identify.fit.search import FINE_TOLERANCE, VariableProjection, off_kinks, searched
+from rigsight.identify.fit.search import (
+    FINE_TOLERANCE,
+    FreeRun,
+    VariableProjection,
+    off_kinks,
+    searched,
+    state_slopes,
+)
 from rigsight.identify.fit.settled_states import SearchStart
 from rigsight.records.record import Floats, Record
-from rigsight.simulate import Structure, Substeps, simulate_outputs, structure_of_fit
+from rigsight.simulate import Structure, Substeps, structure_of_fit
 from rigsight.units import characteristic_value
 
 DEFAULT_ACCURACY = 1e-4
@@ -188,7 +201,7 @@ class GreyBoxFit:
             return theta, bool(solution.status > 0), str(solution.message)
 
         settings = [max_evaluations, tolerance, *map(int, problem.substeps), finish, substeps is None]
-        outcome = self._recalled(self._key(coordinates, start, begin.theta, settings), problem, search)
+        outcome = self._recalled(problem, start, begin.theta, settings, search)
         return self._result(problem, *outcome, finish)
 
     def fit_windows(
@@ -223,7 +236,7 @@ class GreyBoxFit:
             return np.concatenate([own, *problem.places]), success, message
 
         settings = [max_evaluations, tolerance, *map(int, problem.substeps), most_rounds]
-        outcome = self._recalled(self._key(coordinates, start, begin.theta, settings), problem, search)
+        outcome = self._recalled(problem, start, begin.theta, settings, search)
         together = Problem(self.data, coordinates, begin.n_states, problem.upper)
         together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
         return self._result(together, *outcome, finish=True)
@@ -266,29 +279,31 @@ class GreyBoxFit:
             gradient[:n] - through @ gradient[n:],
         )
 
-    def _recalled(self, key: str, problem: Problem, search: Callable[[], _Outcome]) -> _Outcome:
+    def _recalled(
+        self,
+        problem: Problem,
+        start: Mapping[str, float],
+        theta: Floats,
+        settings: Sequence[float],
+        search: Callable[[], _Outcome],
+    ) -> _Outcome:
         """Return the outcome of a search, from memory if it was done before."""
-        known = None if self.memory is None else self.memory.recall(key)
+        if self.memory is None:
+            return search()
+        values = [float(start[name]) for name in self.structure.names]
+        key = fit_key([*self._problem, values, list(problem.coordinates.free)], theta, settings)
+        known = self.memory.recall(key)
         if known is not None:
             problem.n_evaluations = known["evaluations"]
             problem.substeps = [
                 own.with_most(most) for own, most in zip(problem.substeps, known["substeps"], strict=True)
             ]
             return np.array(known["theta"]), known["success"], known["message"]
-        theta, success, message = search()
-        if self.memory is not None:
-            outcome = {"theta": theta.tolist(), "success": success, "message": message}
-            steps = {"evaluations": problem.n_evaluations, "substeps": list(map(int, problem.substeps))}
-            self.memory.remember(key, {**outcome, **steps})
-        return theta, success, message
-
-    def _key(
-        self, coordinates: Coordinates, start: Mapping[str, float], theta: Floats, settings: Sequence[float]
-    ) -> str:
-        if self.memory is None:
-            return ""
-        values = [float(start[name]) for name in self.structure.names]
-        return fit_key([*self._problem, values, list(coordinates.free)], theta, settings)
+        end, success, message = search()
+        outcome = {"theta": end.tolist(), "success": success, "message": message}
+        steps = {"evaluations": problem.n_evaluations, "substeps": list(map(int, problem.substeps))}
+        self.memory.remember(key, {**outcome, **steps})
+        return end, success, message
 
     def _failed(self, problem: Problem, theta: Floats, message: str) -> FitResult:
         n = problem.n_free
@@ -306,8 +321,13 @@ class GreyBoxFit:
         if not finish:
             return self._found(problem, theta, outcome, cost, np.full((n_free, n_free), np.nan), ())
         p = problem.coordinates.to_parameters(own)
+
+        def remainder(index: int) -> Floats:
+            record = self.data.records[index]
+            return record.measured - self.data.accurate(record, p, states[index], self.data.accuracy)
+
         try:
-            residuals = tuple(self.data.of_each_record(lambda i: self._remainder(i, p, states[i])))
+            residuals = tuple(self.data.of_each_record(remainder))
         except SimulationError as error:
             return self._failed(problem, theta, str(error))
         weights = [record.weights for record in self.data.records]
@@ -349,11 +369,4 @@ class GreyBoxFit:
             residuals=residuals,
             substeps=tuple(problem.substeps),
             offset_names=self.data.structure.offsets,
-        )
-
-    def _remainder(self, index: int, p: Floats, state: Floats) -> Floats:
-        """Return measured minus accurately simulated outputs of a record."""
-        d = self.data.records[index]
-        return d.measured - simulate_outputs(
-            self.data.structure, d.held, d.parameters(p), state, d.record.n_samples, self.data.accuracy
         )

@@ -16,7 +16,7 @@ G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; L. Kaufman, BIT 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -26,8 +26,8 @@ from rigsight.identify.fit.coordinates import STEP, Coordinates
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.fit_data import FitData, weighted
 from rigsight.identify.fit.fit_problem import Evaluation, Problem
+from rigsight.identify.fit.settled_states import SearchStart
 from rigsight.records.record import Floats
-from rigsight.simulate import simulate_outputs, simulate_sets
 
 _DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)
 """Dampings of the Levenberg-Marquardt steps of an initial state that are tried at once, in units of the normalized equations."""
@@ -41,6 +41,28 @@ _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Start values of limited states between the rounds of a search, as shares of their range."""
 _DEPENDENT_STATE = 1e-9
 """Part of the response to an initial state outside that to the others below which they give it no more than rounding."""
+FINE_TOLERANCE = 1e-6
+"""Tolerance above which a search is only a rough one, for which kinks do not matter."""
+_VANISHED = 3e-3
+"""Length of a step, in standard errors, at which the search ends: with steps that halve, at most a hundredth remains."""
+_MOST_STEPS = 20
+"""Five were enough if steps shrink by themselves; if the search alternates between two points, halved steps need about twice as
+many."""
+_LEAST_SHARE = 0.1
+_LESS, _MORE = 0.5, 1.5
+"""Factors on the share of a step that is taken, if the step reverses and if it does not: the usual values, not tuned."""
+_LEAST_INFLUENCE = 1e-7
+"""Share of the largest influence below which a combination of coordinates has none: squares are accurate to 1e-16."""
+_WIDEST = 0.1
+"""Largest share of a coordinate's range that a difference spans."""
+_EXACT = 1e-6
+"""Relative accuracy of the residuals. With a chosen number of integration steps, which rounding can change, estimates from the
+same records differed by a twentieth of a standard error. Derivatives need not be as accurate."""
+_WORST = 1.0
+"""Largest increase of the cost, in squared standard errors of white noise, on the way to the point where the differences vanish,
+which cannot resolve less."""
+_DETERMINED = 1e-8
+"""Share of the largest influence, squared, below which a combination of states has none on the first samples."""
 
 
 class VariableProjection(Problem):
@@ -65,15 +87,12 @@ class VariableProjection(Problem):
 
     def jacobian(self, theta: Floats) -> Floats:
         """Return the derivatives of `residual`; the search continues from the point where they are requested."""
-        evaluation = self.at(theta)
+        self.at(theta)
         self.places = self._settled_at
-        root, _ = evaluation.compressed
-        return np.vstack([root, np.zeros(theta.size)])
+        return super().jacobian(theta)
 
-    def at(self, theta: Floats) -> Evaluation:
+    def _evaluation(self, theta: Floats) -> Evaluation:
         """Refit the initial states, then evaluate with their directions projected out of the derivatives."""
-        if self._last is not None and np.array_equal(self._last.theta, theta):
-            return self._last
         p = self.coordinates.to_parameters(theta)
         settled = self.data.of_each_record(lambda i: self._settled(i, p, self.places[i], _FEW_STEPS)[0])
         n = theta.size
@@ -87,10 +106,8 @@ class VariableProjection(Problem):
             cost += self.add_prior(theta, normal, gradient)
         if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
             cost = float("inf")
-        self._best = min(self._best, cost)
-        self._last, self._settled_at = Evaluation(theta.copy(), cost, normal, gradient), settled
-        self.n_evaluations += 1
-        return self._last
+        self._settled_at = settled
+        return Evaluation(theta, cost, normal, gradient)
 
     def settle_anew(self, theta: Floats) -> float:
         """Refit the initial states from several values of limited states, and return the cost."""
@@ -155,15 +172,10 @@ class VariableProjection(Problem):
         record = self.data.records[index]
         sets = np.repeat(record.parameters(p)[:, None], places.shape[1], axis=1)
         with np.errstate(all="ignore"):
-            out = simulate_sets(
-                self.data.structure,
-                record.held,
-                sets,
-                places * self.data.state_sizes(sets),
-                record.record.n_samples,
-                self.substeps[index],
+            states = places * self.data.state_sizes(sets)
+            first, against_first = weighted(
+                record, self.data.simulated(record, sets, states, self.substeps[index])
             )
-            first, against_first = weighted(record, out)
             return np.column_stack([first, first[:, None] + against_first])
 
 
@@ -174,28 +186,6 @@ def _projected(own: Floats, states: Floats, residual: Floats) -> tuple[Floats, F
     base, triangle = np.linalg.qr(states / size)
     base = base[:, np.abs(np.diag(triangle)) > _DEPENDENT_STATE]
     return own - base @ (base.T @ own), residual - base @ (base.T @ residual)
-
-
-FINE_TOLERANCE = 1e-6
-"""Tolerance above which a search is only a rough one, for which kinks do not matter."""
-_VANISHED = 3e-3
-"""Length of a step, in standard errors, at which the search ends: with steps that halve, at most a hundredth remains."""
-_MOST_STEPS = 20
-"""Five were enough if steps shrink by themselves; if the search alternates between two points, halved steps need about twice as
-many."""
-_LEAST_SHARE = 0.1
-_LESS, _MORE = 0.5, 1.5
-"""Factors on the share of a step that is taken, if the step reverses and if it does not: the usual values, not tuned."""
-_LEAST_INFLUENCE = 1e-7
-"""Share of the largest influence below which a combination of coordinates has none: squares are accurate to 1e-16."""
-_WIDEST = 0.1
-"""Largest share of a coordinate's range that a difference spans."""
-_EXACT = 1e-6
-"""Relative accuracy of the residuals. With a chosen number of integration steps, which rounding can change, estimates from the
-same records differed by a twentieth of a standard error. Derivatives need not be as accurate."""
-_WORST = 1.0
-"""Largest increase of the cost, in squared standard errors of white noise, on the way to the point where the differences vanish,
-which cannot resolve less."""
 
 
 def searched(
@@ -269,10 +259,7 @@ def _evaluated(problem: Problem, place: Floats) -> Evaluation:
 
     def accurate(index: int) -> Floats:
         record = data.records[index]
-        n_samples = record.record.n_samples
-        own = record.parameters(p)
-        out = simulate_outputs(data.structure, record.held, own, states[index], n_samples, _EXACT)
-        return weighted(record, out[:, :, None])[0]
+        return weighted(record, data.accurate(record, p, states[index], _EXACT)[:, :, None])[0]
 
     residuals = data.of_each_record(accurate)
     for index, (_, derivative) in enumerate(problem.sensitivities(place)):
@@ -300,3 +287,88 @@ def _step(evaluation: Evaluation, bounds: tuple[Floats, Floats]) -> tuple[Floats
         free &= ~beyond
     step = np.clip(place + step, *bounds) - place
     return step, float(np.linalg.norm(root @ step))
+
+
+class FreeRun(Problem):
+    """Cost, gradient and Gauss-Newton matrix as functions of the parameters' coordinates, with states that follow from these.
+
+    `slopes` are the derivatives of the initial states, in units of their sizes, by the coordinates from where the search begins,
+    shape (n_states, n_free), of each record.
+    """
+
+    def __init__(
+        self,
+        data: FitData,
+        begin: SearchStart,
+        slopes: Sequence[Floats],
+    ) -> None:
+        super().__init__(data, begin.coordinates, 0, begin.coordinates.upper)
+        upper = np.concatenate([begin.coordinates.upper, *begin.upper])
+        self._whole = Problem(data, begin.coordinates, begin.n_states, upper)
+        self._begin, self._slopes = begin, slopes
+
+    def states(self, theta: Floats) -> list[Floats]:
+        """Return the initial states per record."""
+        return self._whole.states(self._with_states(theta))
+
+    def sensitivities(self, theta: Floats) -> list[tuple[Floats, Floats]]:
+        """Return, for each record, the weighted residuals (n,) and their derivatives (n, n_free)."""
+        found = self._like_this().sensitivities(self._with_states(theta))
+        return [
+            (residual, derivative @ _total(slope)[1:, 1:])
+            for (residual, derivative), slope in zip(found, self._slopes, strict=True)
+        ]
+
+    def _products(self, theta: Floats) -> list[Floats]:
+        found = self._like_this()._products(self._with_states(theta))
+        return [
+            _total(slope).T @ product @ _total(slope)
+            for product, slope in zip(found, self._slopes, strict=True)
+        ]
+
+    def _with_states(self, theta: Floats) -> Floats:
+        begin = self._begin
+        moved = theta - begin.theta[: self.n_free]
+        states = [
+            np.clip(place + slope @ moved, low, high)
+            for place, slope, low, high in zip(
+                begin.places, self._slopes, begin.lower, begin.upper, strict=True
+            )
+        ]
+        return np.concatenate([theta, *states])
+
+    def _like_this(self) -> Problem:
+        """Return the problem with states as coordinates, with the same integration and difference steps."""
+        self._whole.substeps = self.substeps
+        self._whole.steps[: self.n_free] = self.steps
+        return self._whole
+
+
+def _total(slope: Floats) -> Floats:
+    """Return the derivative of residual, coordinates and states by residual and coordinates."""
+    n_states, n_free = slope.shape
+    return np.vstack([np.eye(1 + n_free), np.hstack([np.zeros((n_states, 1)), slope])])
+
+
+def state_slopes(
+    data: FitData,
+    scales: Mapping[str, float],
+    values: Mapping[str, float],
+    free: Sequence[str],
+    states: Sequence[Floats],
+) -> list[Floats]:
+    """Return the derivatives of the initial states that fit records best, in units of sizes and by coordinates."""
+    begin = SearchStart.of(data, scales, values, free, states, as_given=True)
+    problem = Problem(data, begin.coordinates, begin.n_states, np.full(begin.theta.size, np.inf))
+    problem.choose_substeps(begin.theta)
+    normal, n_free = problem.at(begin.theta).normal, len(free)
+    if not np.all(np.isfinite(normal)):
+        return [np.zeros((begin.n_states, n_free)) for _ in states]
+    slopes = []
+    for index in range(len(states)):
+        own = problem.columns(index)[n_free:]
+        answers = normal[np.ix_(own, own)]
+        size = np.sqrt(np.where(np.diag(answers) > 0.0, np.diag(answers), 1.0))
+        inverse = np.linalg.pinv(answers / np.outer(size, size), rcond=_DETERMINED, hermitian=True)
+        slopes.append(-(inverse @ (normal[own, :n_free] / size[:, None])) / size[:, None])
+    return slopes

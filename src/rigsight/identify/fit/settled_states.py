@@ -8,7 +8,7 @@ fit itself converges, and longer stretches are left to it.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,11 +63,15 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
     guesses = [first_state(data.structure, d.record, values) for d in data.records]
     p = parameter_vector(data.structure, values)
     if np.any(data.limited):
-        return data.of_each_record(
-            lambda i: _likeliest(
-                data, data.records[i], p, _placed(data, data.records[i], guesses[i], p, values)
-            )
-        )
+
+        def placed(index: int) -> Floats:
+            record, guess = data.records[index], guesses[index]
+            ranges = np.where(data.limited, data.state_sizes(record.parameters(p)[:, None])[:, 0], 0.0)
+            at_rest = state_at_rest(data.structure, record.record, guess, values)
+            places = [g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)]
+            return _likeliest(data, record, p, np.column_stack(places))
+
+        return data.of_each_record(placed)
 
     def settled(index: int) -> Floats:
         record = data.records[index]
@@ -135,20 +139,11 @@ def moving_or_at_rest(data: FitData, values: Mapping[str, float], states: Sequen
     return data.of_each_record(likelier)
 
 
-def _placed(
-    data: FitData, record: RecordData, guess: Floats, p: Floats, values: Mapping[str, float]
-) -> Floats:
-    """Return the estimate and the state at rest with several values of limited states, shape (n_states, n)."""
-    ranges = np.where(data.limited, data.state_sizes(record.parameters(p)[:, None])[:, 0], 0.0)
-    at_rest = state_at_rest(data.structure, record.record, guess, values)
-    return np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
-
-
 def _likeliest(data: FitData, record: RecordData, p: Floats, states: Floats) -> Floats:
     """Return of several initial states, shape (n_states, n), the one with which the parameters fit the record best."""
     sets = np.repeat(record.parameters(p)[:, None], states.shape[1], axis=1)
     with np.errstate(all="ignore"):
-        out = simulate_sets(data.structure, record.held, sets, states, record.record.n_samples, _SUBSTEPS)
+        out = data.simulated(record, sets, states, _SUBSTEPS)
         errors = (record.measured[:, :, None] - out) * record.weights[:, None]
         costs = np.nansum(errors**2, axis=(0, 1))
     costs[~np.all(np.isfinite(out), axis=(0, 1))] = np.inf
@@ -159,36 +154,26 @@ def settled_state(data: FitData, record: RecordData, p: Floats, guess: Floats) -
     """Return the initial state that fits a record from its beginning, as far as the parameters allow."""
     state, n_samples, before = guess, min(_FIRST_SAMPLES, record.record.n_samples), np.inf
     while True:
-        (found,) = _fitted(data, record, record.parameters(p), [state], n_samples)
-        if not found.error <= _LOST * max(before, 1.0):
+        found, error, slopes = _fitted(data, record, record.parameters(p), state, n_samples)
+        if not error <= _LOST * max(before, 1.0):
             return state
-        state, before = found.state, found.error
-        if n_samples == record.record.n_samples or _dies_away(found.slopes, n_samples):
+        state, before = found, error
+        if n_samples == record.record.n_samples or _dies_away(slopes, n_samples):
             return state
         n_samples = min(_LONGER * n_samples, record.record.n_samples)
 
 
-@dataclass(frozen=True)
-class _Fitted:
-    """End of a descent: the state, the root mean square of the weighted error, and its slopes."""
-
-    state: Floats
-    error: float
-    slopes: Floats
-
-
 def _fitted(
-    data: FitData, record: RecordData, p: Floats, starts: Sequence[Floats], n_samples: int
-) -> list[_Fitted]:
-    """Return the state that fits the first samples best, from each start; all descents share their simulations."""
+    data: FitData, record: RecordData, p: Floats, start: Floats, n_samples: int
+) -> tuple[Floats, float, Floats]:
+    """Return the end of a descent on the first samples: state, root mean square of the weighted error, and its slopes."""
     sizes = data.state_sizes(p[:, None])[:, 0]
     sizes = np.where(sizes > 0.0, sizes, 1.0)
     beginning = record.first(n_samples)
-    n_measured = max(1, n_samples * int(np.count_nonzero(record.weights)))
 
-    def errors(asked: Mapping[int, Floats]) -> dict[int, Floats]:
-        """Return the errors of the places around each start, shape (n_errors, n_places)."""
-        lanes = np.hstack([starts[i][:, None] + sizes[:, None] * places for i, places in asked.items()])
+    def errors(places: Floats) -> Floats:
+        """Return the errors of places about the start, shape (n_errors, n_places)."""
+        lanes = start[:, None] + sizes[:, None] * places
         sets = np.repeat(p[:, None], lanes.shape[1], axis=1)
         with np.errstate(all="ignore"):
             out = simulate_sets(data.structure, beginning.held, sets, lanes, n_samples, _SUBSTEPS)
@@ -196,51 +181,28 @@ def _fitted(
             remainder = (beginning.measured[:, used, None] - out[:, used]) * beginning.weights[used, None]
         remainder = remainder.swapaxes(0, 1).reshape(-1, lanes.shape[1])
         remainder = np.clip(np.nan_to_num(remainder, nan=_LARGEST), -_LARGEST, _LARGEST)
-        ends = np.cumsum([places.shape[1] for places in asked.values()])[:-1]
-        return {
-            i: np.vstack([own, _PULL * asked[i]])
-            for i, own in zip(asked, np.split(remainder, ends, axis=1), strict=True)
-        }
+        return np.vstack([remainder, _PULL * places])
 
-    descents = [_descent(start.size) for start in starts]
-    asked = {i: next(descent) for i, descent in enumerate(descents)}
-    ends: dict[int, tuple[Floats, Floats]] = {}
-    while asked:
-        answers, asked = errors(asked), {}
-        for i, answer in answers.items():
-            try:
-                asked[i] = descents[i].send(answer)
-            except StopIteration as end:
-                ends[i] = end.value
-    return [
-        _Fitted(
-            state=start + sizes * ends[i][0],
-            error=float(np.linalg.norm(ends[i][1][:, 0]) / np.sqrt(n_measured)),
-            slopes=(ends[i][1][:, 1:] - ends[i][1][:, :1]) / _STEP,
-        )
-        for i, start in enumerate(starts)
-    ]
-
-
-def _descent(n: int) -> Generator[Floats, Floats, tuple[Floats, Floats]]:
-    """Ask for the errors of places, shape (n, n_places), on the way down; return the last place and the errors around it."""
+    n = start.size
     around, place = np.column_stack([np.zeros(n), _STEP * np.eye(n)]), np.zeros(n)
-    lanes = yield place[:, None] + around
+    lanes = errors(place[:, None] + around)
     for _ in range(_STEPS):
         cost, slopes = float(lanes[:, 0] @ lanes[:, 0]), (lanes[:, 1:] - lanes[:, :1]) / _STEP
         step = np.linalg.lstsq(slopes, -lanes[:, 0], rcond=None)[0]
         # A whole step is usually the best, so the slopes for the next step are computed with it.
         tried = np.column_stack([(place + step)[:, None] + around, place[:, None] + np.outer(step, _SHORTER)])
-        ahead = yield tried
+        ahead = errors(tried)
         costs = np.sum(ahead**2, axis=0)
         best = min((0, *range(n + 1, tried.shape[1])), key=lambda lane: costs[lane])
         if not costs[best] < cost:
             break
         place, gained = tried[:, best], cost - float(costs[best])
-        lanes = ahead[:, : n + 1] if best == 0 else (yield place[:, None] + around)
+        lanes = ahead[:, : n + 1] if best == 0 else errors(place[:, None] + around)
         if gained < _WORTH_A_STEP * cost:
             break
-    return place, lanes
+    n_measured = max(1, n_samples * int(np.count_nonzero(record.weights)))
+    error = float(np.linalg.norm(lanes[:, 0]) / np.sqrt(n_measured))
+    return start + sizes * place, error, (lanes[:, 1:] - lanes[:, :1]) / _STEP
 
 
 def _dies_away(slopes: Floats, n_samples: int) -> bool:

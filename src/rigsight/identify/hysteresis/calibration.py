@@ -1,11 +1,18 @@
-"""Hysteresis parameters from records: global search by simulation, then output-error refinement."""
+"""Hysteresis parameters from records: global search by simulation, then output-error refinement.
+
+The search is differential evolution over the whole range of the parameters, with all sets side by side.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.optimize import Bounds, differential_evolution
+from scipy.stats import qmc
 
 from rigsight.errors import InputError, check_option
 from rigsight.identify.fit.coordinates import Coordinates
@@ -14,7 +21,6 @@ from rigsight.identify.fit.fit_data import FitResult, free_names
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.hysteresis.derived import DerivedQuantities, derived_quantities, record_amplitudes
-from rigsight.identify.hysteresis.search import SearchBox, search
 from rigsight.identify.start.declared_starts import declared_values, in_structure, moved_starts
 from rigsight.identify.start.linear_start import linear_start
 from rigsight.identify.start.scales import characteristic_scales
@@ -27,6 +33,21 @@ RELEASE_GAIN = 1.01
 """Factor by which releasing a special value (an exponent of 1) must lower the cost for other starts to be tried."""
 BEYOND = 2.0
 """Factor of the special value that gives the other start."""
+_SUBSTEPS = 2
+_ROUGH_EVALUATIONS = 40
+_ROUGH_TOLERANCE = 1e-3
+_ROUGH_ACCURACY = 1e-3
+_HOPS = 4
+"""Number of fits started near the best one: with stiff loops the cost has many minima within a few percent of the truth."""
+_HOP = 0.1
+"""Relative size of such a step."""
+_APART = 0.1
+"""Distance in the unit cube above which two ends of a search count as different."""
+_EVENLY = 0.1
+"""Characteristic units up to which a range is spaced evenly."""
+_UNUSABLE = 1e100
+"""Cost of a set that cannot be simulated; its square is still finite."""
+Cost = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -56,21 +77,6 @@ class Calibration:
     def standard_errors(self) -> dict[str, float]:
         """Of the fitted parameters by name."""
         return self.fit.standard_errors
-
-
-def better(one: FitResult | None, other: FitResult) -> FitResult:
-    """Return the fit with the lower cost."""
-    return other if one is None or other.cost < one.cost else one
-
-
-_SUBSTEPS = 2
-_ROUGH_EVALUATIONS = 40
-_ROUGH_TOLERANCE = 1e-3
-_ROUGH_ACCURACY = 1e-3
-_HOPS = 4
-"""Number of fits started near the best one: with stiff loops the cost has many minima within a few percent of the truth."""
-_HOP = 0.1
-"""Relative size of such a step."""
 
 
 def calibrate_to_records(
@@ -109,19 +115,19 @@ def calibrate_to_records(
     begin = start_values(structure, begin)
     chosen = checked_free(structure, free_parameters(structure, outputs) if free is None else free)
     scales = characteristic_scales(rig, records, begin)
-    noise = dict(
-        output_noise
-        or {
-            name: 0.01 * (float(np.sqrt(np.mean([np.var(record[name]) for record in records]))) or 1.0)
-            for name in outputs
-        }
-    )
+    usual = {
+        name: 0.01 * (float(np.sqrt(np.mean([np.var(record[name]) for record in records]))) or 1.0)
+        for name in outputs
+    }
+    noise = dict(output_noise or usual)
     tell = progress or (lambda _: None)
 
     simple, simple_free = special_structure(structure, chosen)
     threads = IdleThreads(n_jobs)
     look = GreyBoxFit(simple, records, scales, noise, _ROUGH_ACCURACY, threads=threads)
-    searched = tuple(name for name in simple_free if name not in _shifts(structure))
+    # What affects only means, or outputs other than the first, is left to the refinement.
+    shifts = {p.name for p in rig.parameters} - numbers_of_motion(rig)
+    searched = tuple(name for name in simple_free if name not in shifts)
     coordinates = Coordinates.of(simple, searched, begin, scales)
     box = SearchBox.around(coordinates, coordinates.from_values(begin), spread)
     ends = search(
@@ -146,7 +152,12 @@ def calibrate_to_records(
         tell("refined an end of the search")
     rough += map(refined, declared_starts(simple, {n: begin[n] for n in simple.names}, scales))
     tell("refined the starts of the effects")
-    rough += map(refined, neighbors(simple, min(rough, key=lambda fit: fit.cost).values))
+    # A fit may have ended in a nearby local minimum.
+    near = min(rough, key=lambda fit: fit.cost).values
+    neighbors = [
+        {**near, **moved} for effect in simple.effects for moved in moved_starts(simple, effect, near)
+    ]
+    rough += map(refined, neighbors)
     tell("refined the neighbors of the best")
     rough.sort(key=lambda fit: fit.cost)
     fit = _refined(structure, chosen, simple, records, scales, noise, rough[0], rng, threads)
@@ -177,7 +188,8 @@ def _refined(
         moved = theta + _HOP * np.maximum(np.abs(theta), _HOP) * rng.standard_normal(theta.size)
         inside = np.clip(moved, coordinates.lower, coordinates.upper)
         values = dict(zip(simple.names, map(float, coordinates.to_parameters(inside)), strict=True))
-        settled = better(settled, careful.fit(values, rough.free, settled.initial_states))
+        moved_fit = careful.fit(values, rough.free, settled.initial_states)
+        settled = min(settled, moved_fit, key=lambda fit: fit.cost)
     if simple is structure or not settled.residuals:
         return settled
     whole = GreyBoxFit(structure, records, scales, noise, threads=threads)
@@ -186,7 +198,7 @@ def _refined(
     best = whole.fit(values, free, settled.initial_states)
     if best.cost < settled.cost / RELEASE_GAIN:
         beyond = {**values, **{name: BEYOND * value for name, value in special.items()}}
-        best = better(best, whole.fit(beyond, free, settled.initial_states))
+        best = min(best, whole.fit(beyond, free, settled.initial_states), key=lambda fit: fit.cost)
     return best
 
 
@@ -207,11 +219,6 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: Floats) -> Floats
             return np.asarray(np.sum((residual - np.mean(residual, axis=0)) ** 2, axis=0))
 
     return np.asarray(np.sum(look.data.of_each_record(of_record), axis=0) / look.n_samples)
-
-
-def _shifts(structure: Structure) -> set[str]:
-    """Return parameters that affect only means, or outputs other than the first; the search does not need them."""
-    return {p.name for p in structure.rig.parameters} - numbers_of_motion(structure.rig)
 
 
 def numbers_of_motion(rig: Rig) -> set[str]:
@@ -282,19 +289,110 @@ def declared_starts(
         for p in effect.parameters
         if p.fitted and p.starts and p.default is None
     }
-    found = []
-    for effect, start in (
-        (e, start) for e in structure.effects for start in e.starts if start.parent is None
-    ):
-        own = declared_values(structure.rig, effect, start.values, begin, scales)
-        found.append({**begin, **own_sizes, **in_structure(structure, effect, own)})
-    return found
+    rig, own_starts = (
+        structure.rig,
+        [(e, s.values) for e in structure.effects for s in e.starts if s.parent is None],
+    )
+    declared = [(effect, declared_values(rig, effect, own, begin, scales)) for effect, own in own_starts]
+    return [{**begin, **own_sizes, **in_structure(structure, *own)} for own in declared]
 
 
-def neighbors(structure: Structure, values: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return the start values that the effects declare for another fit: a fit may have ended in a nearby local minimum."""
-    return [
-        {**values, **moved}
-        for effect in structure.effects
-        for moved in moved_starts(structure, effect, values)
-    ]
+@dataclass(frozen=True, eq=False)
+class SearchBox:
+    """Maps the unit cube to search coordinates.
+
+    Ranges in characteristic units are spaced by their inverse hyperbolic sine: evenly up to a tenth of a unit, by decades
+    beyond.
+    """
+
+    # Range of each coordinate, shape (n_free,).
+    lower: Floats
+    upper: Floats
+
+    @classmethod
+    def around(cls, coordinates: Coordinates, center: Floats, spread: float) -> SearchBox:
+        """Take the declared range of a parameter if it has one, else a range around `center`."""
+        structure = coordinates.structure
+        of_rig = {p.name for p in structure.rig.parameters}
+        lower, upper = coordinates.lower.copy(), coordinates.upper.copy()
+        for i, name in enumerate(coordinates.free):
+            if name not in of_rig:
+                continue
+            reach = np.log(spread) if coordinates.logarithmic[i] else spread * max(1.0, abs(center[i]))
+            lower[i], upper[i] = max(lower[i], center[i] - reach), min(upper[i], center[i] + reach)
+        split = coordinates.split
+        if split is not None:
+            # Both are parts of one stiffness, and only the total is known from the start.
+            whole = np.exp(center[split.stiffness]) + center[split.share]
+            lower[split.stiffness], upper[split.stiffness] = np.log(whole / spread), np.log(whole * spread)
+            lower[split.share], upper[split.share] = 0.0, whole * spread
+        return cls(lower, upper)
+
+    def coordinates(self, places: Floats) -> Floats:
+        """Return the search coordinates of points in the unit cube, both of shape (..., n_free)."""
+        low, high = np.arcsinh(self.lower / _EVENLY), np.arcsinh(self.upper / _EVENLY)
+        return np.asarray(_EVENLY * np.sinh(low + places * (high - low)))
+
+
+def search(
+    cost: Cost,
+    box: SearchBox,
+    rng: np.random.Generator,
+    *,
+    n_generations: int = 100,
+    n_sets: int = 96,
+    n_ends: int = 8,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Floats:
+    """Search the lowest cost over the whole box; return the coordinates of its ends, best first, shape (n_ends, n_free)."""
+    n_free = box.lower.size
+    seen: list[Floats] = []
+    paid: list[Floats] = []
+
+    def of_places(places: Floats) -> Floats:
+        sets = np.atleast_2d(places.T)
+        costs = cost(box.coordinates(sets))
+        usable = np.where(np.isfinite(costs), np.minimum(costs, _UNUSABLE), _UNUSABLE)
+        seen.append(sets)
+        paid.append(usable)
+        return usable
+
+    generations = itertools.count(1)
+    evenly = np.asarray(qmc.Sobol(n_free, rng=rng).random_base2(int(np.ceil(np.log2(n_sets)))))
+    # scipy's stubs do not know that a vectorized cost returns one value per column.
+    vectorized: Any = of_places
+    differential_evolution(
+        vectorized,
+        Bounds(np.zeros(n_free), np.ones(n_free)),
+        strategy="currenttobest1bin",
+        init=evenly[:n_sets],
+        maxiter=n_generations,
+        tol=1e-4,
+        mutation=(0.4, 0.9),
+        recombination=0.9,
+        rng=rng,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+        callback=lambda *_: progress(next(generations)),
+    )
+    # The population ends in one basin, which may be wrong because the simulation is coarse; other basins were visited before.
+    places, costs = np.concatenate(seen), np.concatenate(paid)
+    kept = _different(places, costs, n_ends)
+    usable = [place for place in kept if costs[place] < _UNUSABLE]
+    if not usable:
+        raise InputError(
+            "No parameter set in the search range can be simulated. Give better start values or a smaller spread."
+        )
+    return box.coordinates(places[usable])
+
+
+def _different(places: Floats, costs: Floats, most: int) -> list[int]:
+    """Return the indices of the best points that differ from each other, best first."""
+    kept: list[int] = []
+    for i in np.argsort(costs):
+        if all(np.max(np.abs(places[i] - places[j])) > _APART for j in kept):
+            kept.append(int(i))
+        if len(kept) == most:
+            break
+    return kept

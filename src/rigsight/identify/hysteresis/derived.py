@@ -90,10 +90,8 @@ def derived_quantities(
     for effect, pair in ((e, pair) for e in structure.effects for pair in e.searched_as):
         first, second = (structure.parameter_name(effect, name) for name in (pair.first, pair.second))
         unit = units.get(first, "")
-        pairs += [
-            _derived(f"{first} + {second}", unit, of(first) + of(second), determined),
-            _derived(f"{first} - {second}", unit, of(first) - of(second), determined),
-        ]
+        pairs.append(_derived(f"{first} + {second}", unit, of(first) + of(second), determined))
+        pairs.append(_derived(f"{first} - {second}", unit, of(first) - of(second), determined))
         level = saturation_level(effect)
         if level is not None:
             own = {p.name: of(structure.parameter_name(effect, p.name)) for p in effect.parameters}
@@ -101,19 +99,16 @@ def derived_quantities(
             saturation = _derived("z_max", structure.rig.units["x"], reached, determined)
             words = _in_words(saturation, f"{first} + {second}")
     hysteretic = any(effect.spring is not None for effect in structure.effects)
-    areas = tuple(
+    force, x = structure.rig.units["force"], structure.rig.units["x"]
+    energy = "J" if (force, x) in {("N m", "rad"), ("N", "m")} else f"{force} {x}"
+    areas = [
         LoopArea(
             a,
-            _derived(
-                f"energy per cycle at {a:.3g} {structure.rig.units['x']}",
-                _energy_unit(structure),
-                loop_area(structure, draws, a),
-                determined,
-            ),
+            _derived(f"energy per cycle at {a:.3g} {x}", energy, loop_area(structure, draws, a), determined),
         )
         for a in (amplitudes if hysteretic else ())
-    )
-    return DerivedQuantities(tuple(pairs), saturation, words, areas)
+    ]
+    return DerivedQuantities(tuple(pairs), saturation, words, tuple(areas))
 
 
 def parameter_draws(
@@ -255,20 +250,9 @@ def _in_words(saturation: Derived, total: str) -> str:
 
 def _derived(name: str, unit: str, samples: Floats, determined: bool) -> Derived:
     """Take the value from the first sample and the interval from the others."""
-    if not determined:
-        return Derived(name, unit, float(samples[0]), -np.inf, np.inf)
     usable = samples[1:][~np.isnan(samples[1:])]
-    if usable.size == 0:
+    if not determined or usable.size == 0:
         return Derived(name, unit, float(samples[0]), -np.inf, np.inf)
     # Quantiles without interpolation, because draws may be infinite.
     low, high = np.quantile(usable, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0], method="inverted_cdf")
     return Derived(name, unit, float(samples[0]), float(low), float(high))
-
-
-def _energy_unit(structure: Structure) -> str:
-    units = structure.rig.units
-    return (
-        "J"
-        if (units["force"], units["x"]) in {("N m", "rad"), ("N", "m")}
-        else f"{units['force']} {units['x']}"
-    )

@@ -13,14 +13,16 @@ Control (1963). R. Pintelon and J. Schoukens, *System Identification: A Frequenc
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.identify.start.any_rig_start import any_rig_start
-from rigsight.identify.start.equation_error import solve_in_frequency, spectra_of
+from rigsight.identify.start.linearized_responses import USABLE_BAND, response_of_hold
+from rigsight.identify.start.measured_states import SIGNIFICANT_POWER
 from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Follower, Rig, evaluated
@@ -30,6 +32,12 @@ _UNKNOWN = 1.0
 """Value of a parameter that the records do not determine."""
 _STILL = 1e-12
 """Range of a signal relative to its size that counts as rounding error."""
+_ITERATIONS = 20
+_TRANSIENT_ORDER = 2
+_EXCITED = 1e-3
+_MIN_LINES = 20
+Term = tuple[int, NDArray[np.complex128]]
+"""Power of j omega and the spectrum that it multiplies."""
 
 
 def linear_start(
@@ -61,23 +69,14 @@ def linear_start(
     driven = [record for record in records if not is_constant(record[rig.inputs[0].name])]
     if rig.is_driven and not driven:
         # A free decay consists only of end terms, which this method treats as transients to be removed.
-        return any_rig_start(rig, records, constants, {**_one_offset(rig), **known})
-    records = driven
-    first = _driven if rig.is_driven else _prescribed
-    found = first(rig, records, constants, known)
+        # A constant force is equivalent to a free rest position.
+        bias = rig.motion.bias.free_symbols if rig.motion.rest.free_symbols else ()
+        return any_rig_start(rig, records, constants, {**dict.fromkeys(map(str, bias), 0.0), **known})
+    found = (_driven if rig.is_driven else _prescribed)(rig, driven, constants, known)
     if rig.follower is not None:
-        found |= _followed(rig, rig.follower, records, constants, found)
-    parameters = {p.name: p for p in rig.parameters}
-    clipped = {
-        name: float(np.clip(value, parameters[name].lower, parameters[name].upper))
-        for name, value in found.items()
-    }
-    return {**clipped, **known}
-
-
-def _one_offset(rig: Rig) -> dict[str, float]:
-    """Return zero for a constant force that is equivalent to a free rest position."""
-    return dict.fromkeys(map(str, rig.motion.bias.free_symbols), 0.0) if rig.motion.rest.free_symbols else {}
+        found |= _followed(rig, rig.follower, driven, constants, found)
+    bounds = {p.name: (p.lower, p.upper) for p in rig.parameters}
+    return {**{name: float(np.clip(value, *bounds[name])) for name, value in found.items()}, **known}
 
 
 def _driven(
@@ -119,16 +118,16 @@ def _followed(
 ) -> dict[str, float]:
     """Return the parameters of the state that follows the motion."""
     motion, name = rig.outputs[0].name, follower.symbol.name
-    own = (
-        {symbol.name for symbol in (follower.gain * follower.creepage).free_symbols}
-        - set(constants)
-        - set(found)
-    )
-    own -= {rig.motion.displacement.name, name}
+    own = {symbol.name for symbol in (follower.gain * follower.creepage).free_symbols}
+    own -= {*constants, *found, rig.motion.displacement.name, name}
     seen = [record for record in records if name in record]
     if not seen:
         return {p: 0.0 if p in _offsets(follower) else _UNKNOWN for p in own}
-    slope, rate = first_order(seen, motion, name)
+    # The hold is that of the rig's input; a measured output that drives a later stage has no content above Nyquist.
+    smooth = [replace(record, hold="band_limited") for record in seen]
+    # ``y' = slope x - rate y``, written as ``tau y' + unity y = x``.
+    tau, unity = _equation_error(smooth, motion, name, (1, 0), 1.0)
+    slope, rate = float(abs(1.0 / tau)), float(abs(unity / tau) or 1.0)
     solved = _solved(follower.gain, slope, constants)
     solved |= _solved(follower.feedback, rate / slope, {**constants, **solved})
     static = evaluated(follower.static_gain, {**constants, **solved})
@@ -141,19 +140,13 @@ def _offsets(follower: Follower) -> set[str]:
 
 def _solved(expression: sp.Expr, value: float, known: Mapping[str, float]) -> dict[str, float]:
     """Return the unknown parameter with which an expression has a given value; several unknown ones are assumed to be equal."""
-    lacking = sorted(
-        (symbol for symbol in expression.free_symbols if symbol.name not in known),
-        key=lambda symbol: str(symbol.name),
-    )
+    given = {symbol: known[symbol.name] for symbol in expression.free_symbols if symbol.name in known}
+    lacking = sorted(expression.free_symbols - given.keys(), key=str)
     if not lacking:
         return {}
     unknown = sp.Symbol("unknown", real=True)
-    equation = expression.subs(
-        {symbol: known[symbol.name] for symbol in expression.free_symbols if symbol not in lacking}
-    )
-    solutions = [
-        s for s in sp.solve(equation.subs(dict.fromkeys(lacking, unknown)) - value, unknown) if s.is_real
-    ]
+    equation = expression.subs(given).subs(dict.fromkeys(lacking, unknown))
+    solutions = [s for s in sp.solve(equation - value, unknown) if s.is_real]
     return {symbol.name: float(solutions[-1]) if solutions else _UNKNOWN for symbol in lacking}
 
 
@@ -216,9 +209,8 @@ def second_order(
 ) -> tuple[float, float, float]:
     """Return the best-fitting inertia, damping and stiffness of ``m x'' + d x' + k x = gain u``."""
     orders = (2, 1, 0) if has_stiffness else (2, 1)
-    solution = _equation_error(records, source, response, orders, gain)
-    inertia, damping = solution[0], solution[1]
-    stiffness = solution[2] if has_stiffness else 0.0
+    inertia, damping, *rest = _equation_error(records, source, response, orders, gain)
+    stiffness = rest[0] if has_stiffness else 0.0
     turned = inertia <= 0.0
     inertia = abs(inertia) or 1.0
     if has_stiffness and (turned or (stiffness <= 0.0 and not any_stiffness)):
@@ -226,15 +218,6 @@ def second_order(
     if turned or not any_damping:
         damping = max(damping, 1e-4 * np.sqrt(stiffness * inertia) if stiffness > 0.0 else 0.0)
     return float(inertia), float(damping), float(stiffness)
-
-
-def first_order(records: Sequence[Record], source: str, response: str) -> tuple[float, float]:
-    """Return the best-fitting slope and rate of ``y' = slope x - rate y`` with a measured x."""
-    # The hold is that of the rig's input; a measured output that drives a later stage has no content above Nyquist.
-    smooth = [replace(record, hold="band_limited") for record in records]
-    tau, unity = _equation_error(smooth, source, response, (1, 0), 1.0)
-    slope, rate = 1.0 / tau, unity / tau
-    return float(abs(slope)), float(abs(rate) or 1.0)
 
 
 def _equation_error(
@@ -245,4 +228,88 @@ def _equation_error(
         _check_moves(records, name)
     blocks = [spectra_of(record, source, response) for record in records]
     terms = [[(order, block.response) for order in orders] for block in blocks]
-    return solve_in_frequency(blocks, terms, [gain * block.drive for block in blocks]).coefficients
+    return solve_in_frequency(blocks, terms, [gain * block.drive for block in blocks])
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Spectra of one record on its informative lines, shape (n_lines,) each."""
+
+    omega: Floats  # angular frequencies [rad/s]
+    lines: NDArray[np.intp]  # indices of the lines in the full spectrum
+    hold: NDArray[np.complex128]  # frequency response of the hold
+    drive: NDArray[np.complex128]  # input, multiplied by the response of the hold
+    response: NDArray[np.complex128]  # output
+
+
+def spectra_of(record: Record, source: str, response: str) -> Spectra:
+    """Return the spectra of a record on the lines on which input and response exceed the noise."""
+    u = record[source] - np.mean(record[source])
+    x = record[response] - np.mean(record[response])
+    omega: Floats = 2.0 * np.pi * np.asarray(np.fft.rfftfreq(u.size, record.dt)[1:], dtype=np.float64)
+    drive, spectrum = np.fft.rfft(u)[1:] / u.size, np.fft.rfft(x)[1:] / u.size
+    hold = response_of_hold(record, omega)
+    power = np.abs(spectrum) ** 2
+    floor = np.median(power[int(0.9 * power.size) :])
+    significant = (power > SIGNIFICANT_POWER * floor) & (omega < USABLE_BAND * np.pi / record.dt)
+    excited = np.abs(drive) > _EXCITED * np.max(np.abs(drive))
+    keep = significant & excited
+    if np.count_nonzero(keep) < _MIN_LINES:
+        keep = excited
+    lines = np.flatnonzero(keep) + 1
+    return Spectra(omega[keep], lines, hold[keep], (drive * hold)[keep], spectrum[keep])
+
+
+def solve_in_frequency(
+    blocks: Sequence[Spectra],
+    terms: Sequence[Sequence[Term]],
+    targets: Sequence[NDArray[np.complex128]],
+) -> Floats:
+    """Solve ``sum_i a_i (j omega)^order_i F_i = target + transient`` over all records for the real a_i."""
+    top = max(float(np.max(block.omega)) for block in blocks)
+    n_terms = len(terms[0])
+    weights = [np.ones_like(block.response) for block in blocks]
+    solution = np.zeros(n_terms)
+    for _ in range(_ITERATIONS):
+        previous, solution = solution, _weighted_solution(blocks, terms, targets, weights, top)
+        if np.allclose(solution[:n_terms], previous[:n_terms], rtol=1e-6):
+            break
+        weights = [_own_denominator(*own, solution, top) for own in zip(blocks, terms, strict=True)]
+    return np.asarray(solution[:n_terms] / top ** np.array([order for order, _ in terms[0]]))
+
+
+def _weighted_solution(
+    blocks: Sequence[Spectra],
+    terms: Sequence[Sequence[Term]],
+    targets: Sequence[NDArray[np.complex128]],
+    weights: Sequence[NDArray[np.complex128]],
+    top: float,
+) -> Floats:
+    n_terms, n_transient = len(terms[0]), _TRANSIENT_ORDER + 1
+    n_columns = n_terms + n_transient * len(blocks)
+    normal, right = np.zeros((n_columns, n_columns)), np.zeros(n_columns)
+    for index, (block, own, target, weight) in enumerate(zip(blocks, terms, targets, weights, strict=True)):
+        s = 1j * block.omega / top
+        columns = np.zeros((block.omega.size, n_columns), dtype=np.complex128)
+        for i, (order, spectrum) in enumerate(own):
+            columns[:, i] = s**order * spectrum
+        first = n_terms + index * n_transient
+        for power in range(n_transient):
+            columns[:, first + power] = -(s**power)
+        weighted, goal = columns / weight[:, None], target / weight
+        normal += np.real(weighted.conj().T @ weighted)
+        right += np.real(weighted.conj().T @ goal)
+    # A term that is zero in all records, such as a stop that is never reached, has no scale, and gets no coefficient.
+    size = np.sqrt(np.where(np.diag(normal) > 0.0, np.diag(normal), 1.0))
+    return np.asarray(np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-14)[0] / size)
+
+
+def _own_denominator(
+    block: Spectra, terms: Sequence[Term], solution: Floats, top: float
+) -> NDArray[np.complex128]:
+    s = 1j * block.omega / top
+    value = np.zeros_like(block.response)
+    for i, (order, spectrum) in enumerate(terms):
+        if spectrum is block.response:
+            value = value + solution[i] * s**order
+    return np.where(np.abs(value) > 0.0, value, 1.0)

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from rigsight.identify.rig_equations import RigEquations
 from rigsight.identify.start.measured_states import SIGNIFICANT_POWER
 from rigsight.records.record import Floats, Record
-from rigsight.simulate.equations.structure import input_symbols
 
 Complexes = NDArray[np.complex128]
 
@@ -123,13 +122,12 @@ class LinearizedResponses:
     def _jacobians(self) -> Any:
         equations = self._equations
         tree, structure = equations.structure.tree, equations.structure
-        inputs = [s for i in range(len(equations.rig.inputs)) for s in input_symbols(i)]
         rows = [
             *equations.forces,
             *(tree.flattened(state.rate) for state in tree.states),
             *structure.outputs[: len(equations.sensor_names)],
         ]
-        return equations.slopes(rows, [*structure.states, *inputs], beside=equations.mass_entries)
+        return equations.slopes(rows, [*structure.states, *equations.inputs], beside=equations.mass_entries)
 
 
 def _lines(equations: RigEquations, record: Record, p: Floats, most: int) -> _Lines:

@@ -25,6 +25,17 @@ _RANK = 1e-9
 
 _HIDDEN, _WAVES = 0.7, 20
 """Size of an unmeasured motion relative to a measured one, and its number of periods if none is measured."""
+Complexes = NDArray[np.complex128]
+_STRETCHES = 4
+"""Length of a record in units of a stretch; stretches overlap by half."""
+_SHORTEST = 64
+"""Smallest number of samples of a stretch."""
+SIGNIFICANT_POWER = 25.0
+"""Power over that of the noise above which a line of a sensor is informative."""
+_BAND_OF_SUMS = 0.5
+"""Share of the band below half the sampling rate in which sums approximate the integrals."""
+_LEAST_NOISE = 1e-6
+"""Noise assumed for a sensor without visible noise, relative to its size."""
 
 
 @dataclass(frozen=True)
@@ -131,20 +142,6 @@ def supposed_states(
     rates = np.gradient(signals[:n], record.dt, axis=1) if n else signals[:n]
     nothing = np.zeros((len(units), len(equations.sensor_names)))
     return MeasuredStates(np.concatenate([signals[:n], rates, signals[n:]]), nothing, nothing)
-
-
-Complexes = NDArray[np.complex128]
-
-_STRETCHES = 4
-"""Length of a record in units of a stretch; stretches overlap by half."""
-_SHORTEST = 64
-"""Smallest number of samples of a stretch."""
-SIGNIFICANT_POWER = 25.0
-"""Power over that of the noise above which a line of a sensor is informative."""
-_BAND_OF_SUMS = 0.5
-"""Share of the band below half the sampling rate in which sums approximate the integrals."""
-_LEAST_NOISE = 1e-6
-"""Noise assumed for a sensor without visible noise, relative to its size."""
 
 
 @dataclass(frozen=True)

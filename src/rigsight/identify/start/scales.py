@@ -30,6 +30,12 @@ _PIECES = (1, 20)
 piece starts from the measured state, because an unstable or drifting rig leaves the measured motion after some time."""
 _BEYOND = 3.0
 """Largest ratio of simulated to measured motion; a rig with estimated parameters at its resonance stays below."""
+_Signals = Mapping[str, list[Floats]]
+_LEAST_SHARE = 1e-3
+"""Share of the value at which a parameter is as important as any other term. A parameter below this share gets this size, because
+steps relative to its value would be lost in rounding."""
+_UNKNOWN = 1.0
+"""Size of a quantity that is zero everywhere."""
 
 
 def motion_in_record(
@@ -78,15 +84,6 @@ def _within_reach(
     )
 
 
-_Signals = Mapping[str, list[Floats]]
-
-_LEAST_SHARE = 1e-3
-"""Share of the value at which a parameter is as important as any other term. A parameter below this share gets this size, because
-steps relative to its value would be lost in rounding."""
-_UNKNOWN = 1.0
-"""Size of a quantity that is zero everywhere."""
-
-
 def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:
     """Return the size of each base quantity at each place of a rig, and of each of its parameters and states."""
     equations = equations_of(rig)
@@ -97,11 +94,8 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
         own_sizes.append(own_size)
         for name, samples in found.items():
             signals.setdefault(name, []).append(samples)
-    scales: dict[str, float] = {}
     joints = {joint.name: _of_joint(joint.name, signals) for joint in rig.mechanism.joints}
-    first = next(
-        iter(joints.values()), {"x": _UNKNOWN, "force": _UNKNOWN, "drive": _UNKNOWN, "time": _UNKNOWN}
-    )
+    first = next(iter(joints.values()), dict.fromkeys(("x", "force", "drive", "time"), _UNKNOWN))
     sources = [size_of_signal(signals[f"input {s.name}"]) for s in rig.inputs]
     own_states = [f"value {state.name}" for state in rig.mechanism.states]
     length = size_of_signal(signals[own_states[0]]) if own_states else _UNKNOWN
@@ -119,7 +113,7 @@ def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, f
         slope = f"slope@{name}" if name in equations.sensor_names else f"change {name}"
         x = size_of_signal(signals[key])
         places[name] = {**plain, **_not_zero({"x": x, "time": _over(x, size_about_zero(signals[slope]))})}
-    scales |= plain
+    scales = dict(plain)
     for place, sizes in places.items():
         scales |= {f"{base}@{place}": size for base, size in sizes.items()}
     for name in equations.state_names:

@@ -33,7 +33,6 @@ from rigsight.identify.start.measured_states import (
     supposed_states,
 )
 from rigsight.records.record import Floats, Record
-from rigsight.simulate.equations.structure import input_symbols
 
 _MOST_FACTORS = 6
 """Largest power that is expanded; energies contain squares, and potentials somewhat higher powers."""
@@ -92,21 +91,19 @@ class WeakEquations:
         self._free = tuple(free)
         factors = sensor_factors(equations, frozenset(free))
         unknown = dict.fromkeys(free, 1.0)
-        shown: list[tuple[Record, Floats, MeasuredStates]] = []
-        for record in records:
-            p = equations.parameters({**unknown, **values}, record)
-            measured = measured_states(equations, record, p, factors)
-            if measured is not None:
-                shown.append((record, p, measured))
+        both = [(record, equations.parameters({**unknown, **values}, record)) for record in records]
+        found = [(*own, measured_states(equations, *own, factors)) for own in both]
+        shown = [(record, p, measured) for record, p, measured in found if measured is not None]
         self.n_records = len(shown)
         self._columns = [equations.structure.names.index(name) for name in free]
         if not shown:
             # Sizes of terms can still be estimated.
-            record = records[0]
-            p = equations.parameters({**unknown, **values}, record)
-            shown = [(record, p, supposed_states(equations, record, p, factors))]
+            shown = [(*both[0], supposed_states(equations, *both[0], factors))]
         self._terms, self._mixed = self._separated(shown[0][2])
-        self._term_functions = self._written()
+        p = list(equations.structure.parameter_symbols)
+        factors_of_terms = [term.factor for term in self._terms]
+        self._factors_at = sp.lambdify(p, factors_of_terms, modules=[FUNCTIONS, "numpy"], cse=True)
+        self._functions, self._mixed_functions = map(self._written, (self._terms, self._mixed))
         of_equation = np.array([term.equation for term in self._terms])
         self._of_equation = [np.flatnonzero(of_equation == i) for i in range(self.n_equations)]
         self._memberships = (of_equation == np.arange(self.n_equations)[:, None]).astype(np.float64)
@@ -131,7 +128,6 @@ class WeakEquations:
 
     def term_sizes(self, values: Floats) -> list[tuple[int, float, Floats]]:
         """Return for each term its equation, its size for these values, and its powers in them, shape (n_free,)."""
-        found = []
         sizes = np.sqrt(np.mean(np.concatenate([np.abs(b.terms) ** 2 for b in self._blocks], axis=1), axis=1))
         p = self._blocks[0].p.copy()
         p[self._columns] = values
@@ -142,9 +138,10 @@ class WeakEquations:
             moved[column] *= 1.01
             with np.errstate(all="ignore"):
                 powers[:, i] = np.log(np.abs(self._factors(moved) / factors)) / np.log(1.01)
-        for term, size, factor, power in zip(self._terms, sizes, factors, powers, strict=True):
-            found.append((term.equation, float(np.abs(factor) * size), np.nan_to_num(power)))
-        return found
+        return [
+            (term.equation, float(np.abs(factor) * size), np.nan_to_num(power))
+            for term, size, factor, power in zip(self._terms, sizes, factors, powers, strict=True)
+        ]
 
     def _separated(self, measured: MeasuredStates) -> tuple[list[_Term], list[_Term]]:
         """Return the terms of all equations, and those in which signals and unknown parameters cannot be separated."""
@@ -153,10 +150,7 @@ class WeakEquations:
         symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))
         unknown = {symbols[name] for name in self._free}
         shift = self._offsets(measured, set(structure.parameter_symbols))
-        signals = [
-            *structure.states,
-            *(s for i in range(len(equations.rig.inputs)) for s in input_symbols(i)),
-        ]
+        signals = [*structure.states, *equations.inputs]
         terms: dict[tuple[int, bool, sp.Expr], sp.Expr] = {}
         mixed: list[_Term] = []
         momenta, forces = equations.momenta_and_forces
@@ -195,23 +189,14 @@ class WeakEquations:
                 shift[state] = state + offset
         return shift
 
-    def _written(self) -> tuple[Any, Any, Any, Any, Any]:
-        """Return functions for factors, signals and their derivatives, and for signals and derivatives of mixed terms."""
-        arguments, states = self._equations.arguments, self._equations.structure.states
-
-        def function(expressions: list[sp.Expr]) -> Any:
-            return sp.lambdify(arguments, expressions, modules=[FUNCTIONS, "numpy"], cse=True)
-
-        p = list(self._equations.structure.parameter_symbols)
-        factors = sp.lambdify(p, [t.factor for t in self._terms], modules=[FUNCTIONS, "numpy"], cse=True)
-        signals = function([t.signal for t in self._terms])
-        slopes = self._equations.slopes([t.signal for t in self._terms], states)
-        mixed = function([t.signal for t in self._mixed])
-        mixed_slopes = self._equations.slopes([t.signal for t in self._mixed], states)
-        return factors, signals, slopes, mixed, mixed_slopes
+    def _written(self, terms: Sequence[_Term]) -> tuple[Any, Any]:
+        """Return functions for the signals of terms and for their derivatives by the states."""
+        equations, signals = self._equations, [term.signal for term in terms]
+        function = sp.lambdify(equations.arguments, signals, modules=[FUNCTIONS, "numpy"], cse=True)
+        return function, equations.slopes(signals, equations.structure.states)
 
     def _factors(self, p: Floats) -> Floats:
-        return np.array(self._term_functions[0](*p), dtype=np.float64).reshape(len(self._terms))
+        return np.array(self._factors_at(*p), dtype=np.float64).reshape(len(self._terms))
 
     def _block(self, record: Record, p: Floats, measured: MeasuredStates, most: int) -> _Block:
         equations = self._equations
@@ -220,20 +205,14 @@ class WeakEquations:
             # At a sample, a held input is replaced by the mean of its values before and after it.
             u[0::3, 1:] = (u[0::3, 1:] + u[0::3, :-1]) / 2.0
         projection, floors = projected(equations, record, measured, most)
-        arguments = [*measured.z, *u, 0.0, *p]
-        _, signals, slopes, _, _ = self._term_functions
-        n_samples = measured.z.shape[1]
-        terms = self._projected(projection, self._terms, rows_of(signals(*arguments), n_samples))
-        of_states = rows_of(slopes(*arguments), n_samples).reshape(
-            len(self._terms), equations.n_states, n_samples
-        )
+        terms, slopes = self._at_lines(self._terms, self._functions, projection, [*measured.z, *u, 0.0, *p])
         s = 1j * projection.omega[:, None, None]
         through = measured.by_reading + measured.by_integral / np.where(s == 0.0, 1.0, s)
         return _Block(
             omega=projection.omega,
             terms=terms,
             squares=np.abs(terms) ** 2,
-            slopes=self._slopes(self._terms, np.mean(of_states, axis=2)),
+            slopes=slopes,
             noise=np.asarray(through * np.sqrt(floors), dtype=np.complex128),
             p=p,
             measured=measured,
@@ -241,22 +220,22 @@ class WeakEquations:
             projection=projection,
         )
 
-    def _projected(self, projection: Projection, terms: Sequence[_Term], signals: Floats) -> Complexes:
+    def _at_lines(
+        self, terms: Sequence[_Term], functions: tuple[Any, Any], projection: Projection, at: Sequence[Any]
+    ) -> tuple[Complexes, Floats]:
+        """Return the terms on the lines of a record, and their derivatives, of the shapes in `_Block`."""
+        n, n_states, n_samples = self._equations.n_coordinates, self._equations.n_states, at[0].size
+        signals, by_states = (rows_of(function(*at), n_samples) for function in functions)
+        means = np.mean(by_states.reshape(len(terms), n_states, n_samples), axis=2)
         found = np.empty((len(terms), projection.omega.size), dtype=np.complex128)
-        for row, term, signal in zip(found, terms, signals, strict=True):
+        slopes = np.zeros((len(terms), 3, self.n_equations))
+        for row, own, term, signal, mean in zip(found, slopes, terms, signals, means, strict=True):
             row[:] = projection.of_rate(signal) if term.is_momentum else -projection.of(signal)
-        return found
-
-    def _slopes(self, terms: Sequence[_Term], means: Floats) -> Floats:
-        """Return derivatives of the errors by coordinates and own states for each power of ``j omega``."""
-        n = self._equations.n_coordinates
-        found = np.zeros((len(terms), 3, self.n_equations))
-        for own, term, mean in zip(found, terms, means, strict=True):
             first, sign = (1, 1.0) if term.is_momentum else (0, -1.0)
             own[first, :n] += sign * mean[:n]
             own[first + 1, :n] += sign * mean[n : 2 * n]
             own[first, n:] += sign * mean[2 * n :]
-        return found
+        return found, slopes
 
     def _whitened(self, block: _Block, p: Floats) -> Complexes:
         """Return the errors of a record divided by the root of their covariance, shape (n_points, n_equations)."""
@@ -270,12 +249,8 @@ class WeakEquations:
         response = (self._memberships * factors) @ block.slopes.reshape(len(self._terms), 3 * n)
         response = response.reshape(n, 3, n).swapaxes(0, 1)
         if self._mixed:
-            _, _, _, mixed, mixed_slopes = self._term_functions
-            arguments = [*block.measured.z, *block.u, 0.0, *p]
-            n_samples, n_states = block.measured.z.shape[1], self._equations.n_states
-            added = self._projected(block.projection, self._mixed, rows_of(mixed(*arguments), n_samples))
-            of_states = rows_of(mixed_slopes(*arguments), n_samples).reshape(len(self._mixed), n_states, -1)
-            slopes = self._slopes(self._mixed, np.mean(of_states, axis=2))
+            at = [*block.measured.z, *block.u, 0.0, *p]
+            added, slopes = self._at_lines(self._mixed, self._mixed_functions, block.projection, at)
             for term, size, slope in zip(self._mixed, added, slopes, strict=True):
                 error[:, term.equation] += size
                 spread[:, term.equation] += np.abs(size) ** 2

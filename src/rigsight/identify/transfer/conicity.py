@@ -78,8 +78,9 @@ def estimate_conicity(
     largest = math.atan2(b, 2.0 * r_0)
     width = float(norm.ppf(0.5 + 0.5 * level)) * standard_error
     low_c, high_c = c_y - width, c_y + width
+    top = -0.5 * math.atan(2.0 * r_0 / b)
     value = _bounded(c_y, largest, r_0, b)
-    unbounded = _unbounded(c_y, largest, r_0, b)
+    unbounded = None if c_y > creep_factor(top, r_0, b) else _root(c_y, top, largest, r_0, b)
     slope = abs(conicity_slope(value if unbounded is None else unbounded, r_0, b))
     # At the maximum of c_y its derivative is zero, and the delta method fails.
     error = standard_error / slope if unbounded is not None and slope > 0.0 else math.inf
@@ -111,20 +112,13 @@ def estimate_conicity(
 
 
 def _bounded(c_y: float, largest: float, r_0: float, b: float) -> float:
-    if c_y >= 1.0:
-        return 0.0
-    if c_y <= creep_factor(largest, r_0, b):
-        return largest
-    return float(brentq(lambda delta: creep_factor(delta, r_0, b) - c_y, 0.0, largest))
+    return 0.0 if c_y >= 1.0 else _root(c_y, 0.0, largest, r_0, b)
 
 
-def _unbounded(c_y: float, largest: float, r_0: float, b: float) -> float | None:
-    top = -0.5 * math.atan(2.0 * r_0 / b)
-    if c_y > creep_factor(top, r_0, b):
-        return None
+def _root(c_y: float, lowest: float, largest: float, r_0: float, b: float) -> float:
     if c_y <= creep_factor(largest, r_0, b):
         return largest
-    return float(brentq(lambda delta: creep_factor(delta, r_0, b) - c_y, top, largest))
+    return float(brentq(lambda delta: creep_factor(delta, r_0, b) - c_y, lowest, largest))
 
 
 def creep_factor(delta_0: float, r_0: float, b: float) -> float:

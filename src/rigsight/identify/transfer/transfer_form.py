@@ -55,12 +55,8 @@ class TransferForm:
 
     def _split(self, theta: Floats) -> tuple[float, float, float, float]:
         zeta = float(np.exp(theta[2])) if self.order == "pt2" else 0.0
-        return (
-            float(theta[0]),
-            float(np.exp(theta[1])),
-            zeta,
-            float(theta[-1]) if self.with_dead_time else 0.0,
-        )
+        dead_time = float(theta[-1]) if self.with_dead_time else 0.0
+        return float(theta[0]), float(np.exp(theta[1])), zeta, dead_time
 
     def poles(self, theta: Floats) -> NDArray[np.complex128]:
         """Return the poles [1/s], shape (order,)."""

@@ -90,7 +90,12 @@ def fit_frequency_response(
     notes = [] if best.status > 0 else [str(best.message)]
     notes += _band_notes(measured, float(values[1]), errors)
     success = not notes
-    notes += _reading_notes(magnitude_only, misfit)
+    if magnitude_only:
+        notes.append("Magnitudes show neither the sign of the gain (taken as positive) nor a dead time.")
+    if misfit > MISFIT:
+        notes.append(
+            f"The residuals are {misfit:.1f} times larger than the variances explain: the model order is too low."
+        )
     names = problem.form.names
     motion, motion_covariance = problem.free_motion(best.x)
     kind = "magnitude" if magnitude_only else "complex"
@@ -195,17 +200,15 @@ class _Problem:
 
     def covariance(self, theta: Floats) -> Floats:
         slopes = self.jacobian(theta)
-        bread = slopes.T @ slopes
+        filling = bread = slopes.T @ slopes
         if self.measured.noise_shares is not None:
-            widened = 1.0
-            if self.weighting == "variance":
-                widened = max(self.misfit(theta), 1.0) ** 2 * _scattered_weights(self.measured.noise_freedom)
-            return sandwich_covariance(bread, widened * self._shared_filling(theta))
-        misfit = self.misfit(theta)
+            filling = self._shared_filling(theta)
+        widened = 1.0
         if self.weighting == "variance":
-            widened = max(misfit, 1.0) ** 2 * _scattered_weights(self.measured.noise_freedom)
-            return sandwich_covariance(bread, widened * bread)
-        return sandwich_covariance(bread, misfit**2 * bread)
+            widened = max(self.misfit(theta), 1.0) ** 2 * _scattered_weights(self.measured.noise_freedom)
+        elif self.measured.noise_shares is None:
+            widened = self.misfit(theta) ** 2
+        return sandwich_covariance(bread, widened * filling)
 
     def _shared_filling(self, theta: Floats) -> Floats:
         """Return the covariance of J^T r from the shares of each independent line of noise in all values."""
@@ -242,13 +245,8 @@ class _Problem:
         every = slice(None, None, -(-self.omega.size // _MOST_GRID_LINES))
         kept = np.zeros(self.omega.size, dtype=np.bool_)
         kept[every] = True
-        return replace(
-            self,
-            omega=self.omega[every],
-            values=self.values[every],
-            weights=self.weights[every],
-            measured=self.measured.at(kept),
-        )
+        omega, weights, measured = self.omega[every], self.weights[every], self.measured.at(kept)
+        return replace(self, omega=omega, values=self.values[every], weights=weights, measured=measured)
 
     def bounds(self) -> tuple[Floats, Floats]:
         low, high = self._reach()
@@ -367,17 +365,6 @@ def _band_notes(measured: FrequencyResponse, omega_b: float, errors: Floats) -> 
         f"The band from {low:.4g} to {high:.4g} rad/s does not show the break frequency, fitted as {omega_b:.4g} rad/s: "
         "use a wider band or a record that drives it."
     ]
-
-
-def _reading_notes(magnitude_only: bool, misfit: float) -> list[str]:
-    notes = []
-    if magnitude_only:
-        notes.append("Magnitudes show neither the sign of the gain (taken as positive) nor a dead time.")
-    if misfit > MISFIT:
-        notes.append(
-            f"The residuals are {misfit:.1f} times larger than the variances explain: the model order is too low."
-        )
-    return notes
 
 
 def _components(values: NDArray[np.complex128] | Floats) -> Floats:

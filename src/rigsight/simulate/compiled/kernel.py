@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rigsight.errors import MachineError
 from rigsight.libraries import is_kept, library_file
 from rigsight.records.record import Floats
-from rigsight.simulate.compiled.kernel_source import connect, include_folders, kernel_source
+from rigsight.simulate.compiled.kernel_source import kernel_source
 from rigsight.simulate.equations.structure import Structure
 from rigsight.simulate.input_hold import HeldInput
 
@@ -74,8 +74,9 @@ class Kernel:
                 f"The compiled kernel {path} cannot be loaded ({error}). "
                 "Its folder must permit execution; set RIGSIGHT_CACHE_DIR to a folder that does."
             ) from error
-        connect(structure, loaded)
         self._bodies = structure.rig.mechanism.bodies
+        if self._bodies is not None:
+            self._bodies.program.connect(loaded)
         self._one = _function(loaded, "simulate_one", "a l d l i d a a d a l a")
         self.carries_tangents = hasattr(loaded, "tangent_equations")
         """True if `tangent_equations` and `simulate_tangents` are available, False if `normal_equations` is."""
@@ -126,7 +127,12 @@ class Kernel:
         return out
 
     def normal_equations(self, records: Sequence[FittedRecord], p: Floats, states: Floats) -> Floats:
-        """Simulate parameter sets on records, and return the products that least squares needs."""
+        """Return the products of weighted residuals and differences that least squares need, shape (n_records, n_sets, n_sets).
+
+        Outputs are not stored: for many records and sets, moving them through memory would take longer than computing them.
+        Parameters have the shape (n_parameters, n_sets), states (n_records, n_states, n_sets). Readings of delayed sensors are
+        those before the delay, which is applied after a simulation.
+        """
         n_sets = p.shape[1]
         x = np.zeros((len(records), self._n_states, n_sets))
         x[:, : states.shape[1]] = states
@@ -145,7 +151,12 @@ class Kernel:
     def tangent_equations(
         self, records: Sequence[FittedRecord], p: Floats, dp: Floats, states: Floats, dstates: Floats
     ) -> Floats:
-        """Simulate one parameter set on records with its derivatives, and return the products that least squares needs."""
+        """Return the products of weighted residuals and their derivatives that a least-squares step needs for some records.
+
+        Their shape is (n_records, 1 + n_directions, 1 + n_directions). Parameters have the shape (n_parameters,), their
+        derivatives along each direction (n_parameters, n_directions), states (n_records, n_states) and their derivatives, the
+        same for all records, (n_states, n_directions).
+        """
         width = 1 + dp.shape[1]
         products = np.empty((len(records), width, width))
         self._carry(records, p, dp, states, dstates, products.ctypes.data, None)
@@ -212,7 +223,9 @@ def kernel_of(structure: Structure) -> Kernel:
         own = _made.setdefault(key, threading.Lock())
     with own:
         if key not in _kernels:
-            _kernels[key] = Kernel(library_file(text, include_folders(structure)), structure)
+            bodies = structure.rig.mechanism.bodies
+            folders = () if bodies is None else bodies.program.include_folders
+            _kernels[key] = Kernel(library_file(text, folders), structure)
         _keys[structure] = key
         _texts.pop(structure, None)
         return _kernels[key]
@@ -225,10 +238,7 @@ def _loaded(structure: Structure) -> Kernel | None:
 
 def compiled(structure: Structure) -> bool:
     """Return True if the machine code of a structure's kernels is loaded or in the cache."""
-    if _loaded(structure) is not None:
-        return True
-    text = _text(structure)
-    return is_kept(text)
+    return _loaded(structure) is not None or is_kept(_text(structure))
 
 
 def _text(structure: Structure) -> str:

@@ -22,7 +22,7 @@ class KernelEquations:
         self.structure = structure
         self.frozen: FrozenStructure = freeze(structure)
         # Late inputs are read as further inputs, so that no history has to be kept of them.
-        self._arriving = structure.late_inputs or ()
+        self.arriving = structure.late_inputs or ()
         self._remembered = structure.histories if structure.late_inputs is None else ()
         self._friction_signs = self.frozen.friction_signs(structure)
         fixed, speeds = set(structure.parameter_symbols), self.frozen.speeds(structure)
@@ -36,7 +36,7 @@ class KernelEquations:
                 output.xreplace(self._friction_signs if self.friction_is_shown else {})
                 for output in structure.computed_outputs
             ],
-            "live_rates": [gathered(rate, fixed) for rate in self._live_rates()],
+            "live_rates": [gathered(self._live(e.rate), fixed) for e in structure.remembering_equations],
             "speeds": speeds,
             "speed_slopes": [self._slope(speed) for speed in speeds],
             "limits": [e.limit for e in structure.remembering_equations if e.limit is not None],
@@ -51,6 +51,8 @@ class KernelEquations:
         self.constants: dict[sp.Symbol, sp.Expr] = hoisted
         remaining = iter(flat)
         self._groups = {name: [next(remaining) for _ in group] for name, group in groups.items()}
+        # In terms of states, inputs and constants, as all groups are.
+        self.outputs, self.delays = self._groups["outputs"], self._groups["arrivals"]
         self._steps = dict(zip(self.frozen.steps, self._groups["steps"], strict=True))
         limited_states = (
             i for i, equation in enumerate(structure.remembering_equations) if equation.limit is not None
@@ -132,6 +134,8 @@ class KernelEquations:
             for i, (before, after) in self._followed.items()
         }
         kept = [limited(gained[i], limit) for i, limit in followers.items()]
+        # Symbols without a name are C code already.
+        written = {s: s.name for e in kept for s in e.free_symbols if s not in names}
         others = {i: limit for i, limit in self.limits.items() if i not in followers}
         frictions, several = self.frozen.frictions, self.has_several_frictions
         slopes = self._groups["speed_slopes"]
@@ -151,7 +155,7 @@ class KernelEquations:
             "LANE_RATES": self._body("now x q r", "r", rates, lanes=True),
             "LANE_OUTPUTS": self._body("now x q y", "y", self.outputs, lanes=True),
             "LANE_FOLLOWERS": function_body(
-                (), [f"y[{i}]" for i in followers], kept, self._plus_own(names, kept), lanes=True
+                (), [f"y[{i}]" for i in followers], kept, {**names, **written}, lanes=True
             ),
             "LANE_PUT_BACK": function_body((), *self._put_back("x", others), names, lanes=True),
         }
@@ -175,33 +179,18 @@ class KernelEquations:
         }
         return {**self._names, **signs}
 
-    @property
-    def outputs(self) -> list[sp.Expr]:
-        """The outputs, in terms of states, inputs and constants."""
-        return self._groups["outputs"]
-
-    @property
-    def delays(self) -> list[sp.Expr]:
-        """The delays with which inputs arrive, constants."""
-        return self._groups["arrivals"]
-
     @cached_property
     def _delays(self) -> list[sp.Expr]:
         """Each delay of inputs once."""
-        return list(dict.fromkeys(late.delay for late in self._arriving))
+        return list(dict.fromkeys(late.delay for late in self.arriving))
 
     @property
     def _read_inputs(self) -> list[tuple[int, int]]:
         """Column and delay of each input that the equations read; the delay is -1 for an input that is not late."""
-        late = [(own.index, self.delay_of(own)) for own in self._arriving]
+        late = [(own.index, self.delay_of(own)) for own in self.arriving]
         on_time = [(column, -1) for column in range(self.structure.n_inputs)]
         # The only input of a rig is not read without its delay.
         return [*on_time, *late] if self.structure.histories else late or on_time
-
-    @property
-    def arriving(self) -> tuple[LateInput, ...]:
-        """The inputs that arrive late."""
-        return self._arriving
 
     def delay_of(self, late: LateInput) -> int:
         """Return the number of the delay of an input."""
@@ -211,11 +200,11 @@ class KernelEquations:
     def _as_arriving(self) -> dict[sp.Symbol, sp.Expr]:
         """Each delayed signal of inputs, and its rate, in terms of the inputs that arrive late."""
         found: dict[sp.Symbol, sp.Expr] = {}
-        if self._remembered or not self._arriving:
+        if self._remembered or not self.arriving:
             return found
         for history, rate in zip(self.structure.histories, self._late_rates, strict=True):
             own = {
-                input_symbols(late.index)[0]: late for late in self._arriving if late.delay == history.delay
+                input_symbols(late.index)[0]: late for late in self.arriving if late.delay == history.delay
             }
             late_values = {symbol: late.value for symbol, late in own.items()}
             found[history.symbol] = history.signal.xreplace(late_values)
@@ -280,15 +269,9 @@ class KernelEquations:
         first = self.structure.n_inputs if self.structure.histories else 0
         return {
             symbol: name
-            for i, late in enumerate(self._arriving, first)
+            for i, late in enumerate(self.arriving, first)
             for symbol, name in ((late.value, f"now->u[{i}]"), (late.rate, f"now->du[{i}]"))
         }
-
-    @staticmethod
-    def _plus_own(names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Expr]) -> dict[sp.Symbol, str]:
-        """Add symbols whose names are C code already."""
-        own = {s for e in expressions for s in e.free_symbols if s not in names}
-        return {**names, **{s: s.name for s in own}}
 
     @cached_property
     def _rate_symbols(self) -> tuple[sp.Symbol, ...]:
@@ -332,12 +315,8 @@ class KernelEquations:
         frozen = self.frozen
         return bool(frozen.frictions) and (frozen.single_friction is None or self.friction_is_shown)
 
-    def _live_rates(self) -> list[sp.Expr]:
-        """Return the rates with the current signs, for steps that are not divided at events."""
-        return [self._live(equation.rate) for equation in self.structure.remembering_equations]
-
     def _live(self, expression: sp.Expr) -> sp.Expr:
-        """Return a part of the equations with the current signs."""
+        """Return a part of the equations with the current signs, for steps that are not divided at events."""
         # A state with a limited range enters the equations with its limited value. The state itself is integrated without the
         # limit within a substep and limited at its end, which is exact as long as its rate keeps its sign. The sign of a velocity
         # that dry friction can hold is an argument.

@@ -114,6 +114,12 @@ class DefinedSignals:
         self.definitions.append(Definition(symbol, expression, kind, effect.name, rate_of))
         return symbol
 
+    def changed(
+        self, kind: Kind, effect: Effect, expression: sp.Expr, signals: Mapping[str, sp.Expr]
+    ) -> sp.Symbol:
+        """Return a symbol for an expression in an effect's own symbols, see `Binder.effect`."""
+        return self.define(kind, effect, self.binder.effect(effect, expression, signals))
+
     def states(self, effect: Effect, signals: Mapping[str, sp.Expr]) -> list[FirstOrderState]:
         """Return the states of an effect; `signals` are the expressions of canonical symbols, by name."""
         return [

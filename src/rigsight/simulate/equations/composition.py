@@ -91,7 +91,11 @@ def _compose(
     _check_effects(rig, effects)
     unique = unique_names(rig, effects)
     late = {rig.acts_at(effect) for effect in effects if effect.reading_delay is not None}
-    of_observer = [*map(_bandwidth, observed), *(_ahead(sensor) for sensor in observed if sensor in late)]
+    named = [
+        (bandwidth_name(sensor), f"bandwidth of the observer of {sensor}", "rad/s") for sensor in observed
+    ]
+    named += [(ahead_name(s), f"lead time of the reading of {s}", "s") for s in observed if s in late]
+    of_observer = [Parameter(name, meaning, unit=unit, default=0.0) for name, meaning, unit in named]
     parameters = (*_parameters(rig, effects, unique, dict(fixed)), *of_observer)
     symbols = {p.name: sp.Symbol(f"parameter {p.name}", real=True) for p in parameters}
     return Structure(
@@ -136,21 +140,9 @@ def _parameters(
     return (*rig.constants, *rig.parameters, *(p for p in of_effects if p.name not in fixed))
 
 
-def _bandwidth(sensor: str) -> Parameter:
-    return Parameter(
-        bandwidth_name(sensor), f"bandwidth of the observer of {sensor}", unit="rad/s", default=0.0
-    )
-
-
-def _ahead(sensor: str) -> Parameter:
-    return Parameter(ahead_name(sensor), f"lead time of the reading of {sensor}", unit="s", default=0.0)
-
-
-def structure_named(
-    rig_name: str, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None
-) -> Structure:
+def structure_named(rig_name: str, effects: Iterable[Effect] = ()) -> Structure:
     """Compose a rig given by its name."""
-    return compose(RIGS[check_option("Rig", rig_name, RIGS)], effects, fixed)
+    return compose(RIGS[check_option("Rig", rig_name, RIGS)], effects)
 
 
 def without_vanished_effects(

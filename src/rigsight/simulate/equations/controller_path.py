@@ -16,19 +16,7 @@ _OUTPUT = sp.Symbol("output of a controller", real=True)
 
 
 class ControllerPath:
-    """The law of one drive with its effects.
-
-    Parameters
-    ----------
-    binder, defined
-        Of the structure; definitions are added.
-    n_inputs
-        Number of inputs of the rig.
-    drive, controller
-        The drive and its law.
-    effects
-        At this controller.
-    """
+    """The law of one drive of a rig with `n_inputs` inputs, with its effects; definitions are added to those of the structure."""
 
     def __init__(
         self,
@@ -77,7 +65,7 @@ class ControllerPath:
 
     def _defined_by(self, effect: Effect, expression: sp.Expr, signals: dict[str, sp.Expr]) -> sp.Symbol:
         self.states += self._defined.states(effect, signals)
-        return self._defined.define(Kind.DRIVE, effect, self._binder.effect(effect, expression, signals))
+        return self._defined.changed(Kind.DRIVE, effect, expression, signals)
 
     def _late_inputs(self, read: set[sp.Symbol], effect: Effect) -> dict[sp.Symbol, sp.Expr]:
         """Return the inputs that the law reads with what stands for each where it arrives late."""

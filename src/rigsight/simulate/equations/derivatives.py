@@ -26,6 +26,7 @@ at 1e-8."""
 
 _TINY = sp.Float(1e-300)
 """Added to a magnitude in a divisor or a logarithm: where the magnitude is zero, the finite result is multiplied by zero."""
+_MODULES: list[Any] = [{positive_part.__name__: lambda x: max(x, 0.0)}, "numpy"]
 
 
 @lru_cache(maxsize=128)
@@ -204,9 +205,6 @@ def _jacobian(expressions: Sequence[sp.Expr], by: Sequence[sp.Symbol]) -> sp.Mat
 
 def _function(arguments: Sequence[sp.Symbol], expressions: Any) -> Callable[..., Any]:
     return sp.lambdify(arguments, expressions, _MODULES, cse=True)  # type: ignore[no-any-return]
-
-
-_MODULES: list[Any] = [{positive_part.__name__: lambda x: max(x, 0.0)}, "numpy"]
 
 
 def slopes_of(line: StraightLine, by: Sequence[sp.Symbol]) -> StraightLine:

@@ -22,7 +22,6 @@ _DIGITS = 40
 """Digits of the numbers at which an expression is evaluated."""
 _ROUNDED = 1e-25
 """Size below which a value is rounding error."""
-"""Digits of the numbers; a result below 1e-25 is then rounding error."""
 
 
 class absolute(sp.Function):  # type: ignore[misc]  # noqa: N801
@@ -65,12 +64,6 @@ class FrozenStructure:
     # Intermediate values computed before rates and outputs, as `Structure.remembering_steps`.
     steps: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
-    def in_modes(self, expression: sp.Expr) -> sp.Expr:
-        """Return a part of the structure's equations with the same kinks as modes."""
-        for replacement in self.replacements:
-            expression = expression.xreplace(replacement)
-        return expression
-
     @staticmethod
     def friction_sign(index: int) -> sp.Symbol:
         """Return the symbol of the sign of one of the frictions, which is its multiplier while it sticks."""
@@ -82,7 +75,9 @@ class FrozenStructure:
         expressions = [*(e.rate for e in structure.remembering_equations), *structure.computed_outputs]
         expressions += structure.remembering_steps.values()
         for atom in set().union(*(expression.atoms(sp.sign) for expression in expressions)):
-            argument = self.in_modes(atom.args[0])
+            argument = atom.args[0]
+            for replacement in self.replacements:
+                argument = argument.xreplace(replacement)
             for index, own in enumerate(self.frictions):
                 switch = self.switches[own.mode]
                 if argument in (switch, -switch):

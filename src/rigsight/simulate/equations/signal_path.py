@@ -52,8 +52,7 @@ def bound_to(
     rig: Rig, symbols: Mapping[str, sp.Symbol], expressions: Sequence[sp.Expr]
 ) -> tuple[sp.Expr, ...]:
     """Return expressions of a rig's declaration in the symbols of its structure, with drives and sensors without effects."""
-    path = _Path(Binder(rig, symbols, {}, {}), rig, ())
-    return path.bound(expressions)
+    return _Path(Binder(rig, symbols, {}, {}), rig, ()).bound(expressions)
 
 
 class _Path:
@@ -103,20 +102,19 @@ class _Path:
         followers = self._followers()
         for name in last:
             readings[name] = self._sensor(sensors[name], resisting, of_sensors)
-        states = (*followers, *memories, *lags, *of_sensors, *self._shifts())
+        shifts = [FirstOrderState(s, (sp.Integer(0),), at_place("x", n)) for n, s in self._offsets.items()]
+        states = (*followers, *memories, *lags, *of_sensors, *shifts)
+        definitions, motion = tuple(self._defined.definitions), EquationsOfMotion()
+        if mechanism.free:
+            pulled = self._observer(states) if self._bandwidths else None
+            motion = equations_of_motion(self._rig, self._defined.bound, resisting, pulled)
         return EquationTree(
             inputs=self._inputs(),
-            definitions=tuple(self._defined.definitions),
-            motion=self._motion(resisting, states),
+            definitions=definitions,
+            motion=motion,
             states=states,
             outputs=tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors),
         )
-
-    def _shifts(self) -> list[FirstOrderState]:
-        return [
-            FirstOrderState(symbol, (sp.Integer(0),), at_place("x", name))
-            for name, symbol in self._offsets.items()
-        ]
 
     def bound(self, expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
         """Return expressions with drives and sensors replaced by their definitions, without forces of joints."""
@@ -140,14 +138,6 @@ class _Path:
         for index in range(len(self._bandwidths)):
             found += input_symbols(len(mechanism.inputs) + index)
         return tuple(found)
-
-    def _motion(
-        self, resisting: Mapping[str, tuple[sp.Expr, ...]], states: Sequence[FirstOrderState]
-    ) -> EquationsOfMotion:
-        if not self._rig.mechanism.free:
-            return EquationsOfMotion()
-        pulled = self._observer(states) if self._bandwidths else None
-        return equations_of_motion(self._rig, self._defined.bound, resisting, pulled)
 
     def _observer(self, states: Sequence[FirstOrderState]) -> sp.Matrix:
         """Return the accelerations by which an observer follows the measured readings, shape (n_degrees, 1)."""
@@ -201,9 +191,7 @@ class _Path:
                 speed = self._defined.bound(self._rig.mechanism.rate(drive.along))
                 signals = {**self._of_motion(), "u": source, "v": speed}
                 lags += self._defined.states(effect, signals)
-                source = self._defined.define(
-                    Kind.DRIVE, effect, self._binder.effect(effect, effect.drive, signals)
-                )
+                source = self._defined.changed(Kind.DRIVE, effect, effect.drive, signals)
         return source
 
     def _joint(self, joint: Joint, memories: list[FirstOrderState]) -> tuple[sp.Expr, ...]:
@@ -227,9 +215,7 @@ class _Path:
                     "load": self._defined.define(Kind.LOAD, effect, load),
                     "damped": self._defined.bound(joint.damping) * signals["v"],
                 }
-            torque = self._defined.define(
-                Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals)
-            )
+            torque = self._defined.changed(Kind.TORQUE, effect, effect.torque, signals)
             if effect.energy is Energy.CONSERVATIVE:
                 carried.append(torque)
             torques.append(torque)
@@ -293,9 +279,7 @@ class _Path:
                     "deflection": deflection,
                     "deflection_rate": rate,
                 }
-                torque = self._defined.define(
-                    Kind.SPRING, effect, self._binder.effect(effect, effect.spring, chained)
-                )
+                torque = self._defined.changed(Kind.SPRING, effect, effect.spring, chained)
                 memories += self._defined.states(effect, chained)
         return torque, rate
 
@@ -345,9 +329,7 @@ class _Path:
             if effect.measured is not None:
                 signals = {**self._of_motion(), "reading": reading}
                 states += self._defined.states(effect, signals)
-                reading = self._defined.define(
-                    Kind.READING, effect, self._binder.effect(effect, effect.measured, signals)
-                )
+                reading = self._defined.changed(Kind.READING, effect, effect.measured, signals)
         delays = [
             (effect, self._binder.effect(effect, effect.reading_delay, {}))
             for effect in effects

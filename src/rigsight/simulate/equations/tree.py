@@ -14,6 +14,8 @@ from rigsight.rigs import Coordinate, Rig, applied_symbol, has_short_inverse
 from rigsight.simulate.equations.elimination import acceleration_symbols
 from rigsight.units import size_of
 
+Bound = Callable[[sp.Expr], sp.Expr]
+
 
 class Kind(StrEnum):
     """Kinds of named values in the equations."""
@@ -163,15 +165,11 @@ class EquationTree:
         root, _ = self.lateness(symbol)
         while root != symbol:
             read, moves, shown = self._readers(root)
-            if (
-                len(self.inputs) != 1
-                or len(read) != 1
-                or moves
-                or shown
-                or root not in (*self.inputs, *self._expressions)
-            ):
+            if len(self.inputs) != 1 or len(read) != 1 or moves or shown:
                 return False
-            if not isinstance(self._expressions[read[0]], late):
+            if root not in (*self.inputs, *self._expressions) or not isinstance(
+                self._expressions[read[0]], late
+            ):
                 return False
             root = read[0]
         return self.lateness(symbol)[0] in self.inputs
@@ -210,16 +208,12 @@ class EquationTree:
 
     def shown_lateness(self, symbol: sp.Symbol) -> sp.Expr | None:
         """Return the delay of a reading that is applied after the simulation; None if there is none."""
-        delays: list[sp.Expr] = []
-        while symbol not in self.remembered and isinstance(expression := self._expressions.get(symbol), late):
-            symbol, delay = expression.args
-            delays.append(delay)
-        return sp.Add(*delays) if delays else None
+        return self.lateness(symbol, self.remembered)[1]
 
-    def lateness(self, symbol: sp.Symbol) -> tuple[sp.Symbol, sp.Expr | None]:
-        """Return the symbol or expression before all delays, and the total delay; None without a delay."""
+    def lateness(self, symbol: sp.Symbol, kept: Sequence[sp.Symbol] = ()) -> tuple[sp.Symbol, sp.Expr | None]:
+        """Return the symbol or expression before all delays but those `kept`, and the total delay; None without a delay."""
         delays: list[sp.Expr] = []
-        while isinstance(expression := self._expressions.get(symbol), late):
+        while symbol not in kept and isinstance(expression := self._expressions.get(symbol), late):
             symbol, delay = expression.args
             delays.append(delay)
         return symbol, sp.Add(*delays) if delays else None
@@ -230,23 +224,19 @@ class EquationTree:
 
     @cached_property
     def _remembering_values(self) -> Mapping[sp.Symbol, sp.Expr]:
-        values: dict[sp.Symbol, sp.Expr] = {}
-        for symbol, expression in self._expressions.items():
-            if symbol not in self.remembered:
-                now = expression.args[0] if isinstance(expression, late) else expression
-                values[symbol] = now.xreplace(values)
-        return values
+        return self._values_without(self.remembered)
 
     @cached_property
     def _values(self) -> Mapping[sp.Symbol, sp.Expr]:
+        return self._values_without(())
+
+    def _values_without(self, kept: Sequence[sp.Symbol]) -> Mapping[sp.Symbol, sp.Expr]:
         values: dict[sp.Symbol, sp.Expr] = {}
         for symbol, expression in self._expressions.items():
-            now = expression.args[0] if isinstance(expression, late) else expression
-            values[symbol] = now.xreplace(values)
+            if symbol not in kept:
+                now = expression.args[0] if isinstance(expression, late) else expression
+                values[symbol] = now.xreplace(values)
         return values
-
-
-Bound = Callable[[sp.Expr], sp.Expr]
 
 
 def equations_of_motion(

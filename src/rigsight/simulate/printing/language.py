@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -19,6 +19,10 @@ _NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 _LONGEST_CHAIN = 3
 """Number of terms up to which a sum is added one after the other."""
 
+_LANE_FUNCTIONS = {
+    "Abs": "abs", "absolute": "abs", "sign": "sign_of", "positive_part": "positive", "limited": "within"
+}  # fmt: skip
+"""Functions whose names for vectors differ from those in the equations."""
 # Only functions that are called are written: some compilers warn of unused ones.
 FUNCTIONS = {
     "sign_of": "static inline double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }",
@@ -106,6 +110,11 @@ def _plain(expression: sp.Expr) -> sp.Expr:
     return expression.evalf() if expression.is_number else expression
 
 
+def _called(function: str, *further: str) -> Callable[[Any, sp.Function], str]:
+    """Return the method of a printer that writes a function as a call of another one."""
+    return lambda printer, expr: f"{function}({', '.join([*map(printer._print, expr.args), *further])})"
+
+
 class MatlabPrinter(OctaveCodePrinter):  # type: ignore[misc]
     """MATLAB for scalars, so that operators need no dot."""
 
@@ -115,11 +124,7 @@ class MatlabPrinter(OctaveCodePrinter):  # type: ignore[misc]
     def _print_Pow(self, expr: sp.Pow) -> str:  # noqa: N802
         return str(super()._print_Pow(expr)).replace(".^", "^").replace("./", "/")
 
-    def _print_absolute(self, expr: sp.Function) -> str:
-        return f"abs({self._print(expr.args[0])})"
-
-    def _print_positive_part(self, expr: sp.Function) -> str:
-        return f"max({self._print(expr.args[0])}, 0)"
+    _print_absolute, _print_positive_part = _called("abs"), _called("max", "0")
 
 
 MATLAB = Language(MatlabPrinter(), "{} = {};", "{} = {};")
@@ -135,14 +140,8 @@ class ModelicaPrinter(C99CodePrinter):  # type: ignore[misc]
             return f"sqrt({self._print(expr.base)})"
         return f"{self.parenthesize(expr.base, 1000)}^{self.parenthesize(expr.exp, 1000)}"
 
-    def _print_Abs(self, expr: sp.Abs) -> str:  # noqa: N802
-        return f"abs({self._print(expr.args[0])})"
-
-    def _print_sign(self, expr: sp.sign) -> str:
-        return f"sign({self._print(expr.args[0])})"
-
-    def _print_positive_part(self, expr: sp.Function) -> str:
-        return f"max({self._print(expr.args[0])}, 0.0)"
+    _print_Abs, _print_sign = _called("abs"), _called("sign")  # noqa: N815
+    _print_positive_part = _called("max", "0.0")
 
 
 MODELICA = Language(ModelicaPrinter(), "{} = {};", "{} = {};")
@@ -154,23 +153,13 @@ class PythonPrinter(PowersAsProducts, PythonCodePrinter):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": True, "strict": False})
 
-    def _print_Abs(self, expr: sp.Abs) -> str:  # noqa: N802
-        return f"abs({self._print(expr.args[0])})"
-
-    def _print_absolute(self, expr: sp.Function) -> str:
-        return f"abs({self._print(expr.args[0])})"
-
-    def _print_positive_part(self, expr: sp.Function) -> str:
-        return f"max({self._print(expr.args[0])}, 0.0)"
-
-    def _print_sign(self, expr: sp.sign) -> str:
-        return f"sign_of({self._print(expr.args[0])})"
+    _print_Abs = _print_absolute = _called("abs")  # noqa: N815
+    _print_positive_part, _print_sign = _called("max", "0.0"), _called("sign_of")
 
     def _print_Rational(self, expr: sp.Rational) -> str:  # noqa: N802
         return repr(float(expr))
 
-    def _print_Half(self, expr: sp.Expr) -> str:  # noqa: ARG002, N802
-        return "0.5"
+    _print_Half = _print_Rational  # noqa: N815
 
 
 PYTHON = Language(PythonPrinter(), "{} = {}", "{} = {}")
@@ -185,17 +174,14 @@ class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
 class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
     """C99 with products for small powers; ``sign_of``, ``positive`` and ``within`` are functions in the generated file."""
 
-    def _print_Rational(self, expr: sp.Rational) -> str:  # noqa: N802
+    def _print_Rational(self, expr: sp.Expr) -> str:  # noqa: N802
         return repr(float(expr))
+
+    _print_NumberSymbol = _print_Pi = _print_Exp1 = _print_Rational  # noqa: N815
 
     def _print_Integer(self, expr: sp.Integer) -> str:  # noqa: N802
         # Integers beyond the range of C would overflow; a double can represent them.
         return f"{int(expr)}.0" if abs(int(expr)) < 10**15 else repr(float(expr))
-
-    def _print_NumberSymbol(self, expr: sp.Expr) -> str:  # noqa: N802
-        return repr(float(expr))
-
-    _print_Pi = _print_Exp1 = _print_NumberSymbol  # noqa: N815
 
     def _print_Add(self, expr: sp.Add, order: str | None = None) -> str:  # noqa: N802
         # A compiler may not reorder a sum, so each term of a long one would wait for all earlier ones.
@@ -206,17 +192,8 @@ class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
         parts = [sp.Add(*part, evaluate=False) for part in (terms[:half], terms[half:])]
         return " + ".join(f"({self._print_Add(part, order)})" for part in parts)
 
-    def _print_sign(self, expr: sp.sign) -> str:
-        return f"sign_of({self._print(expr.args[0])})"
-
-    def _print_absolute(self, expr: sp.Function) -> str:
-        return f"fabs({self._print(expr.args[0])})"
-
-    def _print_positive_part(self, expr: sp.Function) -> str:
-        return f"positive({self._print(expr.args[0])})"
-
-    def _print_limited(self, expr: sp.Function) -> str:
-        return f"within({', '.join(map(self._print, expr.args))})"
+    _print_sign, _print_absolute = _called("sign_of"), _called("fabs")
+    _print_positive_part, _print_limited = _called("positive"), _called("within")
 
     def _print_simulated(self, expr: sp.Function) -> str:
         _, index, *arguments = expr.args
@@ -244,7 +221,7 @@ class LanePrinter(CPrinter):
         return f"v_{name}({', '.join(map(self._vector, arguments))})"
 
     def _print_Function(self, expr: sp.Function) -> str:  # noqa: N802
-        return self._call(type(expr).__name__, *expr.args)
+        return self._call(_LANE_FUNCTIONS.get(type(expr).__name__, type(expr).__name__), *expr.args)
 
     def _print_Add(self, expr: sp.Add, order: str | None = None) -> str:  # noqa: N802
         # The vectors of many sets hide this latency.
@@ -255,6 +232,9 @@ class LanePrinter(CPrinter):
         _print_Function
     )
     _print_sinh = _print_cosh = _print_tanh = _print_asinh = _print_exp = _print_log = _print_Function
+    _print_Abs = _print_absolute = _print_sign = _print_positive_part = _print_limited = (  # noqa: N815
+        _print_Function
+    )
 
     def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: N802
         if expr.exp == -1:
@@ -264,21 +244,6 @@ class LanePrinter(CPrinter):
         if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
             return super()._print_Pow(expr, rational)
         return self._call("pow", expr.base, expr.exp)
-
-    def _print_Abs(self, expr: sp.Abs) -> str:  # noqa: N802
-        return self._call("abs", *expr.args)
-
-    def _print_absolute(self, expr: sp.Function) -> str:
-        return self._call("abs", *expr.args)
-
-    def _print_sign(self, expr: sp.sign) -> str:
-        return self._call("sign_of", *expr.args)
-
-    def _print_positive_part(self, expr: sp.Function) -> str:
-        return self._call("positive", *expr.args)
-
-    def _print_limited(self, expr: sp.Function) -> str:
-        return self._call("within", *expr.args)
 
     def _print_simulated(self, expr: sp.Function) -> str:
         _, index, *arguments = expr.args

@@ -57,10 +57,6 @@ class EquationPrinter(ReadingOrder, TextPrinter):
         signal, delay = expression.args
         return f"{self._print(signal)}(t - {self.parenthesize(delay, PRECEDENCE['Mul'])})"
 
-    def _print_moved(self, expression: sp.Expr) -> str:
-        mass, rate = expression.args
-        return f"{self.parenthesize(mass, PRECEDENCE['Mul'], strict=True)} {self._print(rate)}"
-
 
 class TermPrinter(EquationPrinter):
     """A single term in a short form, without spaces in powers."""
@@ -71,11 +67,8 @@ class TermPrinter(EquationPrinter):
 
 def text(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
     """Return an expression as plain text with its symbols renamed."""
-    return str(
-        TextPrinter().doprint(
-            expression.xreplace({s: sp.Symbol(name, real=True) for s, name in names.items()})
-        )
-    )
+    symbols = {s: sp.Symbol(name, real=True) for s, name in names.items()}
+    return str(TextPrinter().doprint(expression.xreplace(symbols)))
 
 
 def text_equation(equation: ShownEquation, names: Mapping[sp.Symbol, str]) -> str:
@@ -132,10 +125,6 @@ class LatexPrinter(ReadingOrder, SympyLatexPrinter):  # type: ignore[misc]
     def _print_late(self, expression: sp.Expr) -> str:
         signal, delay = map(self._print, expression.args)
         return rf"{signal}\left(t - {delay}\right)"
-
-    def _print_moved(self, expression: sp.Expr) -> str:
-        mass, rate = expression.args
-        return f"{self.parenthesize(mass, PRECEDENCE['Mul'], strict=True)} {self._print(rate)}"
 
 
 def _latex_below(word: str) -> str:

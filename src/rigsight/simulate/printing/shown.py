@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
+from sympy.printing.precedence import PRECEDENCE
 
 from rigsight.effects.symbols import positive_part
 from rigsight.simulate.equations.structure import Structure
@@ -266,3 +267,8 @@ class ReadingOrder:
         printer: Any = super()
         terms: list[sp.Expr] = printer._as_ordered_terms(expr, order=order)
         return sorted(terms, key=lambda term: bool(term.could_extract_minus_sign()))
+
+    def _print_moved(self, expression: sp.Expr) -> Any:
+        mass, rate = expression.args
+        printer: Any = self
+        return f"{printer.parenthesize(mass, PRECEDENCE['Mul'], strict=True)} {printer._print(rate)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.compare.random_effects import Prediction
+from rigsight.compare.usual_gap import Prediction
 from rigsight.diagnose.trust.patterns import roles
 from rigsight.identify.identification import Identification
 from rigsight.simulate import compose

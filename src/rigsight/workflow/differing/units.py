@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from rigsight.compare.random_effects import Prediction
+from rigsight.compare.usual_gap import Prediction
 from rigsight.diagnose.trust.patterns import Role, roles
 from rigsight.effects import Effect, Family
 from rigsight.errors import InputError
