@@ -95,9 +95,8 @@ def time_base(stamps: Floats, lines: NDArray[np.int64], file: str, row: str = "l
     if not coarse:
         tolerated = np.maximum(tolerated, LARGEST_ROUNDING * rounding)
     if slope > 0.0 and bool(np.all(deviation <= tolerated)):
-        return TimeBase(
-            float(stamps[0]), _plain(float(slope), float(rounding[-1]) / stamps.size), stamps.size
-        )
+        even = _plain(float(slope), float(rounding[-1]) / stamps.size)
+        return TimeBase(float(stamps[0]), even, stamps.size)
     _check_order(stamps, lines, file, row)
     _check_gaps(stamps, lines, file, row)
     steps = np.diff(stamps)
@@ -112,19 +111,14 @@ def time_base(stamps: Floats, lines: NDArray[np.int64], file: str, row: str = "l
             f"(jitter {100 * jitter:.2g} %, at most {100 * LARGEST_JITTER:g} % is resampled). "
             "Record with a fixed sample time, or cut the record to its even part with start and end."
         )
-    if COARSEST_STAMPS < rounding.max() / slope <= COARSE_BUT_CLEAR and bool(
-        np.all(deviation <= LARGEST_ROUNDING * rounding)
-    ):
+    agrees = bool(np.all(deviation <= LARGEST_ROUNDING * rounding))
+    if agrees and COARSEST_STAMPS < rounding.max() / slope <= COARSE_BUT_CLEAR:
         note = (
             f"{file}: time is printed in steps of {rounding.max():.2g}, coarse beside the sample time of {dt:.4g}; the samples "
             "were taken as evenly spaced, which agrees with every stamp."
         )
-        return TimeBase(
-            float(stamps[0] + start),
-            _plain(slope, float(rounding[-1]) / stamps.size),
-            stamps.size,
-            notes=(note,),
-        )
+        even = _plain(slope, float(rounding[-1]) / stamps.size)
+        return TimeBase(float(stamps[0] + start), even, stamps.size, notes=(note,))
     return TimeBase(float(stamps[0]), _plain(dt, jitter * dt / stamps.size), stamps.size, stamps, jitter)
 
 
@@ -153,11 +147,8 @@ def pauses(stamps: Floats) -> NDArray[np.intp]:
     if found.size == 0 or found.size > MOST_PAUSES * steps.size:
         return none
     lengths = np.diff([0, *(found + 1), stamps.size])
-    if lengths[lengths >= FEWEST_SAMPLES].sum() < FEWEST_KEPT * stamps.size and bool(
-        np.all(in_samples <= longest)
-    ):
-        return none
-    return found
+    too_little = lengths[lengths >= FEWEST_SAMPLES].sum() < FEWEST_KEPT * stamps.size
+    return none if too_little and bool(np.all(in_samples <= longest)) else found
 
 
 def _is_missed(stamps: Floats, sample: int) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.column_mapping import ColumnMapping, Columns
+from rigsight.records.column_mapping import TIME, ColumnMapping, Columns
 from rigsight.records.conditioning import (
     COARSEST_STAMPS,
     FEWEST_KEPT,
@@ -37,11 +37,11 @@ class Stretches:
 
 
 def between(
-    file: str, time: str, table: Columns, scale: ColumnMapping, start: float | None, end: float | None
+    file: str, table: Columns, scale: ColumnMapping, start: float | None, end: float | None
 ) -> Columns:
     """Return the rows of a table from `start` to `end`."""
     begin, stop = (-np.inf if start is None else start), (np.inf if end is None else end)
-    clocks = table.axes or {time: table.values[time]}
+    clocks = table.stamps
     seconds = {signal: scale.to_si(stamps) for signal, stamps in clocks.items()}
     first, last = min(float(t.min()) for t in seconds.values()), max(float(t.max()) for t in seconds.values())
     if not begin < stop or begin > last or stop < first:
@@ -51,7 +51,7 @@ def between(
         )
     rows = {id(clocks[s]): np.flatnonzero((t >= begin) & (t <= stop)) for s, t in seconds.items()}
     if not table.axes:
-        kept = rows[id(clocks[time])]
+        kept = rows[id(clocks[TIME])]
         return replace(table, values={s: v[kept] for s, v in table.values.items()}, lines=table.lines[kept])
     axes = {id(stamps): stamps[rows[id(stamps)]] for stamps in table.axes.values()}
     return replace(
@@ -61,9 +61,9 @@ def between(
     )
 
 
-def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ()) -> Stretches:
+def stretches(file: str, table: Columns, outputs: Sequence[str] = ()) -> Stretches:
     """Return the stretches of a table between the gaps of its clocks."""
-    clocks = table.axes or {time: table.values[time]}
+    clocks = table.stamps
     gaps = {signal: found for signal, stamps in clocks.items() if (found := _gaps(stamps)).size}
     if not gaps:
         return Stretches((table,))
@@ -77,11 +77,9 @@ def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ())
         spans.append((latest, before))
         latest = max(latest, after)
     spans = [(begin, stop) for begin, stop in [*spans, (latest, np.inf)] if begin < stop]
-    parts = [part for begin, stop in spans if (part := _part(table, time, begin, stop)) is not None]
+    parts = [part for begin, stop in spans if (part := _part(table, begin, stop)) is not None]
     long = [part for part in parts if part.lines.size >= FEWEST_SAMPLES]
-    moving = [
-        part for part in long if not outputs or any(not is_constant(part.values[name]) for name in outputs)
-    ]
+    moving = [part for part in long if not (outputs and all(is_constant(part.values[o]) for o in outputs))]
     where = _where(stamps, table, ends)
     n_samples = max(stamps.size for stamps in clocks.values())
     kept = sum(part.lines.size for part in moving)
@@ -91,11 +89,9 @@ def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ())
             "more in which an output changes. Record without dropouts, or fill them before reading if you know what was there."
         )
     dropped = n_samples - kept
-    why = (
-        "shorter stretches"
-        if len(moving) == len(long)
-        else "stretches that are shorter, or in which no output changes,"
-    )
+    why = "shorter stretches"
+    if len(moving) < len(long):
+        why = "stretches that are shorter, or in which no output changes,"
     left = f" {dropped} samples in {why} were left out." if dropped > 0 else ""
     note = (
         f"{file}: samples are missing {where}. It was read as {len(moving)} record{'s' if len(moving) > 1 else ''}, each with "
@@ -143,14 +139,14 @@ def _where(stamps: Floats, table: Columns, ends: NDArray[np.intp]) -> str:
     )
 
 
-def _part(table: Columns, time: str, begin: float, stop: float) -> Columns | None:
+def _part(table: Columns, begin: float, stop: float) -> Columns | None:
     """Return the rows with stamps from `begin` to `stop`; None where a clock has none there."""
 
     def rows(stamps: Floats) -> slice:
         return slice(int(np.searchsorted(stamps, begin)), int(np.searchsorted(stamps, stop, "right")))
 
     if not table.axes:
-        own = rows(table.values[time])
+        own = rows(table.values[TIME])
         values = {name: v[own] for name, v in table.values.items()}
         return replace(table, values=values, lines=table.lines[own])
     axes = {id(stamps): stamps[rows(stamps)] for stamps in table.axes.values()}

@@ -52,9 +52,8 @@ class Mechanism:
     order: tuple[str, ...] = ()  # names of drives and sensors in an order in which none reads one behind it
     # What another program simulates; its mass matrix and forces are added to those of the energies.
     bodies: Bodies | None = None
-    asked: tuple[
-        sp.Symbol, ...
-    ] = ()  # parameters, constants and states that the bodies read, in the order of theirs
+    # Parameters, constants and states that the bodies read, in the order of theirs.
+    asked: tuple[sp.Symbol, ...] = ()
 
     @property
     def free(self) -> tuple[Coordinate, ...]:
@@ -76,6 +75,12 @@ class Mechanism:
     def joint_named(self, name: str | None) -> Joint:
         """Return a joint by its name; the first one for any other name."""
         return next((joint for joint in self.joints if joint.name == name), self.first_joint)
+
+    @property
+    def moving(self) -> set[sp.Symbol]:
+        """Coordinates, rates and states, and the named signals, which may hold these."""
+        own = {symbol for c in self.coordinates for symbol in (c.symbol, c.rate)}
+        return own | {state.symbol for state in self.states} | set(self.signals)
 
     @cached_property
     def has_one_motion(self) -> bool:
@@ -103,13 +108,11 @@ class Mechanism:
         own = sp.Symbol(drive.name, real=True)
         gain = derivative(drive.force, own)
         read = gain.free_symbols | {own, *drive.signal.free_symbols}
-        moving = {c.symbol for c in self.coordinates} | {c.rate for c in self.coordinates}
-        moving |= {state.symbol for state in self.states} | set(self.signals)
         return (
             drive.signal == sp.Symbol(self.inputs[0], real=True)
             and sp.expand(drive.force - gain * own) == 0
             and own not in gain.free_symbols
-            and not read & moving
+            and not read & self.moving
         )
 
     @cached_property
@@ -186,10 +189,8 @@ class Mechanism:
 
     def prescribed_rate(self, expression: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression of prescribed coordinates and their rates."""
-        along = sum(
-            (derivative(expression, c.rate) * acceleration(c) for c in self.prescribed), start=sp.Integer(0)
-        )
-        return self.rate(expression) + along
+        along = (derivative(expression, c.rate) * acceleration(c) for c in self.prescribed)
+        return sum(along, start=self.rate(expression))
 
     def written_out(self, expression: sp.Expr) -> sp.Expr:
         """Return an expression without named signals."""

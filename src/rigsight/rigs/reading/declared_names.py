@@ -78,10 +78,8 @@ def _check_places(declaration: Declaration) -> None:
         for name in getattr(declaration.table, key):
             _check_name(declaration, (key, name), name)
             if name in places:
-                declaration.refuse(
-                    (key, name),
-                    f"[{places[name]}.{name}] has the same name; effects act at places, so each needs its own",
-                )
+                why = "has the same name; effects act at places, so each needs its own"
+                declaration.refuse((key, name), f"[{places[name]}.{name}] {why}")
             places[name] = key
 
 
@@ -89,41 +87,27 @@ def _check_references(declaration: Declaration) -> None:
     """Refuse names in keys and values that stand for a declared thing, and do not."""
     table = declaration.table
     for name, own in table.coordinates.items():
-        if own.prescribed_by is not None and own.prescribed_by not in table.inputs:
-            declaration.refuse(
-                ("coordinates", name, "prescribed_by"),
-                f"there is no input '{own.prescribed_by}'.{nearest(own.prescribed_by, table.inputs)} "
-                f"Declared: {_listed(table.inputs)}",
-            )
+        if own.prescribed_by is not None:
+            path = ("coordinates", name, "prescribed_by")
+            declaration.check_known(path, "input", own.prescribed_by, table.inputs)
     for name, alternative in table.alternatives.items():
-        if alternative.gives not in table.parameters:
-            declaration.refuse(
-                ("alternatives", name, "gives"),
-                f"there is no parameter '{alternative.gives}'.{nearest(alternative.gives, table.parameters)} "
-                f"Declared: {_listed(table.parameters)}",
-            )
+        path = ("alternatives", name, "gives")
+        declaration.check_known(path, "parameter", alternative.gives, table.parameters)
     free = [name for name, own in table.coordinates.items() if own.prescribed_by is None]
     known = [*free, *map(rate_name, free), *table.states]
     for name in table.initial:
         if name in table.states and table.states[name].start is not None:
-            declaration.refuse(
-                ("initial", name),
-                f"'{name}' has two start values: states.{name}.start gives it too; remove one",
-            )
-        if name in known:
+            why = f"has two start values: states.{name}.start gives it too; remove one"
+        elif name in known:
             continue
-        if (
+        elif (
             name in declaration.symbols
             and name.removeprefix(f"{RATE}(").removesuffix(")") in table.coordinates
         ):
-            declaration.refuse(
-                ("initial", name),
-                f"'{name}' is prescribed by an input, which also gives its start value; remove it",
-            )
-        declaration.refuse(
-            ("initial", name),
-            f"'{name}' is not a coordinate, rate or state.{nearest(name, known)} Known: {_listed(known)}",
-        )
+            why = "is prescribed by an input, which also gives its start value; remove it"
+        else:
+            why = f"is not a coordinate, rate or state.{nearest(name, known)} Known: {_listed(known)}"
+        declaration.refuse(("initial", name), f"'{name}' {why}")
 
 
 def check_names_read(declaration: Declaration) -> None:
@@ -236,10 +220,9 @@ def check_all_used(declaration: Declaration) -> None:
                 f"neither it nor another equation reads '{name}', the signal of the drive after its effects; use '{name}' in it",
             )
     for name in table.alternatives:
-        if name not in expressions["alternatives", name, "value"].reads:
-            declaration.refuse(
-                ("alternatives", name, "value"), f"it does not read '{name}', from which it should be derived"
-            )
+        path = ("alternatives", name, "value")
+        if name not in expressions[path].reads:
+            declaration.refuse(path, f"it does not read '{name}', from which it should be derived")
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from functools import partial
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from rigsight.rigs.mechanism import Mechanism
 from rigsight.rigs.parts import READING, Coordinate, Drive, Joint, RateState, Sensor, Signal
 from rigsight.rigs.reading.declaration import DRIVE_PARTS, JOINT_PARTS, Declaration
 from rigsight.rigs.reading.declared_names import check_all_used, check_declared_names, check_names_read
-from rigsight.rigs.reading.declared_units import check_units_add_up
+from rigsight.rigs.reading.dimensions import Units
 from rigsight.rigs.reading.expressions import rate_name
 from rigsight.rigs.reading.rig_tables import ConstantTable, ParameterTable
 from rigsight.rigs.reading.simulator import check_simulator, simulated_bodies, with_whole_path
@@ -106,7 +107,7 @@ def _checked(declaration: Declaration, check_units: bool) -> Rig:
     check_names_read(declaration)
     order = signal_order(declaration)
     if check_units:
-        check_units_add_up(declaration, order)
+        Units(declaration).check(order)
     check_all_used(declaration)
     rig = rig_of(declaration, order)
     check_mechanism(declaration, rig.mechanism)
@@ -147,30 +148,24 @@ _LARGEST, _LEAST = 1e18, 1e-15
 
 def rig_of(declaration: Declaration, order: list[KeyPath]) -> Rig:
     """Return the rig."""
-    table = declaration.table
+    table, parameter = declaration.table, partial(_parameter, declaration)
     mechanism = _mechanism(declaration, order)
     one_motion = mechanism.has_one_motion
     return Rig(
         name=table.name,
         summary=table.summary,
         inputs=tuple(Signal(name, own.unit, own.about) for name, own in table.inputs.items()),
-        constants=tuple(
-            _parameter(declaration, "constants", name, own, "") for name, own in table.constants.items()
-        ),
+        constants=tuple(parameter("constants", name, own, "") for name, own in table.constants.items()),
         parameters=tuple(
-            _parameter(
-                declaration,
-                "parameters",
-                name,
-                own,
-                sized_by(name, own.unit, mechanism) if one_motion else size_of(name),
+            parameter(
+                "parameters", name, own, sized_by(name, own.unit, mechanism) if one_motion else size_of(name)
             )
             for name, own in table.parameters.items()
         ),
         mechanism=mechanism,
         alternatives=tuple(
             Alternative(
-                _parameter(declaration, "alternatives", name, own, ""),
+                parameter("alternatives", name, own, ""),
                 own.gives,
                 declaration.sympy(("alternatives", name, "value")),
             )
@@ -184,6 +179,10 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
     table, symbols, sympy = declaration.table, declaration.symbols, declaration.sympy
     signals = {symbols[str(path[1])]: sympy(path) for path in order if path[0] == "signals"}
     bodies = simulated_bodies(declaration)
+    started: list[tuple[KeyPath, str]] = [(("initial", name), name) for name in table.initial]
+    started += [
+        (("states", name, "start"), name) for name, own in table.states.items() if own.start is not None
+    ]
     return Mechanism(
         inputs=tuple(table.inputs),
         coordinates=tuple(
@@ -211,23 +210,11 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
             for name, own in table.sensors.items()
         ),
         states=tuple(
-            RateState(
-                symbols[name],
-                sympy(("states", name, "rate")),
-                own.unit,
-                own.about,
-            )
+            RateState(symbols[name], sympy(("states", name, "rate")), own.unit, own.about)
             for name, own in table.states.items()
         ),
         signals=signals,
-        initial={
-            **{symbols[name]: sympy(("initial", name)) for name in table.initial},
-            **{
-                symbols[name]: sympy(("states", name, "start"))
-                for name, own in table.states.items()
-                if own.start is not None
-            },
-        },
+        initial={symbols[name]: sympy(path) for path, name in started},
         order=tuple(str(path[1]) for path in order if path[0] != "signals"),
         bodies=bodies,
         asked=tuple(symbols[name] for name in (*table.simulator.parameters, *table.simulator.states))
@@ -251,10 +238,8 @@ def _parameter(
     for end in ("lower", "upper"):
         bound = getattr(own, end)
         if log and bound is not None and bound <= 0.0:
-            declaration.refuse(
-                (key, name, end),
-                f"log = true searches its logarithm, so {end} must be above 0, got {bound:g}",
-            )
+            why = f"log = true searches its logarithm, so {end} must be above 0, got {bound:g}"
+            declaration.refuse((key, name, end), why)
     if key == "alternatives" and own.default is not None:
         declaration.refuse((key, name, "default"), "an alternative has none; give its parameter a default")
     lower = own.lower if own.lower is not None else (_LEAST if log else -_LARGEST)
@@ -265,14 +250,7 @@ def _parameter(
     if own.default is not None and not lower <= own.default <= upper:
         declaration.refuse((key, name, "default"), f"{own.default:g} is not within [{lower:g}, {upper:g}]")
     return Parameter(
-        name,
-        own.about,
-        dimension_text,
-        own.unit,
-        lower=lower,
-        upper=upper,
-        default=own.default,
-        logarithmic=log,
+        name, own.about, dimension_text, own.unit, lower, upper, default=own.default, logarithmic=log
     )
 
 

@@ -11,6 +11,8 @@ from rigsight.simulators import KINDS, Bodies
 from rigsight.simulators.bodies import model_digest
 
 _KEY = "simulator"
+_OWNERS = {"states": "mujoco", "rates": "fmu", "forces": "fmu", "step": "fmu", "without_armature": "mujoco"}
+"""Keys that one kind of simulator alone has."""
 
 
 def check_simulator(declaration: Declaration) -> None:
@@ -19,23 +21,14 @@ def check_simulator(declaration: Declaration) -> None:
     if own is None:
         return
     if own.kind not in KINDS:
-        declaration.refuse(
-            (_KEY, "kind"),
-            f"'{own.kind}' is not a simulator.{nearest(own.kind, KINDS)} Allowed: {', '.join(KINDS)}",
-        )
+        allowed = f"{nearest(own.kind, KINDS)} Allowed: {', '.join(KINDS)}"
+        declaration.refuse((_KEY, "kind"), f"'{own.kind}' is not a simulator.{allowed}")
     free = [name for name, coordinate in table.coordinates.items() if coordinate.prescribed_by is None]
     if len(free) < len(table.coordinates) or not free:
         declaration.refuse(
             (_KEY,), "every coordinate of a simulated rig must be a degree of freedom; remove prescribed_by"
         )
-    owners = {
-        "states": "mujoco",
-        "rates": "fmu",
-        "forces": "fmu",
-        "step": "fmu",
-        "without_armature": "mujoco",
-    }
-    for key, wanted in owners.items():
+    for key, wanted in _OWNERS.items():
         if getattr(own, key) and own.kind != wanted:
             declaration.refuse((_KEY, key), f"it belongs to {wanted}, but this is {own.kind}; remove it")
     if own.digest and own.kind == "python":
@@ -44,11 +37,7 @@ def check_simulator(declaration: Declaration) -> None:
         )
     for key in ("coordinates", "rates", "forces"):
         for name in getattr(own, key):
-            if name not in free:
-                declaration.refuse(
-                    (_KEY, key, name),
-                    f"there is no coordinate '{name}'.{nearest(name, free)} Declared: {', '.join(free)}",
-                )
+            declaration.check_known((_KEY, key, name), "coordinate", name, free)
         names = list(getattr(own, key).values())
         for name, there in getattr(own, key).items():
             if names.count(there) > 1:
@@ -57,18 +46,12 @@ def check_simulator(declaration: Declaration) -> None:
         if list(own.parameters.values()).count(there) > 1:
             declaration.refuse((_KEY, "parameters", name), f"'{there}' is given by two numbers; remove one")
     for name in own.states:
-        if name not in table.states:
-            declaration.refuse(
-                (_KEY, "states", name),
-                f"there is no state '{name}'.{nearest(name, table.states)} Declared: {', '.join(table.states) or 'none'}",
-            )
+        declaration.check_known((_KEY, "states", name), "state", name, table.states)
     numbers = declaration.names("constants", "parameters")
     for name in own.parameters:
         if name not in numbers:
-            declaration.refuse(
-                (_KEY, "parameters", name),
-                f"'{name}' is neither a constant nor a parameter of this file.{nearest(name, numbers)} Declare it",
-            )
+            why = f"is neither a constant nor a parameter of this file.{nearest(name, numbers)} Declare it"
+            declaration.refuse((_KEY, "parameters", name), f"'{name}' {why}")
 
 
 def simulated_bodies(declaration: Declaration) -> Bodies | None:
