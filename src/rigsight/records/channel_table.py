@@ -46,7 +46,8 @@ def read_columns(
         possible = selection.possible_times(time_is_mapped) if dt is None else selection.shown_times(dt)
         times = {f"time {number}": number for numbers in possible.values() for number in numbers}
         # Signals of other rates end in other rows of a text, and blank cells fill the rest.
-        file.ahead({**selection.found, **times}, len(times) > 1)
+        if file.ahead is not None:
+            file.ahead({**selection.found, **times}, len(times) > 1)
         values = {signal: selection.quantity(signal) for signal in selection.found}
         clocks = {signal: selection.clock(signal, own, values) for signal, own in possible.items()}
         notes = (*file.notes, *selection.notes())

@@ -17,7 +17,14 @@ from rigsight.records.channel_units import si_mapping, units_of_columns
 from rigsight.records.clocks import side_by_side
 from rigsight.records.column_mapping import TIME as TIME
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
-from rigsight.records.conditioning import TimeBase, check_long_enough, time_base
+from rigsight.records.conditioning import (
+    TimeBase,
+    between,
+    check_long_enough,
+    one_stretch,
+    stretches,
+    time_base,
+)
 from rigsight.records.record import Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, joined
 from rigsight.records.sensor_signs import between_readings, refuse_codes, unwrapped
@@ -31,7 +38,6 @@ from rigsight.records.sound_signals import (
     refuse_implausible,
     rest_notes,
 )
-from rigsight.records.stretches import between, one_stretch, stretches
 
 _DIALECT = ("separator", "decimal", "header", "comment")
 """What may be said of a text."""

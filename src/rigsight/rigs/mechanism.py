@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice, permutations
+from itertools import islice, permutations, product
 
 import numpy as np
 import sympy as sp
@@ -298,30 +298,12 @@ def has_short_inverse(mass: sp.ImmutableMatrix) -> bool:
     """Return True if at most `MOST_COUPLED` coordinates move one another's inertia, directly or not, by short formulas."""
     return all(
         len(group) <= MOST_COUPLED and (len(group) == 1 or _products(mass, group) <= _MOST_PRODUCTS)
-        for group in _coupled(mass)
+        for group in mass.connected_components()
     )
-
-
-def _coupled(mass: sp.ImmutableMatrix) -> list[list[int]]:
-    """Return the rows of a mass matrix in groups that move one another."""
-    left, groups = set(range(mass.rows)), []
-    while left:
-        group, waiting = [], [left.pop()]
-        while waiting:
-            row = waiting.pop()
-            group.append(row)
-            moved = {column for column in left if mass[row, column] != 0}
-            left -= moved
-            waiting += moved
-        groups.append(group)
-    return groups
 
 
 def _products(mass: sp.ImmutableMatrix, group: list[int]) -> int:
     """Return the products in the determinant of a group's rows, each entry written out as a sum."""
-    terms = {
-        (i, j): len(sp.Add.make_args(mass[i, j])) if mass[i, j] != 0 else 0 for i in group for j in group
-    }
-    return sum(
-        math.prod(terms[i, j] for i, j in zip(group, order, strict=True)) for order in permutations(group)
-    )
+    terms = {place: len(sp.Add.make_args(mass[place])) for place in product(group, group) if mass[place] != 0}
+    orders = (zip(group, order, strict=True) for order in permutations(group))
+    return sum(math.prod(terms.get(place, 0) for place in places) for places in orders)

@@ -277,12 +277,9 @@ def rig_text(draft: RigDraft, source: str, folder: Path) -> str:
     if draft.is_as_it_is:
         beside = Path(os.path.relpath(tables["simulator"]["file"], folder.resolve())).as_posix()
         tables["simulator"] = {**tables["simulator"], "file": beside}
-    return f"{_printable(head)}\n\n{tomli_w.dumps(tables)}"
-
-
-def _printable(text: str) -> str:
-    """Return text without the signs that TOML forbids in comments."""
-    return "".join(sign if sign in "\n\t" or sign.isprintable() else " " for sign in text)
+    # TOML forbids some signs in comments.
+    plain = "".join(sign if sign in "\n\t" or sign.isprintable() else " " for sign in head)
+    return f"{plain}\n\n{tomli_w.dumps(tables)}"
 
 
 def simulator_table(

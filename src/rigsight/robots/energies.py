@@ -129,8 +129,11 @@ def _together(joints: Sequence[TreeJoint]) -> list[list[TreeJoint]]:
     groups: list[list[TreeJoint]] = []
     for joint in joints:
         last = groups[-1][-1] if groups else None
-        if last is not None and all(
-            np.array_equal(getattr(last, part), getattr(joint, part)) for part in ("slides", "axis", "anchor")
+        if (
+            last is not None
+            and last.slides == joint.slides
+            and np.array_equal(last.axis, joint.axis)
+            and np.array_equal(last.anchor, joint.anchor)
         ):
             groups[-1].append(joint)
         else:
