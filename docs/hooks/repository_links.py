@@ -61,7 +61,7 @@ def place_on_site(path: str) -> str | None:
     if path == "src/rigsight/effects":
         return "effects/index.md"
     found = re.fullmatch(r"src/rigsight/effects/(\w+)\.py", path)
-    if found and found[1] not in ("__init__", "catalogue", "effect", "symbols"):
+    if found and found[1] not in ("__init__", "catalogue", "effect", "numbers", "symbols"):
         return f"effects/{found[1]}.md"
     package = re.fullmatch(r"src/rigsight/(\w+?)(?:\.py)?", path)
     return f"reference/{package[1]}.md" if package else None

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rigsight.robots import draft_rig, free_run, load_model, load_spec, with_gears
-from rigsight.robots.free_run import ALLOWED
+from rigsight.robots.runs import ALLOWED
 
 from ..tiers import slow_but
 

@@ -10,7 +10,7 @@ import pytest
 
 from rigsight.records import Record
 from rigsight.robots import draft_rig, free_run, gap_of_written, load_model, write_back
-from rigsight.robots.free_run import ALLOWED
+from rigsight.robots.runs import ALLOWED
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 

@@ -16,8 +16,8 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import u
-from rigsight.parameters import Parameter
 
 T_a, u_a = sp.symbols("T_a u_a", real=True)
 
@@ -27,13 +27,11 @@ ACTUATOR_LAG = Effect(
     family=Family.DELAY_OR_LAG,
     summary="The drive follows its command with a first-order lag.",
     parameters=(
-        Parameter(
+        amount(
             "T_a",
             "time constant",
             "time",
-            lower=0.0,
             upper=1e6,
-            null=0.0,
             starts=(0.05, 0.3),
             search=(1e-3, 10.0),
             logarithmic=True,

@@ -17,8 +17,8 @@ References: K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics*
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import signed
 from rigsight.effects.symbols import x
-from rigsight.parameters import Parameter
 
 k_2 = sp.Symbol("k_2", real=True)
 
@@ -28,13 +28,12 @@ ASYMMETRIC_STIFFNESS = Effect(
     family=Family.SPRING_LAW,
     summary="The spring is stiffer on one side than on the other.",
     parameters=(
-        Parameter(
+        signed(
             "k_2",
             "quadratic stiffness",
             "force x^-2",
             lower=-1e24,
             upper=1e24,
-            null=0.0,
             starts=(0.2, -0.2),
             search=(-1.0, 1.0),
         ),

@@ -25,8 +25,8 @@ model M5 without its part that falls with speed.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import drive_size, driven, load, v
-from rigsight.parameters import Parameter
 
 T_c, mu, mu_m, mu_e = sp.symbols("T_c mu mu_m mu_e", real=True)
 
@@ -36,36 +36,11 @@ BACK_DRIVING_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction grows with the force of the motor and, otherwise, with that of the load.",
     parameters=(
-        Parameter(
-            "T_c",
-            "friction without load",
-            "drive",
-            lower=0.0,
-            upper=1e12,
-            null=0.0,
-            starts=(0.05, 0.1),
-            search=(0.0, 2.0),
+        amount("T_c", "friction without load", "drive", upper=1e12, starts=(0.05, 0.1), search=(0.0, 2.0)),
+        amount(
+            "mu_m", "friction per force of the motor", "", upper=1.0, starts=(0.1, 0.2), search=(0.0, 1.0)
         ),
-        Parameter(
-            "mu_m",
-            "friction per force of the motor",
-            "",
-            lower=0.0,
-            upper=1.0,
-            null=0.0,
-            starts=(0.1, 0.2),
-            search=(0.0, 1.0),
-        ),
-        Parameter(
-            "mu_e",
-            "friction per force of the load",
-            "",
-            lower=0.0,
-            upper=1.0,
-            null=0.0,
-            starts=(0.2, 0.1),
-            search=(0.0, 1.0),
-        ),
+        amount("mu_e", "friction per force of the load", "", upper=1.0, starts=(0.2, 0.1), search=(0.0, 1.0)),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

@@ -17,7 +17,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.parameters import Parameter
+from rigsight.effects.numbers import amount
 
 T_m = sp.Symbol("T_m", real=True)
 
@@ -26,11 +26,7 @@ COMMAND_DELAY = Effect(
     place=Place.CONTROLLER,
     family=Family.DELAY_OR_LAG,
     summary="The controller receives its command late.",
-    parameters=(
-        Parameter(
-            "T_m", "delay", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)
-        ),
-    ),
+    parameters=(amount("T_m", "delay", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
     command_delay=T_m,

@@ -17,8 +17,8 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import command
-from rigsight.parameters import Parameter
 
 T_c, c_c = sp.symbols("T_c c_c", real=True)
 
@@ -28,13 +28,11 @@ COMMAND_FILTER = Effect(
     family=Family.CONTROLLER,
     summary="The controller follows a smoothed command.",
     parameters=(
-        Parameter(
+        amount(
             "T_c",
             "time constant",
             "time",
-            lower=0.0,
             upper=1e6,
-            null=0.0,
             starts=(0.05, 0.3),
             search=(1e-3, 10.0),
             logarithmic=True,

@@ -19,6 +19,7 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import limit
 from rigsight.effects.symbols import beyond, clamp, command
 from rigsight.parameters import Parameter
 
@@ -30,13 +31,11 @@ COMMAND_RATE_LIMIT = Effect(
     family=Family.CONTROLLER,
     summary="The command changes at a limited rate.",
     parameters=(
-        Parameter(
+        limit(
             "w_c",
             "largest rate of the command",
             "input time^-1",
             lower=1e-12,
-            upper=1e300,
-            null=1e300,
             starts=(0.7, 0.3),
             search=(0.02, 3.0),
         ),

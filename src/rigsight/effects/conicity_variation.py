@@ -16,8 +16,8 @@ References: A. H. Wickens, *Fundamentals of Rail Vehicle Dynamics* (Swets & Zeit
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import limit
 from rigsight.effects.symbols import creep_gain, creepage, lateral_displacement, lateral_feedback
-from rigsight.parameters import Parameter
 
 y_n = sp.Symbol("y_n", real=True)
 
@@ -27,13 +27,11 @@ CONICITY_VARIATION = Effect(
     family=Family.CONTACT,
     summary="The wheel profile steepens away from the center, so that the restoring effect on the axle grows with displacement.",
     parameters=(
-        Parameter(
+        limit(
             "y_n",
             "displacement at which the restoring part has doubled",
             "length",
             lower=1e-12,
-            upper=1e300,
-            null=1e300,
             starts=(2.0, 0.7),
             search=(0.05, 100.0),
             logarithmic=True,

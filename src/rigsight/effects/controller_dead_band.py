@@ -16,8 +16,8 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import beyond, error, output
-from rigsight.parameters import Parameter
 
 e_0 = sp.Symbol("e_0", real=True)
 
@@ -27,15 +27,8 @@ CONTROLLER_DEAD_BAND = Effect(
     family=Family.CONTROLLER,
     summary="The controller ignores small errors.",
     parameters=(
-        Parameter(
-            "e_0",
-            "half-width of the dead band",
-            "input",
-            lower=0.0,
-            upper=1e300,
-            null=0.0,
-            starts=(0.02, 0.1),
-            search=(0.0, 1.0),
+        amount(
+            "e_0", "half-width of the dead band", "input", upper=1e300, starts=(0.02, 0.1), search=(0.0, 1.0)
         ),
     ),
     energy=Energy.ACTIVE,

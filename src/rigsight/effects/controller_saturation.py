@@ -18,8 +18,8 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import limit
 from rigsight.effects.symbols import clamp, output
-from rigsight.parameters import Parameter
 
 o_max = sp.Symbol("o_max", real=True)
 
@@ -29,16 +29,7 @@ CONTROLLER_SATURATION = Effect(
     family=Family.CONTROLLER,
     summary="The output of the controller cannot exceed a limit.",
     parameters=(
-        Parameter(
-            "o_max",
-            "largest output",
-            "input",
-            lower=0.0,
-            upper=1e300,
-            null=1e300,
-            starts=(0.05, 0.2),
-            search=(0.003, 2.0),
-        ),
+        limit("o_max", "largest output", "input", lower=0.0, starts=(0.05, 0.2), search=(0.003, 2.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

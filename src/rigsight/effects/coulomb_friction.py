@@ -18,8 +18,8 @@ Righthand Sides* (Kluwer 1988), for sticking.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import v
-from rigsight.parameters import Parameter
 
 T_c = sp.Symbol("T_c", real=True)
 
@@ -29,16 +29,7 @@ COULOMB_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction of constant size opposes the motion; the mass sticks while the torque is small.",
     parameters=(
-        Parameter(
-            "T_c",
-            "Coulomb friction",
-            "drive",
-            lower=0.0,
-            upper=1e12,
-            null=0.0,
-            starts=(0.05, 0.3),
-            search=(0.0, 2.0),
-        ),
+        amount("T_c", "Coulomb friction", "drive", upper=1e12, starts=(0.05, 0.3), search=(0.0, 2.0)),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

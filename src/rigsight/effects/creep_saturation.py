@@ -17,8 +17,8 @@ usual smooth form of the saturation.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import limit
 from rigsight.effects.symbols import creep_gain, creepage
-from rigsight.parameters import Parameter
 
 s = sp.Symbol("s", real=True)
 
@@ -28,13 +28,11 @@ CREEP_SATURATION = Effect(
     family=Family.CONTACT,
     summary="The rolling contact saturates: at large creepage the lateral rate grows less than the creepage.",
     parameters=(
-        Parameter(
+        limit(
             "s",
             "creepage at saturation",
             "x",
             lower=1e-12,
-            upper=1e300,
-            null=1e300,
             starts=(1.0, 0.3),
             search=(0.02, 100.0),
             logarithmic=True,

@@ -17,8 +17,8 @@ References: I. Kovacic and M. J. Brennan, *The Duffing Equation* (Wiley 2011).
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import signed
 from rigsight.effects.symbols import x
-from rigsight.parameters import Parameter
 
 k_3 = sp.Symbol("k_3", real=True)
 
@@ -28,13 +28,12 @@ CUBIC_STIFFNESS = Effect(
     family=Family.SPRING_LAW,
     summary="The spring hardens (or softens) with the cube of the deflection.",
     parameters=(
-        Parameter(
+        signed(
             "k_3",
             "cubic stiffness",
             "force x^-3",
             lower=-1e18,
             upper=1e30,
-            null=0.0,
             starts=(0.3, -0.1),
             search=(-0.5, 1e3),
         ),

@@ -18,8 +18,8 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import error, output
-from rigsight.parameters import Parameter
 
 T_v, T_f, e_f = sp.symbols("T_v T_f e_f", real=True)
 
@@ -29,26 +29,8 @@ DERIVATIVE_ACTION = Effect(
     family=Family.CONTROLLER,
     summary="The controller reacts to the rate of its error.",
     parameters=(
-        Parameter(
-            "T_v",
-            "derivative time",
-            "time",
-            lower=0.0,
-            upper=1e6,
-            null=0.0,
-            starts=(0.05, 0.3),
-            search=(0.0, 3.0),
-        ),
-        Parameter(
-            "T_f",
-            "filter of the rate",
-            "time",
-            lower=1e-9,
-            upper=1e6,
-            starts=(0.02,),
-            search=(1e-3, 0.3),
-            logarithmic=True,
-        ),
+        amount("T_v", "derivative time", "time", upper=1e6, starts=(0.05, 0.3), search=(0.0, 3.0)),
+        scale("T_f", "filter of the rate", "time", lower=1e-9, upper=1e6, starts=(0.02,), search=(1e-3, 0.3)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

@@ -23,6 +23,7 @@ References: J. C. Dixon, *The Shock Absorber Handbook* (Wiley 2007), chapter 7, 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import signed
 from rigsight.effects.symbols import clamp, v
 from rigsight.parameters import Parameter
 
@@ -34,13 +35,12 @@ DIRECTIONAL_DAMPING = Effect(
     family=Family.DAMPING_LAW,
     summary="Damping is larger in one direction than in the other, up to a knee.",
     parameters=(
-        Parameter(
+        signed(
             "d_a",
             "half the difference of the damping of the two directions",
             "force time x^-1",
             lower=-1e15,
             upper=1e15,
-            null=0.0,
             starts=(0.5, -0.5),
             search=(-1e3, 1e3),
         ),

@@ -23,8 +23,8 @@ direction.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import drive_size, v
-from rigsight.parameters import Parameter
 
 T_fwd, T_bwd, T_c = sp.symbols("T_fwd T_bwd T_c", real=True)
 
@@ -34,23 +34,19 @@ DIRECTIONAL_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction is larger in one direction than in the other.",
     parameters=(
-        Parameter(
+        amount(
             "T_fwd",
             "friction while x' is positive",
             "drive",
-            lower=0.0,
             upper=1e12,
-            null=0.0,
             starts=(0.15, 0.3),
             search=(0.0, 2.0),
         ),
-        Parameter(
+        amount(
             "T_bwd",
             "friction while x' is negative",
             "drive",
-            lower=0.0,
             upper=1e12,
-            null=0.0,
             starts=(0.05, 0.1),
             search=(0.0, 2.0),
         ),

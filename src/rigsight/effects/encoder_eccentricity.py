@@ -24,8 +24,8 @@ References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on shaft e
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import scale, signed
 from rigsight.effects.symbols import reading
-from rigsight.parameters import Parameter
 
 e_sin, e_cos, kappa = sp.symbols("e_sin e_cos kappa", real=True)
 
@@ -35,36 +35,25 @@ ENCODER_ECCENTRICITY = Effect(
     family=Family.TONE_OR_RIPPLE,
     summary="The reading has an error that is periodic in the position.",
     parameters=(
-        Parameter(
+        signed(
             "e_sin",
             "part of the error that is zero at the origin",
             "x",
             lower=-1e9,
             upper=1e9,
-            null=0.0,
             starts=(0.02, 0.01),
             search=(-0.3, 0.3),
         ),
-        Parameter(
+        signed(
             "e_cos",
             "part of the error that is largest at the origin",
             "x",
             lower=-1e9,
             upper=1e9,
-            null=0.0,
             starts=(0.01, -0.02),
             search=(-0.3, 0.3),
         ),
-        Parameter(
-            "kappa",
-            "wave number",
-            "x^-1",
-            lower=1e-9,
-            upper=1e12,
-            starts=(6.0, 15.0),
-            search=(3.3, 60.0),
-            logarithmic=True,
-        ),
+        scale("kappa", "wave number", "x^-1", lower=1e-9, upper=1e12, starts=(6.0, 15.0), search=(3.3, 60.0)),
     ),
     energy=Energy.ACTIVE,
     wave_number="kappa",

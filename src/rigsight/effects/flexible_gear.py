@@ -25,8 +25,8 @@ References: M. W. Spong, ASME J. Dyn. Syst. Meas. Control 109 (1987) 310, on fle
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import damped, driven, load, m, time_size, v, x
-from rigsight.parameters import Parameter
 
 r, w_a, zeta_a, s, s_rate = sp.symbols("r w_a zeta_a s s_rate", real=True)
 
@@ -46,17 +46,10 @@ FLEXIBLE_GEAR = Effect(
     family=Family.RESONANCE,
     summary="A spring stands between the rotor and the link behind it.",
     parameters=(
-        Parameter(
-            "r",
-            "part of the inertia behind the gear",
-            "",
-            lower=0.0,
-            upper=0.999,
-            null=0.0,
-            starts=(0.5, 0.2),
-            search=(0.0, 0.98),
+        amount(
+            "r", "part of the inertia behind the gear", "", upper=0.999, starts=(0.5, 0.2), search=(0.0, 0.98)
         ),
-        Parameter(
+        scale(
             "w_a",
             "angular frequency of the link",
             "time^-1",
@@ -64,17 +57,9 @@ FLEXIBLE_GEAR = Effect(
             upper=1e9,
             starts=(2.0, 4.0),
             search=(0.5, 50.0),
-            logarithmic=True,
         ),
-        Parameter(
-            "zeta_a",
-            "its damping ratio",
-            "",
-            lower=1e-6,
-            upper=10.0,
-            starts=(0.05, 0.02),
-            search=(1e-4, 2.0),
-            logarithmic=True,
+        scale(
+            "zeta_a", "its damping ratio", "", lower=1e-6, upper=10.0, starts=(0.05, 0.02), search=(1e-4, 2.0)
         ),
     ),
     # It moves forces of the drive and of the weight from one mass to another: alone it is no passive element.

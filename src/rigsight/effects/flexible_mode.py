@@ -21,8 +21,8 @@ References: J. P. Den Hartog, *Mechanical Vibrations* (McGraw-Hill 1956), on the
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import m, time_size, v, x
-from rigsight.parameters import Parameter
 
 m_a, w_a, zeta_a, q, q_rate = sp.symbols("m_a w_a zeta_a q q_rate", real=True)
 
@@ -41,17 +41,15 @@ FLEXIBLE_MODE = Effect(
     family=Family.RESONANCE,
     summary="A second mass is attached to the moving mass by a spring and adds a resonance.",
     parameters=(
-        Parameter(
+        amount(
             "m_a",
             "inertia of the second mass",
             "force time^2 x^-1",
-            lower=0.0,
             upper=1e9,
-            null=0.0,
             starts=(0.1, 0.3),
             search=(0.0, 5.0),
         ),
-        Parameter(
+        scale(
             "w_a",
             "its angular frequency",
             "time^-1",
@@ -59,17 +57,9 @@ FLEXIBLE_MODE = Effect(
             upper=1e9,
             starts=(2.0, 4.0),
             search=(0.05, 50.0),
-            logarithmic=True,
         ),
-        Parameter(
-            "zeta_a",
-            "its damping ratio",
-            "",
-            lower=1e-6,
-            upper=10.0,
-            starts=(0.05, 0.02),
-            search=(1e-4, 2.0),
-            logarithmic=True,
+        scale(
+            "zeta_a", "its damping ratio", "", lower=1e-6, upper=10.0, starts=(0.05, 0.02), search=(1e-4, 2.0)
         ),
     ),
     energy=Energy.DISSIPATIVE,

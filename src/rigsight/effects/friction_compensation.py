@@ -19,6 +19,7 @@ References: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083, section 4.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import clamp, command, output
 from rigsight.parameters import Parameter
 
@@ -30,16 +31,7 @@ FRICTION_COMPENSATION = Effect(
     family=Family.CONTROLLER,
     summary="The controller adds a constant in the direction of the goal.",
     parameters=(
-        Parameter(
-            "u_f",
-            "what is added",
-            "input",
-            lower=0.0,
-            upper=1e300,
-            null=0.0,
-            starts=(0.02, 0.1),
-            search=(0.0, 1.0),
-        ),
+        amount("u_f", "what is added", "input", upper=1e300, starts=(0.02, 0.1), search=(0.0, 1.0)),
         Parameter(
             "T_f",
             "filter of the rate",

@@ -17,8 +17,8 @@ References: A. H. Nayfeh and D. T. Mook, *Nonlinear Oscillations* (Wiley 1979), 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import signed
 from rigsight.effects.symbols import k, x
-from rigsight.parameters import Parameter
 
 k_g, k_3 = sp.symbols("k_g k_3", real=True)
 
@@ -28,13 +28,12 @@ GRAVITY_PENDULUM = Effect(
     family=Family.GRAVITY,
     summary="Gravity restores with the sine of the angle.",
     parameters=(
-        Parameter(
+        signed(
             "k_g",
             "weight times lever arm",
             "force x^-1",
             lower=-1e12,
             upper=1e12,
-            null=0.0,
             starts=(1.0, 20.0),
             search=(-1e3, 1e3),
         ),

@@ -18,8 +18,8 @@ References: D. J. Ewins, *Modal Testing* (Research Studies Press 2000), on mass 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import acceleration
-from rigsight.parameters import Parameter
 
 m_e = sp.Symbol("m_e", real=True)
 
@@ -29,13 +29,11 @@ INERTIA = Effect(
     family=Family.INERTIA,
     summary="A mass moves with the element, and its inertia force is part of the measured force.",
     parameters=(
-        Parameter(
+        amount(
             "m_e",
             "inertia that moves with the element",
             "force time^2 x^-1",
-            lower=0.0,
             upper=1e12,
-            null=0.0,
             starts=(0.1, 0.5),
             search=(0.0, 10.0),
         ),

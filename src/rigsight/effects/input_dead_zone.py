@@ -16,8 +16,8 @@ References: H. K. Khalil, *Nonlinear Systems* (Prentice Hall 2002), section 1.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import beyond, u
-from rigsight.parameters import Parameter
 
 u_0 = sp.Symbol("u_0", real=True)
 
@@ -27,15 +27,8 @@ INPUT_DEAD_ZONE = Effect(
     family=Family.DRIVE_LIMIT,
     summary="Small drive inputs have no effect.",
     parameters=(
-        Parameter(
-            "u_0",
-            "half-width of the dead zone",
-            "input",
-            lower=0.0,
-            upper=1e300,
-            null=0.0,
-            starts=(0.05, 0.2),
-            search=(0.0, 2.0),
+        amount(
+            "u_0", "half-width of the dead zone", "input", upper=1e300, starts=(0.05, 0.2), search=(0.0, 2.0)
         ),
     ),
     energy=Energy.ACTIVE,

@@ -17,7 +17,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.parameters import Parameter
+from rigsight.effects.numbers import amount
 
 T_d = sp.Symbol("T_d", real=True)
 
@@ -26,11 +26,7 @@ INPUT_DELAY = Effect(
     place=Place.ACTUATOR,
     family=Family.DELAY_OR_LAG,
     summary="The drive acts later than commanded.",
-    parameters=(
-        Parameter(
-            "T_d", "dead time", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)
-        ),
-    ),
+    parameters=(amount("T_d", "dead time", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
     delay=T_d,

@@ -16,8 +16,8 @@ References: H. K. Khalil, *Nonlinear Systems* (Prentice Hall 2002), section 1.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import limit
 from rigsight.effects.symbols import clamp, u
-from rigsight.parameters import Parameter
 
 u_max = sp.Symbol("u_max", real=True)
 
@@ -27,16 +27,7 @@ INPUT_SATURATION = Effect(
     family=Family.DRIVE_LIMIT,
     summary="The drive cannot exceed a limit.",
     parameters=(
-        Parameter(
-            "u_max",
-            "largest drive input",
-            "input",
-            lower=0.0,
-            upper=1e300,
-            null=1e300,
-            starts=(0.8, 0.4),
-            search=(0.02, 2.0),
-        ),
+        limit("u_max", "largest drive input", "input", lower=0.0, starts=(0.8, 0.4), search=(0.02, 2.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

@@ -19,8 +19,8 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import error, output
-from rigsight.parameters import Parameter
 
 r_i, z = sp.symbols("r_i z", real=True)
 
@@ -30,13 +30,11 @@ INTEGRAL_ACTION = Effect(
     family=Family.CONTROLLER,
     summary="The controller integrates its error.",
     parameters=(
-        Parameter(
+        amount(
             "r_i",
             "reciprocal of the integral time",
             "time^-1",
-            lower=0.0,
             upper=1e12,
-            null=0.0,
             starts=(0.1, 0.3),
             search=(0.0, 20.0),
         ),

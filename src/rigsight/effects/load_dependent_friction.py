@@ -28,8 +28,8 @@ model M3; P. Hamon, M. Gautier and P. Garrec, IEEE/RSJ IROS (2010) 6187, on fric
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import drive_size, load, v
-from rigsight.parameters import Parameter
 
 T_c, mu = sp.symbols("T_c mu", real=True)
 
@@ -39,26 +39,8 @@ LOAD_DEPENDENT_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction grows with the load that the joint carries.",
     parameters=(
-        Parameter(
-            "T_c",
-            "friction without load",
-            "drive",
-            lower=0.0,
-            upper=1e12,
-            null=0.0,
-            starts=(0.05, 0.1),
-            search=(0.0, 2.0),
-        ),
-        Parameter(
-            "mu",
-            "friction per load",
-            "",
-            lower=0.0,
-            upper=1.0,
-            null=0.0,
-            starts=(0.1, 0.2),
-            search=(0.0, 1.0),
-        ),
+        amount("T_c", "friction without load", "drive", upper=1e12, starts=(0.05, 0.1), search=(0.0, 2.0)),
+        amount("mu", "friction per load", "", upper=1.0, starts=(0.1, 0.2), search=(0.0, 1.0)),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

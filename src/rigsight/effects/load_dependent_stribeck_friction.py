@@ -24,6 +24,7 @@ model M4 with one ratio of the two levels.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import drive_size, load, v, v_size
 from rigsight.parameters import Parameter
 
@@ -35,26 +36,15 @@ LOAD_DEPENDENT_STRIBECK_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction grows with the load of the joint, and is larger at standstill.",
     parameters=(
-        Parameter(
+        amount(
             "T_c",
             "friction at high speed without load",
             "drive",
-            lower=0.0,
             upper=1e12,
-            null=0.0,
             starts=(0.05, 0.1),
             search=(0.0, 2.0),
         ),
-        Parameter(
-            "mu",
-            "friction per load",
-            "",
-            lower=0.0,
-            upper=1.0,
-            null=0.0,
-            starts=(0.1, 0.2),
-            search=(0.0, 0.5),
-        ),
+        amount("mu", "friction per load", "", upper=1.0, starts=(0.1, 0.2), search=(0.0, 0.5)),
         Parameter(
             "s",
             "excess at standstill over high speed",
@@ -64,7 +54,7 @@ LOAD_DEPENDENT_STRIBECK_FRICTION = Effect(
             starts=(0.5, 1.0),
             search=(0.02, 3.0),
         ),
-        Parameter(
+        scale(
             "w_s",
             "Stribeck velocity",
             "x time^-1",
@@ -72,7 +62,6 @@ LOAD_DEPENDENT_STRIBECK_FRICTION = Effect(
             upper=1e12,
             starts=(0.1, 0.02),
             search=(1e-3, 3.0),
-            logarithmic=True,
         ),
     ),
     energy=Energy.DISSIPATIVE,

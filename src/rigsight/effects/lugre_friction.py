@@ -25,6 +25,7 @@ References: C. Canudas de Wit et al., IEEE TAC 40 (1995) 419.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import drive_size, v, v_size, x_size
 from rigsight.parameters import Parameter
 
@@ -38,16 +39,7 @@ LUGRE_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction deflects like a spring before it slides, and falls with speed.",
     parameters=(
-        Parameter(
-            "T_c",
-            "friction at high speed",
-            "drive",
-            lower=0.0,
-            upper=1e12,
-            null=0.0,
-            starts=(0.1, 0.3),
-            search=(0.0, 2.0),
-        ),
+        amount("T_c", "friction at high speed", "drive", upper=1e12, starts=(0.1, 0.3), search=(0.0, 2.0)),
         Parameter(
             "s",
             "excess at standstill over high speed",
@@ -57,7 +49,7 @@ LUGRE_FRICTION = Effect(
             starts=(0.5, 1.0),
             search=(0.02, 3.0),
         ),
-        Parameter(
+        scale(
             "w_s",
             "Stribeck velocity",
             "x time^-1",
@@ -65,9 +57,8 @@ LUGRE_FRICTION = Effect(
             upper=1e12,
             starts=(0.1, 0.3),
             search=(1e-3, 0.5),
-            logarithmic=True,
         ),
-        Parameter(
+        scale(
             "x_p",
             "displacement over which the friction builds up",
             "x",
@@ -75,7 +66,6 @@ LUGRE_FRICTION = Effect(
             upper=1e9,
             starts=(0.1, 0.03),
             search=(1e-3, 0.2),
-            logarithmic=True,
         ),
     ),
     energy=Energy.DISSIPATIVE,

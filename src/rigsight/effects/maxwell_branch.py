@@ -23,8 +23,8 @@ References: J. D. Ferry, *Viscoelastic Properties of Polymers* (Wiley 1980), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import drive_size, time_size, v, x_size
-from rigsight.parameters import Parameter
 
 k_m, tau_m, q = sp.symbols("k_m tau_m q", real=True)
 
@@ -40,25 +40,11 @@ MAXWELL_BRANCH = Effect(
     family=Family.VISCOELASTICITY,
     summary="A second spring in series with a damper acts in parallel to the spring and relaxes.",
     parameters=(
-        Parameter(
-            "k_m",
-            "stiffness of the branch",
-            "force x^-1",
-            lower=0.0,
-            upper=1e18,
-            null=0.0,
-            starts=(0.3, 0.8),
-            search=(0.0, 10.0),
+        amount(
+            "k_m", "stiffness of the branch", "force x^-1", upper=1e18, starts=(0.3, 0.8), search=(0.0, 10.0)
         ),
-        Parameter(
-            "tau_m",
-            "relaxation time",
-            "time",
-            lower=1e-9,
-            upper=1e9,
-            starts=(1.0, 3.0),
-            search=(0.01, 100.0),
-            logarithmic=True,
+        scale(
+            "tau_m", "relaxation time", "time", lower=1e-9, upper=1e9, starts=(1.0, 3.0), search=(0.01, 100.0)
         ),
     ),
     energy=Energy.DISSIPATIVE,

@@ -20,7 +20,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), on periodic 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.parameters import Parameter
+from rigsight.effects.numbers import scale, signed
 
 T_p, w_p, phi = sp.symbols("T_p w_p phi", real=True)
 
@@ -30,17 +30,8 @@ PERIODIC_DISTURBANCE = Effect(
     family=Family.TONE_OR_RIPPLE,
     summary="An external torque is periodic in time, independent of the drive.",
     parameters=(
-        Parameter(
-            "T_p",
-            "amplitude",
-            "drive",
-            lower=-1e15,
-            upper=1e15,
-            null=0.0,
-            starts=(0.05,),
-            search=(0.0, 2.0),
-        ),
-        Parameter(
+        signed("T_p", "amplitude", "drive", lower=-1e15, upper=1e15, starts=(0.05,), search=(0.0, 2.0)),
+        scale(
             "w_p",
             "angular frequency",
             "time^-1",
@@ -48,7 +39,6 @@ PERIODIC_DISTURBANCE = Effect(
             upper=1e9,
             starts=(2.0, 0.8),
             search=(0.02, 50.0),
-            logarithmic=True,
         ),
     ),
     energy=Energy.ACTIVE,

@@ -21,8 +21,8 @@ References: K. J. Astrom and T. Hagglund, *Advanced PID Control* (ISA 2006), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import error, output, time_size
-from rigsight.parameters import Parameter
 
 r_i, T_v, T_f, z, e_f = sp.symbols("r_i T_v T_f z e_f", real=True)
 
@@ -32,36 +32,16 @@ PID_ACTION = Effect(
     family=Family.CONTROLLER,
     summary="The controller integrates its error and reacts to the rate of it.",
     parameters=(
-        Parameter(
+        amount(
             "r_i",
             "reciprocal of the integral time",
             "time^-1",
-            lower=0.0,
             upper=1e12,
-            null=0.0,
             starts=(0.1, 0.3),
             search=(0.0, 20.0),
         ),
-        Parameter(
-            "T_v",
-            "derivative time",
-            "time",
-            lower=0.0,
-            upper=1e6,
-            null=0.0,
-            starts=(0.05, 0.3),
-            search=(0.0, 3.0),
-        ),
-        Parameter(
-            "T_f",
-            "filter of the rate",
-            "time",
-            lower=1e-9,
-            upper=1e6,
-            starts=(0.02,),
-            search=(1e-3, 0.3),
-            logarithmic=True,
-        ),
+        amount("T_v", "derivative time", "time", upper=1e6, starts=(0.05, 0.3), search=(0.0, 3.0)),
+        scale("T_f", "filter of the rate", "time", lower=1e-9, upper=1e6, starts=(0.02,), search=(1e-3, 0.3)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

@@ -18,8 +18,8 @@ van der Pol equation has its negative.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import v, x
-from rigsight.parameters import Parameter
 
 c_x = sp.Symbol("c_x", real=True)
 
@@ -29,13 +29,11 @@ POSITION_DEPENDENT_DAMPING = Effect(
     family=Family.DAMPING_LAW,
     summary="Damping that grows with the square of the displacement.",
     parameters=(
-        Parameter(
+        amount(
             "c_x",
             "damping per squared displacement",
             "force time x^-3",
-            lower=0.0,
             upper=1e18,
-            null=0.0,
             starts=(0.3, 3.0),
             search=(0.0, 1e3),
         ),

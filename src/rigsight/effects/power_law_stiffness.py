@@ -21,6 +21,7 @@ References: K. L. Johnson, *Contact Mechanics* (Cambridge 1985), chapter 4, for 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import signed
 from rigsight.effects.symbols import drive_size, x, x_size
 from rigsight.parameters import Parameter
 
@@ -32,25 +33,16 @@ POWER_LAW_STIFFNESS = Effect(
     family=Family.SPRING_LAW,
     summary="A force parallel to the spring grows with a power of the deflection.",
     parameters=(
-        Parameter(
+        signed(
             "k_p",
             "stiffness of the power law at x_r",
             "force x^-1",
             lower=-1e18,
             upper=1e30,
-            null=0.0,
             starts=(0.5, 1.0),
             search=(-0.5, 1e3),
         ),
-        Parameter(
-            "n",
-            "power",
-            "",
-            lower=1.0,
-            upper=20.0,
-            starts=(1.5, 2.0),
-            search=(1.2, 8.0),
-        ),
+        Parameter("n", "power", "", lower=1.0, upper=20.0, starts=(1.5, 2.0), search=(1.2, 8.0)),
         Parameter(
             "x_r",
             "deflection at which k_p holds, a convention",

@@ -26,8 +26,8 @@ References: P. R. Dahl, *A Solid Friction Model* (Aerospace Corporation TOR-0158
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import drive_size, v, x_size
-from rigsight.parameters import Parameter
 
 T_c, x_p, z = sp.symbols("T_c x_p z", real=True)
 
@@ -37,17 +37,8 @@ PRESLIDING_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction deflects like a spring before it slides.",
     parameters=(
-        Parameter(
-            "T_c",
-            "friction once it slides",
-            "drive",
-            lower=0.0,
-            upper=1e12,
-            null=0.0,
-            starts=(0.1, 0.3),
-            search=(0.0, 2.0),
-        ),
-        Parameter(
+        amount("T_c", "friction once it slides", "drive", upper=1e12, starts=(0.1, 0.3), search=(0.0, 2.0)),
+        scale(
             "x_p",
             "displacement over which the friction builds up",
             "x",
@@ -55,7 +46,6 @@ PRESLIDING_FRICTION = Effect(
             upper=1e9,
             starts=(0.1, 0.3),
             search=(1e-3, 10.0),
-            logarithmic=True,
         ),
     ),
     energy=Energy.DISSIPATIVE,

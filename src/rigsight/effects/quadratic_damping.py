@@ -16,8 +16,8 @@ References: K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics*
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import v
-from rigsight.parameters import Parameter
 
 c_2 = sp.Symbol("c_2", real=True)
 
@@ -27,15 +27,8 @@ QUADRATIC_DAMPING = Effect(
     family=Family.DAMPING_LAW,
     summary="Damping that grows with the square of the speed (fluid drag).",
     parameters=(
-        Parameter(
-            "c_2",
-            "drag coefficient",
-            "force time^2 x^-2",
-            lower=0.0,
-            upper=1e15,
-            null=0.0,
-            starts=(0.1, 1.0),
-            search=(0.0, 1e3),
+        amount(
+            "c_2", "drag coefficient", "force time^2 x^-2", upper=1e15, starts=(0.1, 1.0), search=(0.0, 1e3)
         ),
     ),
     energy=Energy.DISSIPATIVE,

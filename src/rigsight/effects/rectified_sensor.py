@@ -18,8 +18,8 @@ pulse counter that is insensitive to the direction.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import reading
-from rigsight.parameters import Parameter
 
 r = sp.Symbol("r", real=True)
 
@@ -29,16 +29,7 @@ RECTIFIED_SENSOR = Effect(
     family=Family.SENSOR,
     summary="The sensor shows the magnitude and not the sign.",
     parameters=(
-        Parameter(
-            "r",
-            "share of the rectified reading",
-            "",
-            lower=0.0,
-            upper=1.0,
-            null=0.0,
-            starts=(0.9, 0.5),
-            search=(0.0, 1.0),
-        ),
+        amount("r", "share of the rectified reading", "", upper=1.0, starts=(0.9, 0.5), search=(0.0, 1.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY, even_harmonics=True),

@@ -18,7 +18,7 @@ References: K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems* (Prent
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.parameters import Parameter
+from rigsight.effects.numbers import amount
 
 T_s = sp.Symbol("T_s", real=True)
 
@@ -27,11 +27,7 @@ SENSOR_DELAY = Effect(
     place=Place.SENSOR,
     family=Family.DELAY_OR_LAG,
     summary="The displacement is measured with a delay.",
-    parameters=(
-        Parameter(
-            "T_s", "dead time", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)
-        ),
-    ),
+    parameters=(amount("T_s", "dead time", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
     reading_delay=T_s,

@@ -17,8 +17,8 @@ References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on first-o
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import reading
-from rigsight.parameters import Parameter
 
 T_m, x_m = sp.symbols("T_m x_m", real=True)
 
@@ -28,13 +28,11 @@ SENSOR_LAG = Effect(
     family=Family.DELAY_OR_LAG,
     summary="The displacement is measured through a first-order lag.",
     parameters=(
-        Parameter(
+        amount(
             "T_m",
             "time constant",
             "time",
-            lower=0.0,
             upper=1e6,
-            null=0.0,
             starts=(0.05, 0.3),
             search=(1e-3, 10.0),
             logarithmic=True,

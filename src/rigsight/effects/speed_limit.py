@@ -21,6 +21,7 @@ References: A. Hughes and B. Drury, *Electric Motors and Drives* (Newnes 2013), 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import limit
 from rigsight.effects.symbols import beyond, input_size, u, v, v_size
 from rigsight.parameters import Parameter
 
@@ -32,13 +33,11 @@ SPEED_LIMIT = Effect(
     family=Family.DRIVE_LIMIT,
     summary="The largest drive input falls with speed.",
     parameters=(
-        Parameter(
+        limit(
             "u_s",
             "largest drive input at standstill",
             "input",
             lower=0.0,
-            upper=1e300,
-            null=1e300,
             starts=(0.8, 0.5),
             search=(0.02, 3.0),
         ),

@@ -20,8 +20,8 @@ References: H. Gross, J. Hamann and G. Wiegartner, *Electrical Feed Drives in Au
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import amount
 from rigsight.effects.symbols import output
-from rigsight.parameters import Parameter
 
 r_v, z = sp.symbols("r_v z", real=True)
 
@@ -31,13 +31,11 @@ SPEED_LOOP_INTEGRAL = Effect(
     family=Family.CONTROLLER,
     summary="A speed loop inside the position loop integrates.",
     parameters=(
-        Parameter(
+        amount(
             "r_v",
             "reciprocal of the integral time",
             "time^-1",
-            lower=0.0,
             upper=1e12,
-            null=0.0,
             starts=(0.3, 0.1),
             search=(0.0, 50.0),
         ),

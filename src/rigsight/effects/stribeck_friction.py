@@ -23,8 +23,8 @@ References: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import drive_size, v, v_size
-from rigsight.parameters import Parameter
 
 T_c, T_s, w_s = sp.symbols("T_c T_s w_s", real=True)
 
@@ -34,27 +34,16 @@ STRIBECK_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction that is larger at standstill and falls with speed.",
     parameters=(
-        Parameter(
+        amount(
             "T_c",
             "Coulomb friction at high speed",
             "drive",
-            lower=0.0,
             upper=1e12,
-            null=0.0,
             starts=(0.05, 0.2),
             search=(0.0, 2.0),
         ),
-        Parameter(
-            "T_s",
-            "friction at standstill",
-            "drive",
-            lower=0.0,
-            upper=1e12,
-            null=0.0,
-            starts=(0.1, 0.4),
-            search=(0.0, 4.0),
-        ),
-        Parameter(
+        amount("T_s", "friction at standstill", "drive", upper=1e12, starts=(0.1, 0.4), search=(0.0, 4.0)),
+        scale(
             "w_s",
             "Stribeck velocity",
             "x time^-1",
@@ -62,7 +51,6 @@ STRIBECK_FRICTION = Effect(
             upper=1e12,
             starts=(0.1, 0.02),
             search=(1e-3, 3.0),
-            logarithmic=True,
         ),
     ),
     energy=Energy.DISSIPATIVE,

@@ -20,8 +20,8 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start
+from rigsight.effects.numbers import signed
 from rigsight.effects.symbols import time_size
-from rigsight.parameters import Parameter
 
 T_x = sp.Symbol("T_x", real=True)
 
@@ -31,13 +31,12 @@ TIME_SHIFT = Effect(
     family=Family.DELAY_OR_LAG,
     summary="The time stamps of one signal are early or late relative to the others.",
     parameters=(
-        Parameter(
+        signed(
             "T_x",
             "time by which the signal is late",
             "time",
             lower=-1e6,
             upper=1e6,
-            null=0.0,
             starts=(-0.05, -0.1),
             search=(-1.0, 1.0),
         ),

@@ -25,8 +25,8 @@ References: T. M. Jahns and W. L. Soong, IEEE Trans. Ind. Electron. 43 (1996) 32
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
+from rigsight.effects.numbers import scale, signed
 from rigsight.effects.symbols import position
-from rigsight.parameters import Parameter
 
 T_sin, T_cos, kappa = sp.symbols("T_sin T_cos kappa", real=True)
 
@@ -36,36 +36,25 @@ TORQUE_RIPPLE = Effect(
     family=Family.TONE_OR_RIPPLE,
     summary="A torque is periodic in the position: cogging, gear teeth, an eccentric pulley.",
     parameters=(
-        Parameter(
+        signed(
             "T_sin",
             "part that is zero at the origin",
             "drive",
             lower=-1e15,
             upper=1e15,
-            null=0.0,
             starts=(0.1, 0.05),
             search=(-2.0, 2.0),
         ),
-        Parameter(
+        signed(
             "T_cos",
             "part that is largest at the origin",
             "drive",
             lower=-1e15,
             upper=1e15,
-            null=0.0,
             starts=(0.05, -0.1),
             search=(-2.0, 2.0),
         ),
-        Parameter(
-            "kappa",
-            "wave number",
-            "x^-1",
-            lower=1e-9,
-            upper=1e12,
-            starts=(6.0, 15.0),
-            search=(3.3, 60.0),
-            logarithmic=True,
-        ),
+        scale("kappa", "wave number", "x^-1", lower=1e-9, upper=1e12, starts=(6.0, 15.0), search=(3.3, 60.0)),
     ),
     energy=Energy.CONSERVATIVE,
     wave_number="kappa",

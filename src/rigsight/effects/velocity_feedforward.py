@@ -17,8 +17,8 @@ References: G. Ellis, *Control System Design Guide* (Elsevier 2012), chapter 8.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
+from rigsight.effects.numbers import amount, scale
 from rigsight.effects.symbols import command, output
-from rigsight.parameters import Parameter
 
 T_w, T_f, c_f = sp.symbols("T_w T_f c_f", real=True)
 
@@ -28,26 +28,15 @@ VELOCITY_FEEDFORWARD = Effect(
     family=Family.CONTROLLER,
     summary="The controller adds the commanded velocity.",
     parameters=(
-        Parameter(
+        amount(
             "T_w",
             "gain of the velocity over that of the position",
             "time",
-            lower=0.0,
             upper=1e6,
-            null=0.0,
             starts=(0.05, 0.3),
             search=(0.0, 3.0),
         ),
-        Parameter(
-            "T_f",
-            "filter of the rate",
-            "time",
-            lower=1e-9,
-            upper=1e6,
-            starts=(0.02,),
-            search=(1e-3, 0.3),
-            logarithmic=True,
-        ),
+        scale("T_f", "filter of the rate", "time", lower=1e-9, upper=1e6, starts=(0.02,), search=(1e-3, 0.3)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

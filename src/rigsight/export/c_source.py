@@ -51,14 +51,16 @@ def c_source(exported: Exported, source: str, name: str) -> str:
     structure, upper = exported.structure, name.upper()
     equations = KernelEquations(structure)
     delayed, late = structure.delay is not None, structure.first_shown_late is not None
-    names = _parameter_names(exported)
+    # Their names are words of no language and of no part of the file.
+    pairs = zip(structure.parameter_symbols, exported.parameters, strict=True)
+    names = {symbol: f"p->{quantity.name}" for symbol, quantity in pairs}
     inputs = ["t", *(quantity.name for quantity in exported.inputs)]
     outs = [quantity.name for quantity in exported.outputs]
     room = max(1, len(exported.inputs))
-    kernel = "\n".join(
-        [equations.text("const parameters *p", list(names.values())), accurate_integrator(equations)]
-    )
+    computed = equations.text("const parameters *p", list(names.values()))
+    kernel = f"{computed}\n{accurate_integrator(equations)}"
     rest, parts = _rest(exported, names), template_parts("export", "model_parts.c.txt")
+    lacking = (text for name, text in FUNCTIONS.items() if f"{name}(" in rest and text not in kernel)
     fragments = {
         "HEADER": "\n".join(f" * {line}".rstrip() for line in header_lines(exported, source)),
         "TITLE": f"Simulation of {exported.title}",
@@ -87,10 +89,12 @@ def c_source(exported: Exported, source: str, name: str) -> str:
         )
         + (f"    double origin[2], readings[{upper}_HISTORY][2];\n" if late else ""),
         "KERNEL": kernel,
-        "FUNCTIONS": _missing_functions(kernel, rest),
+        "FUNCTIONS": "".join(f"{text}\n" for text in lacking),
         "STANDING": "\n".join(f"    c.c[{i}][0] = u[{at}];" for i, at in enumerate(_places(exported))),
         "REST": rest,
-        "REST_CALL": _rest_call(exported),
+        "REST_CALL": "    (void)p; (void)u;\n"
+        if exported.rest is None
+        else parts["BALANCE_CALL" if isinstance(exported.rest, Balance) else "REST_CALL"],
         "DEFAULTS": "\n".join(
             f"    p->{q.name} = {value!r};"
             for q, value in zip(exported.parameters, exported.values, strict=True)
@@ -118,18 +122,12 @@ def c_source(exported: Exported, source: str, name: str) -> str:
     return filled(template("export", "model.c.txt"), fragments)
 
 
-def _parameter_names(exported: Exported) -> dict[sp.Symbol, str]:
-    """Return how each parameter is written; their names are words of no language and of no part of the file."""
-    pairs = zip(exported.structure.parameter_symbols, exported.parameters, strict=True)
-    return {symbol: f"p->{quantity.name}" for symbol, quantity in pairs}
-
-
 def _memory(exported: Exported, equations: KernelEquations) -> int:
     """Return how many numbers the integrator keeps between samples."""
-    states, modes = max(1, len(exported.states)), max(1, len(exported.frozen.modes))
-    inputs, frictions = max(1, len(exported.inputs)), max(1, len(exported.frozen.frictions))
-    watched = len(exported.frozen.modes) + 2 * len(exported.frozen.frictions) + 1
-    constants = max(1, len(equations.constants))
+    frozen = exported.frozen
+    counted = (exported.states, exported.inputs, frozen.modes, frozen.frictions, equations.constants)
+    states, inputs, modes, frictions, constants = (max(1, len(own)) for own in counted)
+    watched = len(frozen.modes) + 2 * len(frozen.frictions) + 1
     return 5 * states + modes + 2 * watched + constants + inputs + 2 * frictions + _SPARE
 
 
@@ -146,19 +144,6 @@ def _piece(exported: Exported) -> str:
     ]
     unread = [name for name in ("next", "dt") if not any(name in line for line in lines)]
     return "\n".join([*(f"    (void){name};" for name in unread), *lines])
-
-
-def _missing_functions(kernel: str, rest: str) -> str:
-    """Return the functions that the equilibrium calls and the kernel has not written."""
-    lacking = [text for name, text in FUNCTIONS.items() if f"{name}(" in rest and text not in kernel]
-    return "".join(f"{text}\n" for text in lacking)
-
-
-def _rest_call(exported: Exported) -> str:
-    if exported.rest is None:
-        return "    (void)p; (void)u;\n"
-    parts = template_parts("export", "model_parts.c.txt")
-    return parts["BALANCE_CALL" if isinstance(exported.rest, Balance) else "REST_CALL"]
 
 
 def _rest(exported: Exported, names: Mapping[sp.Symbol, str]) -> str:

@@ -63,12 +63,8 @@ def _unpacked_input(exported: Exported) -> str:
 
 def _array(exported: Exported, expressions: list[sp.Expr]) -> str:
     targets, own = results(len(expressions)), _own_words(exported)
-    steps = exported.structure.steps
-    lines = [
-        *unpacked_states(exported, own),
-        *PYTHON.statements(targets, expressions, code_names(exported, own), steps),
-    ]
-    return indented([*lines, f"return np.array([{', '.join(targets)}])"])
+    lines = PYTHON.statements(targets, expressions, code_names(exported, own), exported.structure.steps)
+    return indented([*unpacked_states(exported, own), *lines, f"return np.array([{', '.join(targets)}])"])
 
 
 def _own_words(exported: Exported) -> frozenset[str]:

@@ -45,10 +45,8 @@ def equation_lines(exported: Exported) -> list[str]:
     for state, equation in zip(exported.states, structure.equations, strict=True):
         line = f"{state.name}' = {text(equation.rate, names)}"
         if equation.limit is not None:
-            line += (
-                f", abs({state.name}) <= {text(equation.limit, names)}: it stays at the end of its range while driven "
-                f"against it"
-            )
+            line += f", abs({state.name}) <= {text(equation.limit, names)}: "
+            line += "it stays at the end of its range while driven against it"
         lines.append(line)
     for i, (output, expression) in enumerate(zip(exported.outputs, structure.outputs, strict=True)):
         line = f"output {output.name} [{output.unit}] = {text(expression, names)}"
@@ -74,16 +72,12 @@ def _held_lines(exported: Exported) -> list[str]:
     return [f"dry friction holds {text(slip, names)} at zero while it can" for slip in slips]
 
 
-def signal_lines(exported: Exported) -> list[str]:
-    """Return inputs and states with units, one a line."""
-    lines = [f"input {q.name} [{q.unit}]: {q.description}" for q in exported.inputs]
-    return lines + [f"state {q.name} [{q.unit}]" for q in exported.states]
-
-
 def header_lines(exported: Exported, source: str) -> list[str]:
     """Return what stands at the head of every exported file."""
     lines = [f"{made_by(source)}; SI units.", "", "Equations:"]
-    return lines + [f"  {line}" for line in (*equation_lines(exported), *signal_lines(exported))]
+    inputs = [f"input {q.name} [{q.unit}]: {q.description}" for q in exported.inputs]
+    states = [f"state {q.name} [{q.unit}]" for q in exported.states]
+    return lines + [f"  {line}" for line in (*equation_lines(exported), *inputs, *states)]
 
 
 def indented(lines: list[str], level: int = 1) -> str:

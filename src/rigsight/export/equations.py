@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Set
+from collections.abc import Set
 from dataclasses import dataclass
 
 import sympy as sp
@@ -11,7 +11,6 @@ import sympy as sp
 from rigsight.effects import Place
 from rigsight.effects.symbols import clamp
 from rigsight.errors import InputError
-from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector
 from rigsight.simulate.equations.binder import state_symbol
@@ -157,11 +156,8 @@ def _check_delays(structure: Structure) -> None:
     """Refuse delays but that of the only input and that of the first sensor."""
     remembered = {history.symbol.name.partition(":")[0] for history in structure.histories}
     late = [e.name for e in structure.effects if e.name in remembered]
-    late += [
-        output.name
-        for output, delay in zip(structure.rig.outputs[1:], structure.shown_late[1:], strict=True)
-        if delay is not None
-    ]
+    behind = zip(structure.rig.outputs[1:], structure.shown_late[1:], strict=True)
+    late += [output.name for output, delay in behind if delay is not None]
     if late:
         raise InputError(
             f"A delay at {', '.join(late)} cannot be exported: only delays of a single input and of the first sensor can. "
@@ -178,8 +174,8 @@ def exported(
     names = _Names(reserved)
     sources = _sources(structure.rig, names, of_inputs)
     shown = _Names(reserved)
-    outputs = [shown.quantity(s.name, s.name, s.unit, s.description) for s in structure.rig.outputs]
-    parameters = tuple(names.quantity(p.name, p.name, p.unit, p.description) for p in structure.parameters)
+    outputs = tuple(shown.quantity(s.name, s.unit, s.description) for s in structure.rig.outputs)
+    parameters = tuple(names.quantity(p.name, p.unit, p.description) for p in structure.parameters)
     units = _state_units(structure)
     return Exported(
         structure=structure,
@@ -188,12 +184,9 @@ def exported(
         step=step,
         parameters=parameters,
         values=tuple(float(value) for value in parameter_vector(structure, values)),
-        states=tuple(
-            names.quantity(e.symbol.name, e.symbol.name, units[e.symbol], "state")
-            for e in structure.equations
-        ),
+        states=tuple(names.quantity(e.symbol.name, units[e.symbol], "state") for e in structure.equations),
         sources=sources,
-        outputs=tuple(outputs),
+        outputs=outputs,
         rest=_rest(structure, {p.source: p.name for p in parameters}),
     )
 
@@ -202,11 +195,10 @@ def _sources(rig: Rig, names: _Names, of_inputs: Set[str]) -> tuple[Source, ...]
     prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
     found = []
     for signal in rig.inputs:
-        value = names.quantity(signal.name, signal.name, signal.unit, signal.description, of_inputs)
-        rate = None
+        value, rate = names.quantity(signal.name, signal.unit, signal.description, of_inputs), None
         if signal.name in prescribing:
-            wished = f"{signal.name}_rate"
-            rate = names.quantity(wished, wished, f"{signal.unit}/s", f"rate of {signal.name}", of_inputs)
+            about = f"rate of {signal.name}"
+            rate = names.quantity(f"{signal.name}_rate", f"{signal.unit}/s", about, of_inputs)
         found.append(Source(value, rate))
     return tuple(found)
 
@@ -234,18 +226,14 @@ def _rest(structure: Structure, names: dict[str, str]) -> Rest | Balance | None:
     def of_parameters(expression: sp.Expr) -> sp.Expr:
         return expression.xreplace({s: bound[s.name] for s in expression.free_symbols})
 
-    disturbances: Iterable[tuple[str, Parameter]] = (
-        (structure.parameter_name(effect, p.name), p)
-        for effect in structure.effects
-        if effect.place is Place.DISTURBANCE
-        for p in effect.parameters
-    )
+    disturbances = [effect for effect in structure.effects if effect.place is Place.DISTURBANCE]
+    pushing = [structure.parameter_name(effect, p.name) for effect in disturbances for p in effect.parameters]
     return Rest(
         displacement=of_parameters(motion.rest),
         inertia=of_parameters(motion.inertia),
         stiffness=of_parameters(motion.stiffness),
         damping=names[motion.damping.name],
-        silenced=tuple(names[name] for name, _ in disturbances if name in names),
+        silenced=tuple(names[name] for name in pushing if name in names),
     )
 
 
@@ -259,9 +247,7 @@ class _Names:
         self._reserved = reserved
         self._used: set[str] = set()
 
-    def quantity(
-        self, wished: str, source: str, unit: str, description: str, refused: Set[str] = frozenset()
-    ) -> Quantity:
+    def quantity(self, wished: str, unit: str, description: str, refused: Set[str] = frozenset()) -> Quantity:
         """Return a quantity under the wished name, or one like it that is not refused."""
         name = re.sub(r"[^0-9A-Za-z_]+", "_", wished).strip("_") or "value"
         if name[0].isdigit():
@@ -274,7 +260,7 @@ class _Names:
         ):
             name += "_"
         self._used.add(name)
-        return Quantity(name, source, harmless(unit), harmless(description))
+        return Quantity(name, wished, harmless(unit), harmless(description))
 
 
 def harmless(text: str) -> str:

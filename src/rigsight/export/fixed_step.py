@@ -109,24 +109,16 @@ def _rest(structure: Structure, p: Floats) -> Floats:
 
 def _sides(frozen: FrozenStructure) -> Iterator[Floats]:
     count = len(frozen.modes)
-    for side in (1.0, -1.0):
-        yield np.full(count, side)
-        for i in range(count):
-            modes = np.full(count, side)
-            modes[i] = -side
-            yield modes
+    one_turned = np.vstack([np.ones(count), np.ones((count, count)) - 2.0 * np.eye(count)])
+    yield from (*one_turned, *-one_turned)
 
 
 def _of_eigenvalues(jacobian: Floats) -> float:
     if not np.all(np.isfinite(jacobian)):
         return LONGEST
-    step = LONGEST
-    for value in np.linalg.eigvals(jacobian):
-        size = abs(value)
-        if size > 1.0 / LONGEST:
-            oscillates = abs(value.imag) > 0.1 * size
-            step = min(step, (OSCILLATION if oscillates else SETTLING) / size)
-    return step
+    values = [value for value in np.linalg.eigvals(jacobian) if abs(value) > 1.0 / LONGEST]
+    steps = ((OSCILLATION if abs(v.imag) > 0.1 * abs(v) else SETTLING) / abs(v) for v in values)
+    return min(steps, default=LONGEST)
 
 
 def _rounded(step: float) -> float:

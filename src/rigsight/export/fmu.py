@@ -19,18 +19,10 @@ from rigsight.libraries.library_cache import OPTIONS, first_library, library_suf
 from rigsight.libraries.templates import filled, template
 
 _NO_UNIT = "1"
-
-
 Version = Literal[2, 3]
 
 _SYSTEMS = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}
-_PROCESSORS = {
-    "x86_64": "x86_64",
-    "AMD64": "x86_64",
-    "aarch64": "aarch64",
-    "arm64": "aarch64",
-    "ARM64": "aarch64",
-}
+_PROCESSORS = {"AMD64": "x86_64", "arm64": "aarch64", "ARM64": "aarch64"}
 _NAMESPACE = uuid.UUID("0a4b5d0e-2f0f-5a53-9d5e-6f1c2a7e9b31")
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 _INTERPOLATED: Mapping[Version, str] = {
@@ -55,9 +47,8 @@ def fmu(
         "UPPER": name.upper(),
         "NAME": name,
     }
-    wrapper = filled(
-        template("export", f"fmi{version}.c.txt"), {"UNIT": template("export", "fmi.c.txt"), **fragments}
-    )
+    unit = {"UNIT": template("export", "fmi.c.txt")}
+    wrapper = filled(template("export", f"fmi{version}.c.txt"), unit | fragments)
     sources = {f"fmi{version}_{name}.c": wrapper, f"{name}.c": model}
     members: dict[str, str | bytes] = {
         "modelDescription.xml": model_description(exported, source, name, guid, version),
@@ -130,21 +121,14 @@ def model_description(
     variables = _unique([*_common(exported), *(_of_version_3(exported) if version == 3 else ())])
     root = ET.Element("fmiModelDescription", fmiVersion=f"{version}.0", modelName=name)
     root.set("guid" if version == 2 else "instantiationToken", guid)
-    root.set(
-        "description",
-        f"{exported.title}. A communication step is a sample: {hold_text(exported)}. "
-        + "; ".join(equation_lines(exported)),
-    )
+    step = f"A communication step is a sample: {hold_text(exported)}."
+    root.set("description", f"{exported.title}. {step} {'; '.join(equation_lines(exported))}")
     root.set("generationTool", made_by(source).removeprefix("Made by "))
     root.set("variableNamingConvention", "flat")
     if version == 2:
         root.set("numberOfEventIndicators", "0")
-    simulation = ET.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=name,
-        canHandleVariableCommunicationStepSize=_truth(not needs_constant_step(exported)),
-    )
+    simulation = ET.SubElement(root, "CoSimulation", modelIdentifier=name)
+    simulation.set("canHandleVariableCommunicationStepSize", _truth(not needs_constant_step(exported)))
     if version == 2:
         simulation.set("canInterpolateInputs", _truth(interpolates(exported)))
         simulation.set("canGetAndSetFMUstate", "true")
@@ -161,14 +145,13 @@ def model_description(
         _add(listed, reference, variable, version)
     structure = ET.SubElement(root, "ModelStructure")
     outputs = [i for i, variable in enumerate(variables) if variable.causality == "output"]
-    for index in outputs if version == 3 else ():
-        ET.SubElement(structure, "Output", valueReference=str(index))
-    for index in outputs if version == 3 else ():
-        ET.SubElement(structure, "InitialUnknown", valueReference=str(index))
-    for group in ("Outputs", "InitialUnknowns") if version == 2 else ():
-        unknowns = ET.SubElement(structure, group)
+    for kind in ("Output", "InitialUnknown"):
+        unknowns = structure if version == 3 else ET.SubElement(structure, f"{kind}s")
         for index in outputs:
-            ET.SubElement(unknowns, "Unknown", index=str(index + 1))
+            if version == 3:
+                ET.SubElement(unknowns, kind, valueReference=str(index))
+            else:
+                ET.SubElement(unknowns, "Unknown", index=str(index + 1))
     return _text(root)
 
 

@@ -7,7 +7,7 @@ import re
 from rigsight.export.description import made_by
 from rigsight.export.equations import Exported
 from rigsight.simulate.printing.notation import LatexPrinter, latex_equation, latex_name, latex_text
-from rigsight.simulate.printing.shown import ShownEquations, shown_equations
+from rigsight.simulate.printing.shown import shown_equations
 
 _THIN = r"\,"
 
@@ -15,18 +15,22 @@ _THIN = r"\,"
 def latex(exported: Exported, source: str) -> str:
     r"""Return equations as an ``align*`` (package amsmath), and a table of symbols, values and units."""
     shown = shown_equations(exported.structure)
+    numbers = zip(exported.structure.parameter_symbols, exported.parameters, exported.values, strict=True)
     table = [
-        f"  ${latex_name(shown.names[symbol])}$ & ${_number(value)}$ & ${_unit(q.unit)}$ & "
-        rf"{latex_text(q.description)} \\"
-        for symbol, q, value in zip(
-            exported.structure.parameter_symbols, exported.parameters, exported.values, strict=True
-        )
+        rf"  ${latex_name(shown.names[symbol])}$ & ${_number(value)}$ & ${_unit(q.unit)}$ & {latex_text(q.description)} \\"
+        for symbol, q, value in numbers
     ]
+    printer, equations = LatexPrinter(shown.names), []
+    for equation in shown.equations:
+        equations.append(" &= ".join(latex_equation(equation, shown.names)))
+    for mode in exported.frictions:
+        slip = printer.expression(exported.frozen.switches[mode])
+        equations.append(rf"{slip} &= 0 \text{{ while dry friction holds}}")
     lines = [
         f"% {exported.title}. {made_by(source)}.",
         "% For a document that loads amsmath. A state with a range, |z| <= g, rests at the end that it is driven against.",
         r"\begin{align*}",
-        " \\\\\n".join(f"  {equation}" for equation in _equations(exported, shown)),
+        " \\\\\n".join(f"  {equation}" for equation in equations),
         r"\end{align*}",
         r"\begin{tabular}{llll}",
         r"  symbol & value & unit & meaning \\ \hline",
@@ -34,16 +38,6 @@ def latex(exported: Exported, source: str) -> str:
         r"\end{tabular}",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _equations(exported: Exported, shown: ShownEquations) -> list[str]:
-    lines = [" &= ".join(latex_equation(equation, shown.names)) for equation in shown.equations]
-    printer = LatexPrinter(shown.names)
-    slips = (exported.frozen.switches[mode] for mode in exported.frictions)
-    return [
-        *lines,
-        *(rf"{printer.expression(slip)} &= 0 \text{{ while dry friction holds}}" for slip in slips),
-    ]
 
 
 def _number(value: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import sympy as sp
 
@@ -35,8 +36,7 @@ INPUT_WORDS = words(
 """Of the template where inputs are arguments and not read yet, beside what no name in any export is."""
 
 _PIECE = "c({i}, :, :) = reshape({call}.', 1, 4, []);"
-_CALLS = {"zoh": "steps_of({name})", "foh": "lines_of({name}, dt)"}
-_CUBIC = "cubics_of({value}, {rate}, dt)"
+_CALLS = {"zoh": "steps_of({})", "foh": "lines_of({}, dt)", "cubic": "cubics_of({}, {}, dt)"}
 _STOP_ONE = "m.x(<<VELOCITY>>) = 0;"
 _OF_FRICTION = (
     "FRICTION_SIGN", "KEEP_HELD", "HOLD_AT_REST", "HELD_SLOPE", "HELD_DISTANCES", "FRICTION_CROSSED", "FRICTION",
@@ -65,9 +65,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         "STATE_TEXT": ", ".join(state.name for state in exported.states) or "(none)",
         "DELAY": "0" if structure.delay is None else MATLAB.expression(structure.delay, names),
         "READ_SIGNS": "  m = read_signs(m, piece, start + split, 0);\n" if exported.hold == "zoh" else "",
-        "AS_MEASURED": ""
-        if late is None
-        else filled(_parts()["AS_MEASURED"], {"LATE": MATLAB.expression(late, names)}),
+        "AS_MEASURED": "" if late is None else _part("AS_MEASURED", {"LATE": MATLAB.expression(late, names)}),
         "PARAMETERS": "\n".join(
             f"p.{q.name} = {value!r};   % [{q.unit}] {q.description}"
             for q, value in zip(exported.parameters, exported.values, strict=True)
@@ -94,8 +92,8 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
     return filled(template("export", "model.m.txt"), fragments)
 
 
-def _parts() -> Mapping[str, str]:
-    return template_parts("export", "model_parts.m.txt")
+def _part(key: str, fragments: Mapping[str, object] = MappingProxyType({})) -> str:
+    return filled(template_parts("export", "model_parts.m.txt")[key], fragments)
 
 
 def _names(exported: Exported) -> dict[sp.Symbol, str]:
@@ -117,15 +115,14 @@ def _friction(exported: Exported) -> dict[str, str]:
     if mode is None:
         return dict.fromkeys(_OF_FRICTION, "")
     slopes = {slope_symbol(i): f"slopes({i + 1})" for i in range(len(exported.states))}
+    lines = MATLAB.statements(["slip"], [slip_rate(exported)], {**_names(exported), **slopes})
     own = {
-        "SLIP_RATE": "\n".join(
-            MATLAB.statements(["slip"], [slip_rate(exported)], {**_names(exported), **slopes})
-        ),
-        "STOP": _parts()["STOP"] if velocity is None else _STOP_ONE,
+        "SLIP_RATE": "\n".join(lines),
+        "STOP": _part("STOP") if velocity is None else _STOP_ONE,
         "VELOCITY": (velocity or 0) + 1,
         "FRICTION": mode + 1,
     }
-    return {key: filled(_parts()[key], own) for key in _OF_FRICTION}
+    return {key: _part(key, own) for key in _OF_FRICTION}
 
 
 def _body(
@@ -143,28 +140,21 @@ def _pieces(exported: Exported, inputs: list[str]) -> str:
     functions: dict[str, str] = {}
     for i, source in enumerate(exported.sources):
         kind = exported.hold if source.rate is None else "cubic"
-        call = (
-            _CALLS[exported.hold].format(name=source.value.name)
-            if source.rate is None
-            else _CUBIC.format(value=source.value.name, rate=source.rate.name)
-        )
+        call = _CALLS[kind].format(*(quantity.name for quantity in source.quantities))
         lines.append(_PIECE.format(i=i + 1, call=call))
-        functions[kind] = _parts()[kind]
-    return filled(
-        _parts()["ALL_PIECES"],
-        {
-            "INPUTS": "".join(f", {name}" for name in inputs),
-            "COUNT": len(lines),
-            "LINES": "\n".join(lines),
-            "FUNCTIONS": "".join(functions.values()),
-        },
-    )
+        functions[kind] = _part(kind)
+    own = {
+        "INPUTS": "".join(f", {name}" for name in inputs),
+        "COUNT": len(lines),
+        "LINES": "\n".join(lines),
+        "FUNCTIONS": "".join(functions.values()),
+    }
+    return _part("ALL_PIECES", own)
 
 
 def _limits(exported: Exported) -> str:
-    names = {
-        symbol: name.replace("p.", "m.p.").replace("x(", "m.x(") for symbol, name in _names(exported).items()
-    }
+    own = _names(exported)
+    names = {symbol: name.replace("p.", "m.p.").replace("x(", "m.x(") for symbol, name in own.items()}
     text = ""
     for i, limit in exported.limits.items():
         half = MATLAB.expression(limit, names)
@@ -172,27 +162,25 @@ def _limits(exported: Exported) -> str:
     dependent = exported.frozen.dependent_modes
     if exported.limits and dependent:
         listed = ", ".join(str(i + 1) for i in dependent)
-        text += filled(_parts()["DEPENDENT"], {"COUNT": len(dependent), "LISTED": listed})
+        text += _part("DEPENDENT", {"COUNT": len(dependent), "LISTED": listed})
     return text
 
 
 def _rest(exported: Exported) -> str:
     rest = exported.rest
     if rest is None:
-        return filled(_parts()["NO_REST"], {"N_STATES": len(exported.states)})
+        return _part("NO_REST", {"N_STATES": len(exported.states)})
     if isinstance(rest, Balance):
         return _balance(exported, rest)
     values = MATLAB.statements(["x(1)", "inertia", "stiffness"], rest.expressions, _names(exported))
-    return filled(
-        _parts()["REST"],
-        {
-            "N_STATES": len(exported.states),
-            "VALUES": "\n".join(values),
-            "DAMPING": rest.damping,
-            "SILENCED": "".join(f"p.{name} = 0;\n" for name in rest.silenced),
-            "VELOCITY": 1 + (exported.structure.velocity_index or 0),
-        },
-    )
+    own = {
+        "N_STATES": len(exported.states),
+        "VALUES": "\n".join(values),
+        "DAMPING": rest.damping,
+        "SILENCED": "".join(f"p.{name} = 0;\n" for name in rest.silenced),
+        "VELOCITY": 1 + (exported.structure.velocity_index or 0),
+    }
+    return _part("REST", own)
 
 
 def _balance(exported: Exported, rest: Balance) -> str:

@@ -33,8 +33,7 @@ MIN_STEPS = 4
 MIN_STEPS_PRESCRIBED = 32
 """The same if the motion is prescribed: the model has no time scale that requires more."""
 
-_PIECES = {"zoh": "_steps({name})", "foh": "_lines({name}, dt)"}
-_CUBIC = "_cubics({value}, {rate}, dt)"
+_PIECES = {"zoh": "_steps({})", "foh": "_lines({}, dt)", "cubic": "_cubics({}, {}, dt)"}
 _OWN_WORDS_OF_REST = words("first inertia stiffness")
 """Of `_REST` where parameters stand, beside what no name in any export is."""
 _OWN_WORDS_OF_START = words("x any len ValueError")
@@ -51,14 +50,17 @@ def min_steps(exported: Exported) -> int:
 def python_function(exported: Exported, source: str) -> str:
     """Return the text of a Python file with a function ``simulate``."""
     structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
-    own = _own_words_of_equations(exported)
+    # What the template calls its own where parameters and states stand, beside what no name in any export is.
+    counts = map(len, (frozen.rates, frozen.switches, structure.computed_outputs))
+    own = frozenset({"slip_rate", "slopes", "result", *results(max(counts))})
     constants = constant_names(equations)
     names = code_names(exported, own) | constants
     modes = {mode: f"modes[{i}]" for i, mode in enumerate(frozen.modes)}
-    every = {**names, **modes}
+    every, shown = {**names, **modes}, {**names, friction_sign(exported): "friction_sign"}
     inputs = [quantity.name for quantity in exported.inputs]
     unpack = unpacked_states(exported, own)
     slopes = {slope_symbol(i): f"slopes[{i}]" for i in range(len(exported.states))}
+    prepare = PYTHON.statements(list(constants.values()), list(equations.constants.values()), names)
     limits = [PYTHON.expression(limit, names) for limit in exported.limits.values()]
     fragments = {
         "TITLE": f"Simulation of {exported.title}",
@@ -77,20 +79,10 @@ def python_function(exported: Exported, source: str) -> str:
         "MORE_INPUTS": "".join(f", {name}" for name in inputs),
         "HOLD_TEXT": hold_text(exported),
         "N_OUTPUTS": len(structure.computed_outputs),
-        "UNPACK_PARAMETERS": indented(
-            [
-                *unpacked_parameters(exported, own),
-                *PYTHON.statements(list(constants.values()), list(equations.constants.values()), names),
-            ]
-        ),
+        "UNPACK_PARAMETERS": indented([*unpacked_parameters(exported, own), *prepare]),
         "RATES": _returned(unpack, list(equations.rates), every, equations.steps),
         "SWITCHES": _returned(unpack, list(equations.switches), every),
-        "OUTPUTS": _returned(
-            unpack,
-            list(equations.outputs),
-            {**names, friction_sign(exported): "friction_sign"},
-            equations.shown_steps,
-        ),
+        "OUTPUTS": _returned(unpack, list(equations.outputs), shown, equations.shown_steps),
         "SLIP_RATE": _returned_one(unpack, slip_rate(exported), {**names, **slopes}),
         "LIMITS": sequence(limits),
         "DELAY": _number(exported, structure.delay, "0.0"),
@@ -105,12 +97,6 @@ def python_function(exported: Exported, source: str) -> str:
     }
     text = filled(template("export", "model.py.txt"), fragments)
     return text.replace("else before\n\n        motion", "else before\n        motion")
-
-
-def _own_words_of_equations(exported: Exported) -> frozenset[str]:
-    """Return what the template calls its own where parameters and states stand, beside what no name in any export is."""
-    counts = map(len, (exported.frozen.rates, exported.frozen.switches, exported.structure.computed_outputs))
-    return frozenset({"slip_rate", "slopes", "result", *results(max(counts))})
 
 
 def results(count: int) -> list[str]:
@@ -179,12 +165,9 @@ def _pieces(exported: Exported, inputs: list[str]) -> str:
     parts, lines = template_parts("export", "model_parts.py.txt"), list[str]()
     functions: dict[str, str] = {}
     for source in exported.sources:
-        if source.rate is None:
-            lines.append(_PIECES[exported.hold].format(name=source.value.name))
-            functions[exported.hold] = parts[exported.hold]
-        else:
-            lines.append(_CUBIC.format(value=source.value.name, rate=source.rate.name))
-            functions["cubic"] = parts["cubic"]
+        kind = exported.hold if source.rate is None else "cubic"
+        lines.append(_PIECES[kind].format(*(quantity.name for quantity in source.quantities)))
+        functions[kind] = parts[kind]
     body = f"return list(zip({', '.join(lines)}))" if lines else "return [()] * n"
     own = {
         "INPUTS": "".join(f", {name}" for name in inputs),
@@ -204,16 +187,14 @@ def _rest(exported: Exported) -> str:
     used = sorted({names[s] for expression in rest.expressions for s in expression.free_symbols})
     called = {s: local.get(name, name) for s, name in names.items()}
     values = PYTHON.statements(["state[0]", "inertia", "stiffness"], rest.expressions, called)
-    return filled(
-        parts["REST"],
-        {
-            "UNPACK": indented([f'{local[name]} = numbers["{name}"]' for name in used]),
-            "VALUES": indented(values),
-            "DAMPING": rest.damping,
-            "VELOCITY": exported.structure.velocity_index,
-            "SILENCED": "".join(f', "{name}": 0.0' for name in rest.silenced),
-        },
-    )
+    own = {
+        "UNPACK": indented([f'{local[name]} = numbers["{name}"]' for name in used]),
+        "VALUES": indented(values),
+        "DAMPING": rest.damping,
+        "VELOCITY": exported.structure.velocity_index,
+        "SILENCED": "".join(f', "{name}": 0.0' for name in rest.silenced),
+    }
+    return filled(parts["REST"], own)
 
 
 def _balance(exported: Exported, rest: Balance) -> str:
@@ -223,25 +204,20 @@ def _balance(exported: Exported, rest: Balance) -> str:
     lines = PYTHON.statements(targets, rest.expressions, code_names(exported, own))
     rows = ", ".join(f"[{', '.join(targets[n * (i + 1) : n * (i + 2)])}]" for i in range(n))
     result = f"return np.array([{', '.join(targets[:n])}]), np.array([{rows}])"
-    starts = PYTHON.statements(
-        [f"x[{i}]" for i in rest.start], list(rest.start.values()), code_names(exported, _OWN_WORDS_OF_START)
-    )
-    return filled(
-        template("export", "equilibrium.py.txt"),
-        {
-            "UNBALANCED": indented(
-                [*unpacked_parameters(exported, own), *unpacked_states(exported, own), *lines, result]
-            ),
-            "START": indented(
-                [*(unpacked_parameters(exported, _OWN_WORDS_OF_START) if starts else ()), *starts]
-            ),
-            "UNKNOWN": ", ".join(map(str, rest.unknown)),
-            "BALANCED": repr(BALANCED),
-            "UNDER_INPUT": f"        raise ValueError({NO_START!r})"
-            if rest.remembers
-            else "        x = _balanced(numbers, given, x)",
-        },
-    )
+    lines = [*unpacked_parameters(exported, own), *unpacked_states(exported, own), *lines, result]
+    called, places = code_names(exported, _OWN_WORDS_OF_START), [f"x[{i}]" for i in rest.start]
+    starts = PYTHON.statements(places, list(rest.start.values()), called)
+    if starts:
+        starts = [*unpacked_parameters(exported, _OWN_WORDS_OF_START), *starts]
+    refusal, balanced = f"raise ValueError({NO_START!r})", "x = _balanced(numbers, given, x)"
+    fragments = {
+        "UNBALANCED": indented(lines),
+        "START": indented(starts),
+        "UNKNOWN": ", ".join(map(str, rest.unknown)),
+        "BALANCED": repr(BALANCED),
+        "UNDER_INPUT": indented([refusal if rest.remembers else balanced], 2),
+    }
+    return filled(template("export", "equilibrium.py.txt"), fragments)
 
 
 def local_names(exported: Exported, own: Set[str]) -> dict[str, str]:

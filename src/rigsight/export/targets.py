@@ -157,13 +157,8 @@ def export_model(
         _check_name(chosen, name)
     if step is not None:
         _check_step(chosen, step)
-    content = exported(
-        model,
-        _hold(chosen, model, hold),
-        step or LONGEST,
-        RESERVED | chosen.own_words(name),
-        chosen.input_words,
-    )
+    reserved = RESERVED | chosen.own_words(name)
+    content = exported(model, _hold(chosen, model, hold), step or LONGEST, reserved, chosen.input_words)
     _check_expressible(chosen, content)
     if step is None and chosen.fixed_step:
         content = replace(content, step=internal_step(model))
@@ -230,8 +225,13 @@ def _check_expressible(target: Target, content: Exported) -> None:
 
 def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
     hold = model.hold if wished is None else wished
+    if wished is not None and not target.steps:
+        able = ", ".join(t.name for t in TARGETS.values() if t.steps)
+        raise InputError(
+            f"--hold is of {able}; what is written for {target.name} leaves the input between samples to others. Leave it out."
+        )
     if wished is not None:
-        _check_hold(target, wished)
+        check_option("--hold", hold, ("foh", "zoh"))
     mechanism = model.structure.rig.mechanism
     prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
     if set(mechanism.inputs) <= prescribing or not target.steps:
@@ -243,15 +243,6 @@ def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
             "sample faster for the same accuracy) or --hold zoh."
         )
     return hold
-
-
-def _check_hold(target: Target, hold: Hold) -> None:
-    if not target.steps:
-        able = ", ".join(t.name for t in TARGETS.values() if t.steps)
-        raise InputError(
-            f"--hold is of {able}; what is written for {target.name} leaves the input between samples to others. Leave it out."
-        )
-    check_option("--hold", hold, ("foh", "zoh"))
 
 
 def _check_step(target: Target, step: float) -> None:
@@ -266,12 +257,11 @@ def _check_step(target: Target, step: float) -> None:
 
 
 def _check_name(target: Target, name: str) -> None:
+    why = ""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,59}", name):
-        raise InputError(
-            f"'{name}' cannot be the name of a {target.name} model, which is that of its file: letters, digits and underscores, "
-            "a letter first, at most 60. Name another file with --out."
-        )
-    if name in target.words:
-        raise InputError(
-            f"'{name}' is a word of the language and no name for a {target.name} model. Name another file with --out."
-        )
+        why = f"cannot be the name of a {target.name} model, which is that of its file: letters, digits and underscores, "
+        why += "a letter first, at most 60"
+    elif name in target.words:
+        why = f"is a word of the language and no name for a {target.name} model"
+    if why:
+        raise InputError(f"'{name}' {why}. Name another file with --out.")

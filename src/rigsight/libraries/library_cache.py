@@ -39,6 +39,8 @@ NO_COMPILER = (
     f"Debian 'apt-get install gcc', or name one in the environment variable {VARIABLE}."
 )
 
+_CACHES = {"win32": ("LOCALAPPDATA", "AppData/Local"), "darwin": ("", "Library/Caches")}
+"""Platform -> the variable that names the folder of caches, and where it is at home without one."""
 CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
 FLAGS_VARIABLE = "RIGSIGHT_CFLAGS"
 """Options that follow those of the engine and so replace them, to see whether a result depends on them: ``-O1``."""
@@ -56,6 +58,16 @@ _OWN_PROCESSOR = {
     "aarch64": "-mcpu=native",
     "arm64": "-mcpu=native",
 }
+_OF_PROCESSOR = (
+    "vendor_id",
+    "cpu family",
+    "model",
+    "model name",
+    "stepping",
+    "flags",
+    "Features",
+    "CPU part",
+)
 _CHECKSUM_SIZE = 64
 
 
@@ -146,9 +158,8 @@ def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]
                 return target.read_bytes()
             if shutil.disk_usage(place).free < _ROOM:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), place)
-            first = next(
-                (line for line in said.splitlines() if "error" in line), said.strip() or "no message"
-            )
+            lines = (line for line in said.splitlines() if "error" in line)
+            first = next(lines, said.strip() or "no message")
     except OSError as error:
         raise MachineError(
             f"The C compiler {compiler.name} cannot be run in {tempfile.gettempdir()} ({error.strerror or error}). "
@@ -177,18 +188,13 @@ def _run(command: Sequence[str], place: str) -> tuple[int, str]:
         try:
             _, said = process.communicate()
         except BaseException:
-            _end(process)
+            if os.name == "nt":
+                process.kill()
+            else:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
             raise
     return process.returncode, said
-
-
-def _end(process: subprocess.Popen[str]) -> None:
-    """End a program and its child processes."""
-    if os.name == "nt":
-        process.kill()
-        return
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
 
 
 def cache_folder() -> Path:
@@ -196,15 +202,10 @@ def cache_folder() -> Path:
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
         return Path(chosen)
-    name = {"win32": "LOCALAPPDATA", "darwin": ""}.get(sys.platform, "XDG_CACHE_HOME")
-    base = os.environ.get(name)
-    return (Path(base) if base else _caches_at_home()) / "rigsight" / "kernels"
-
-
-def _caches_at_home() -> Path:
-    inside = {"win32": "AppData/Local", "darwin": "Library/Caches"}.get(sys.platform, ".cache")
+    variable, inside = _CACHES.get(sys.platform, ("XDG_CACHE_HOME", ".cache"))
+    base = os.environ.get(variable)
     try:
-        return Path.home() / inside
+        return (Path(base) if base else Path.home() / inside) / "rigsight" / "kernels"
     except RuntimeError:
         # A container with a numeric user without a name.
         raise InputError(
@@ -267,17 +268,7 @@ def processor() -> str:
     reported = f"{platform.machine()} {platform.processor()}"
     with contextlib.suppress(OSError):
         first = Path("/proc/cpuinfo").read_text("utf-8", errors="replace").partition("\n\n")[0]
-        names = (
-            "vendor_id",
-            "cpu family",
-            "model",
-            "model name",
-            "stepping",
-            "flags",
-            "Features",
-            "CPU part",
-        )
-        lines = [line for line in first.splitlines() if line.partition(":")[0].strip() in names]
+        lines = [line for line in first.splitlines() if line.partition(":")[0].strip() in _OF_PROCESSOR]
         reported = "\n".join([reported, *lines])
     return reported
 

@@ -76,14 +76,12 @@ def _remarks(channel: Channel, samples: Floats) -> Iterator[str]:
         yield f"has {', '.join(channel.stored.unclear)}, which may be a conversion and is not applied"
     found = codes(samples)
     for code in found:
-        yield (
-            f"{code.value:.6g} stands for a missing or invalid reading ({code.samples.size}, first in row {code.samples[0] + 1})"
-        )
+        where = f"{code.samples.size}, first in row {code.samples[0] + 1}"
+        yield f"{code.value:.6g} stands for a missing or invalid reading ({where})"
     if found:
         return
-    period = next((turn for turn in FULL_TURNS if is_wrapped(samples, turn)), None) or wrapping_counter(
-        samples
-    )
+    turn = next((turn for turn in FULL_TURNS if is_wrapped(samples, turn)), None)
+    period = turn or wrapping_counter(samples)
     if period is not None:
         yield f"begins again at the end of {period:.6g}: an angle or a counter; it is unwrapped if the signal is one"
     slow = held(samples)

@@ -11,7 +11,6 @@ import numpy as np
 from rigsight.errors import InputError, nearest
 from rigsight.records.channel_units import UnknownUnitError, factor
 from rigsight.records.clocks import (
-    TIME,
     Clock,
     increases,
     possible_clocks,
@@ -19,7 +18,7 @@ from rigsight.records.clocks import (
     shared_clock,
     with_clocks,
 )
-from rigsight.records.column_mapping import ColumnMapping, Columns
+from rigsight.records.column_mapping import TIME, ColumnMapping, Columns
 from rigsight.records.formats.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
 from rigsight.records.formats.channel_file import file_format, open_channels
 from rigsight.records.formats.text_channels import TextColumns
@@ -47,20 +46,25 @@ def read_columns(
         possible = selection.possible_times(time_is_mapped) if dt is None else selection.shown_times(dt)
         times = {f"time {number}": number for numbers in possible.values() for number in numbers}
         # Signals of other rates end in other rows of a text, and blank cells fill the rest.
-        file.ahead({**selection.found, **times}, len(times) > 1)
+        if file.ahead is not None:
+            file.ahead({**selection.found, **times}, len(times) > 1)
         values = {signal: selection.quantity(signal) for signal in selection.found}
         clocks = {signal: selection.clock(signal, own, values) for signal, own in possible.items()}
+        notes = (*file.notes, *selection.notes())
         if dt is not None:
             unread = [file.channels[number].name for number in selection.named(TIME)]
             if not unread and any(file.channels[i].axis is not None for i in selection.found.values()):
                 unread = [_OWN_AXIS]
+            if unread:
+                told = ", ".join(unread[:_LISTED])
+                note = f"{path.name}: dt = {dt:g} s was taken as given, and the file's own time ({told}) was not read. "
+                notes = (*notes, f"{note}Leave dt out to read it.")
             lengths = {samples.size for samples in values.values()}
             if len(lengths) > 1 or (clocks and shared_clock(clocks.values()) is None):
                 refuse_one_dt(path.name, dt, "clocks of their own or other lengths")
             n_samples = max(lengths, default=max((one.n_samples for one in file.channels), default=0))
-            clocks = dict.fromkeys(
-                selection.found or [TIME], Clock("dt", dt * np.arange(n_samples, dtype=np.float64))
-            )
+            clock = Clock("dt", dt * np.arange(n_samples, dtype=np.float64))
+            clocks = dict.fromkeys(selection.found or [TIME], clock)
         values = {signal: samples[: clocks[signal].stamps.size] for signal, samples in values.items()}
         for signal, clock in clocks.items():
             if signal in values:
@@ -71,26 +75,16 @@ def read_columns(
             values,
             {signal: file.channels[number].label for signal, number in selection.found.items()},
             np.arange(1, n_rows + 1, dtype=np.int64) if file.lines is None else file.lines,
-            (*file.notes, *selection.notes(), *(() if dt is None else _unread_time(path, dt, unread))),
+            notes,
             units={
                 signal: unit
-                for signal, number in selection.found.items()
-                if (unit := file.channels[number].unit) is not None
+                for signal, i in selection.found.items()
+                if (unit := file.channels[i].unit) is not None
             },
             row=file.row,
             names=tuple(channel.label for channel in file.channels),
         )
-    return with_clocks(path.name, TIME, table, clocks)
-
-
-def _unread_time(path: Path, dt: float, unread: Sequence[str]) -> tuple[str, ...]:
-    """Return a note that a sample time that was given replaces the time in a file, none where it has no time."""
-    if not unread:
-        return ()
-    return (
-        f"{path.name}: dt = {dt:g} s was taken as given, and the file's own time ({', '.join(unread[:_LISTED])}) was not read. "
-        "Leave dt out to read it.",
-    )
+    return with_clocks(path.name, table, clocks)
 
 
 @contextmanager
@@ -256,7 +250,9 @@ class _Selection:
         for signal, numbers in possible.items():
             channel = self._file.channels[self.found[signal]]
             foreign = numbers == [declared] and signal not in given
-            if channel.axis is not None and foreign and not _around(self._file.channels[numbers[0]], channel):
+            # A time in the group of the channel, or in one around it, is its own.
+            time = self._file.channels[numbers[0]].group if foreign else ""
+            if channel.axis is not None and time and not f"{channel.group}/".startswith(f"{time}/"):
                 possible[signal] = []
         return possible
 
@@ -313,11 +309,6 @@ class _Selection:
             given = np.flatnonzero(~(np.isnan(stamps) & np.isnan(stamps if samples is None else samples)))
             stamps = stamps[: int(given[-1]) + 1 if given.size else 0]
         return Clock(channel.name, stamps, channel.unit, channel.origin)
-
-
-def _around(time: Channel, channel: Channel) -> bool:
-    """Return True if a time stands in the group of a channel, or in one around it."""
-    return f"{channel.group}/".startswith(f"{time.group}/") or not time.group
 
 
 def _in_seconds(path: Path, channel: Channel, axis: TimeAxis) -> Floats:

@@ -28,19 +28,13 @@ _USUAL = {
     "Nm": "N*m",
     "mNm": "mN*m",
     "kNm": "kN*m",
-    "Deg": "deg",
-    "DEG": "deg",
-    "degrees": "deg",
-    "Rad": "rad",
-    "RAD": "rad",
-    "Amp": "A",
-    "amp": "A",
-    "Sec": "s",
-    "SEC": "s",
-    "seconds": "s",
     "Newton": "newton",
     "KN": "kN",
     "MM": "mm",
+    **dict.fromkeys(("Deg", "DEG", "degrees"), "deg"),
+    **dict.fromkeys(("Rad", "RAD"), "rad"),
+    **dict.fromkeys(("Amp", "amp"), "A"),
+    **dict.fromkeys(("Sec", "SEC", "seconds"), "s"),
 }
 # German for degree, to pint a gigaradian and a gon.
 _MISLEADING = {"Grad": "deg", "grad": "deg, or gon"}
@@ -111,25 +105,15 @@ def in_drive_unit(unit: str) -> tuple[float, str] | None:
     return None
 
 
-def _drive_of(unit: str | None) -> str | None:
-    """Return the SI unit of a drive that this unit is another size of, None where it is none."""
-    found = None if unit is None else in_drive_unit(unit)
-    return None if found is None else found[1]
-
-
 def is_a(unit: str, si: str) -> bool:
     """Return True if a unit stated in a file has the same dimension as `si`."""
-    try:
-        factor(unit, si)
-    except UnknownUnitError:
-        return False
-    return True
+    return unit.strip() == si or is_unit(unit.strip(), si)
 
 
-def is_unit(text: str) -> bool:
-    """Return True if a text is a unit of any quantity."""
+def is_unit(text: str, si: str | None = None) -> bool:
+    """Return True if a text is a unit of any quantity, or of that of `si`."""
     try:
-        _conversion(text, text)
+        _conversion(text, text if si is None else si)
     except UnknownUnitError:
         return False
     return True
@@ -144,9 +128,8 @@ def units_of_columns(
 ) -> tuple[dict[str, str], list[str]]:
     """Return the units of all signals, of several sets the one that the columns state, and notes on columns that state none."""
     sets = [dict(units), *({**units, **other} for other in others)]
-    open_ones = [
-        name for name in table.labels if len({one[name] for one in sets}) > 1 and mappings[name].scale is None
-    ]
+    differing = [name for name in table.labels if len({one[name] for one in sets}) > 1]
+    open_ones = [name for name in differing if mappings[name].scale is None]
     said, is_stated = {}, set()
     for name in open_ones:
         label = table.labels[name]
@@ -187,7 +170,8 @@ def si_mapping(
     if mapping.scale is not None:
         return mapping, ()
     named = split_unit(label)[1]
-    taken = si if has_si(si) else _drive_of(named)
+    drive = None if named is None else in_drive_unit(named)
+    taken = si if has_si(si) else drive and drive[1]
     by_whom = "stated in the file"
     # Brackets are written around a unit; behind a blank or a stroke it may be something else.
     if stated is None and named and taken and label.rstrip().endswith(tuple("])>")) and is_a(named, taken):
@@ -234,11 +218,8 @@ def si_mapping(
     except UnknownUnitError as error:
         by = "" if mapping.unit is not None else f", {by_whom},"
         # An offset cannot stand beside a unit.
-        right = (
-            ""
-            if mapping.offset is not None
-            else f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or '
-        )
+        named_right = f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or '
+        right = named_right if mapping.offset is None else ""
         raise InputError(
             f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write {right}scale = 1.0 to take the values without "
             "conversion."
@@ -254,11 +235,8 @@ def si_mapping(
         said = named if stated is None else stated
         if said is None or not is_a(said, si) or conversion(said, si) == (scale, offset):
             return converted, (f"{where}: taken in {unit}.{absolute}",) if absolute else ()
-        by = (
-            "the file states"
-            if stated is not None and by_whom == "stated in the file"
-            else "its name ends with"
-        )
+        by_file = stated is not None and by_whom == "stated in the file"
+        by = "the file states" if by_file else "its name ends with"
         return converted, (
             f"{where}: taken in {unit}, as stated in the campaign, although {by} {said}.{absolute}",
         )

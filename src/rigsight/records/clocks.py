@@ -11,11 +11,10 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.records.channel_names import NAMES_OF, closeness, plain_words
-from rigsight.records.column_mapping import Columns
+from rigsight.records.column_mapping import TIME, Columns
 from rigsight.records.record import Floats
 from rigsight.records.stamps import seconds_since
 
-TIME = "t"
 _NAMED = 2.0
 _WORDS_OF_TIME = tuple(sorted(NAMES_OF[TIME], key=len, reverse=True))
 
@@ -123,23 +122,17 @@ def refuse_one_dt(file: str, dt: float, what: str) -> NoReturn:
     )
 
 
-def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock]) -> Columns:
+def with_clocks(file: str, table: Columns, clocks: Mapping[str, Clock]) -> Columns:
     """Return a table with the time of its signals: one for all where they share it, else the stamps of each."""
     chosen = list(clocks.values())
     shared = shared_clock(chosen)
     known = {signal: clock.origin for signal, clock in clocks.items() if clock.origin is not None}
     if shared is not None:
-        labels = {time: shared.label, **table.labels}
-        units = table.units if shared.unit is None else {**table.units, time: shared.unit}
+        labels = {TIME: shared.label, **table.labels}
+        units = table.units if shared.unit is None else {**table.units, TIME: shared.unit}
         lines = table.lines if table.lines.size else np.arange(1, shared.stamps.size + 1, dtype=np.int64)
-        return replace(
-            table,
-            values={time: shared.stamps, **table.values},
-            labels=labels,
-            units=units,
-            lines=lines,
-            origins=known,
-        )
+        values = {TIME: shared.stamps, **table.values}
+        return replace(table, values=values, labels=labels, units=units, lines=lines, origins=known)
     if len({clock.unit or "s" for clock in chosen}) > 1:
         raise InputError(f"{file}: its signals have times in different units; export them in seconds.")
     if 0 < len(known) < len(clocks):
@@ -161,30 +154,26 @@ def with_clocks(file: str, time: str, table: Columns, clocks: Mapping[str, Clock
     unit = next((clock.unit for clock in chosen if clock.unit is not None), None)
     return replace(
         table,
-        labels={time: chosen[0].label, **table.labels},
-        units=table.units if unit is None else {**table.units, time: unit},
+        labels={TIME: chosen[0].label, **table.labels},
+        units=table.units if unit is None else {**table.units, TIME: unit},
         axes=axes,
         clocks={signal: clock.label for signal, clock in clocks.items()},
         origins=dict.fromkeys(clocks, first) if first is not None else {},
     )
 
 
-def side_by_side(file: str, time: str, tables: Mapping[Path, Columns]) -> Columns:
+def side_by_side(file: str, tables: Mapping[Path, Columns]) -> Columns:
     """Return the signals of several files as those of one record, each with the time of its file."""
-    values, labels, units, clocks = {}, {}, {}, {}
+    values, labels, clocks = {}, {}, {}
+    units: dict[str, str] = {}
     for path, table in tables.items():
-        for signal, samples in table.values.items():
-            if signal == time:
-                continue
-            values[signal] = samples
+        units |= {signal: unit for signal, unit in table.units.items() if signal != TIME}
+        for signal in (name for name in table.values if name != TIME):
+            values[signal] = table.values[signal]
             labels[signal] = f"{table.labels[signal]} of {path.name}"
-            label = table.clocks.get(signal, table.labels[time])
-            stamps = table.axes[signal] if table.axes else table.values[time]
-            clocks[signal] = Clock(
-                f"{label} of {path.name}", stamps, table.units.get(time), table.origins.get(signal)
-            )
-            if signal in table.units:
-                units[signal] = table.units[signal]
+            label = f"{table.clocks.get(signal, table.labels[TIME])} of {path.name}"
+            stamps, origin = table.clock_of(signal), table.origins.get(signal)
+            clocks[signal] = Clock(label, stamps, table.units.get(TIME), origin)
     longest = max(tables.values(), key=lambda table: table.lines.size)
     joint = Columns(
         values,
@@ -195,7 +184,7 @@ def side_by_side(file: str, time: str, tables: Mapping[Path, Columns]) -> Column
         row=longest.row,
         names=tuple(name for table in tables.values() for name in table.names),
     )
-    return with_clocks(file, time, joint, clocks)
+    return with_clocks(file, joint, clocks)
 
 
 def shared_clock(clocks: Iterable[Clock]) -> Clock | None:

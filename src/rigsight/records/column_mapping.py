@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records.record import Floats
 
+TIME = "t"
+
 
 @dataclass(frozen=True)
 class ColumnMapping:
@@ -62,7 +64,6 @@ class ColumnMapping:
                 f"Column '{self.name}': unit = \"{self.unit}\" is combined with scale or offset, which also convert; give one of "
                 "the two."
             )
-
         if not (self.unwrap is None or isinstance(self.unwrap, bool) or 0.0 < self.unwrap < math.inf):
             raise InputError(
                 f"Column '{self.name}': unwrap must be true, false, or the numbers after which the column begins again, got "
@@ -130,3 +131,12 @@ class Columns:
     names: tuple[str, ...] = ()  # names of all columns in the file
     # Signal name -> moment from which its time counts, where the file says so.
     origins: Mapping[str, np.datetime64] = field(default_factory=dict)
+
+    @property
+    def stamps(self) -> Mapping[str, Floats]:
+        """Time stamps of each signal where they do not share one axis, else of time itself; shape (n_samples,) each."""
+        return self.axes or {TIME: self.values[TIME]}
+
+    def clock_of(self, signal: str) -> Floats:
+        """Return the time stamps of a signal, shape (n_samples,)."""
+        return self.axes[signal] if self.axes else self.values[TIME]

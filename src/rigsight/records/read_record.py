@@ -14,10 +14,17 @@ import numpy as np
 from rigsight.errors import InputError, readable
 from rigsight.records.channel_table import read_columns
 from rigsight.records.channel_units import si_mapping, units_of_columns
-from rigsight.records.clocks import TIME as TIME
 from rigsight.records.clocks import side_by_side
+from rigsight.records.column_mapping import TIME as TIME
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
-from rigsight.records.conditioning import check_long_enough, time_base
+from rigsight.records.conditioning import (
+    TimeBase,
+    between,
+    check_long_enough,
+    one_stretch,
+    stretches,
+    time_base,
+)
 from rigsight.records.record import Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, joined
 from rigsight.records.sensor_signs import between_readings, refuse_codes, unwrapped
@@ -31,7 +38,6 @@ from rigsight.records.sound_signals import (
     refuse_implausible,
     rest_notes,
 )
-from rigsight.records.stretches import between, one_stretch, stretches
 
 _DIALECT = ("separator", "decimal", "header", "comment")
 """What may be said of a text."""
@@ -117,11 +123,9 @@ def read_stretches(
     recorded = [signal for signal in inputs if signal.name not in constant_inputs]
     names = [*(signal.name for signal in (*recorded, *outputs)), *beside]
     wanted = {name: columns.get(name, ColumnMapping(name)) for name in names}
-    needed = (
-        [signal.name for signal in outputs[:1]]
-        if options.required_outputs is None
-        else options.required_outputs
-    )
+    needed = options.required_outputs
+    if needed is None:
+        needed = [signal.name for signal in outputs[:1]]
     free = [output.name for output in outputs if not require_outputs or output.name not in needed]
     # A column that was mapped by hand is meant to be there.
     spare = [signal for signal in (*options.absent_inputs, *free, *beside) if signal not in columns]
@@ -135,8 +139,12 @@ def read_stretches(
         raise InputError(
             f"{path.name} has none of the outputs {listed}. Its columns: {listed_columns(table)}. Map one at least under columns."
         )
-    if dt is None:
-        _refuse_time_as_signal(path.name, table)
+    same = [name for name, label in table.labels.items() if name != TIME and label == table.labels.get(TIME)]
+    if dt is None and same:
+        raise InputError(
+            f"{path.name}: {same[0]} and {TIME} are both read from column '{table.labels[TIME]}'. Give each a column of its own "
+            "under columns."
+        )
     units = {TIME: "s"} | {signal.name: signal.unit for signal in (*inputs, *outputs)}
     # One that nothing is computed in has the unit that it was said to have.
     units |= {name: wanted[name].unit or "" for name in beside}
@@ -144,18 +152,13 @@ def read_stretches(
     to_si: dict[str, ColumnMapping] = {}
     for signal, label in table.labels.items():
         mapping = time if signal == TIME else wanted[signal]
+        stated = None if signal in beside else table.units.get(signal)
         to_si[signal], notes = si_mapping(
-            path.name,
-            signal,
-            units[signal],
-            mapping,
-            label,
-            None if signal in beside else table.units.get(signal),
-            options.gain,
+            path.name, signal, units[signal], mapping, label, stated, options.gain
         )
         unit_notes += notes
     if options.start is not None or options.end is not None:
-        table = between(path.name, TIME, table, to_si[TIME], options.start, options.end)
+        table = between(path.name, table, to_si[TIME], options.start, options.end)
     raw = {name: table.values[name] for name in names if name in table.values}
     # A few samples at rest are too few before they are a rest.
     check_long_enough(path.name, max(values.size for values in table.values.values()))
@@ -169,9 +172,8 @@ def read_stretches(
         found += still
         if options.role == "estimation":
             must_move = options.moving_inputs if may_rest else [signal.name for signal in recorded]
-            found += rest_notes(
-                path, raw, table, recorded, must_move, kind == "step" and not options.moving_inputs
-            )
+            is_step = kind == "step" and not options.moving_inputs
+            found += rest_notes(path, raw, table, recorded, must_move, is_step)
     # A command stands at its extremes on purpose.
     found += clipping_notes(path, {name: v for name, v in raw.items() if name not in beside}, table)
     found += [
@@ -188,7 +190,7 @@ def read_stretches(
     # If nothing drives the rig and nothing was measured, only time gives the number of samples.
     kept = [*raw] or [TIME]
     measured = [output.name for output in outputs if output.name in raw] if require_outputs else []
-    cut = stretches(path.name, TIME, table, measured)
+    cut = stretches(path.name, table, measured)
     parts = (one_stretch(path.name, cut),) if at_pauses == "refuse" else cut.parts
     held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
     holds: dict[str, Hold] = {signal.name: options.hold for signal in inputs}
@@ -196,7 +198,7 @@ def read_stretches(
     records = []
     sensors = {signal.name for signal in outputs}.union(options.moving_inputs)
     for number, stretch in enumerate(parts, 1):
-        part, slow = between_readings(path, TIME, stretch, sensors.intersection(kept))
+        part, slow = between_readings(path, stretch, sensors.intersection(kept))
         on_axis = _on_one_axis(path, part, kept, to_si[TIME], options.resample, holds)
         samples = {signal: to_si[signal].to_si(own) for signal, own in on_axis.samples.items()}
         n_samples = next(iter(samples.values())).size
@@ -243,17 +245,6 @@ def _table(
     return found
 
 
-def _refuse_time_as_signal(file: str, table: Columns) -> None:
-    same = [
-        signal for signal, label in table.labels.items() if signal != TIME and label == table.labels.get(TIME)
-    ]
-    if same:
-        raise InputError(
-            f"{file}: {same[0]} and {TIME} are both read from column '{table.labels[TIME]}'. Give each a column of its own under "
-            "columns."
-        )
-
-
 def _on_one_axis(
     path: Path,
     table: Columns,
@@ -265,17 +256,14 @@ def _on_one_axis(
     """Return the signals that are kept, not yet in SI, on the even axis [s] that they share or are to share."""
     scale = 1.0 if time.scale is None else time.scale
     offset = 0.0 if time.offset is None else time.offset
-    if not table.axes:
-        base = time_base(table.values[TIME], table.lines, path.name, table.row).in_seconds(scale, offset)
-        bases = dict.fromkeys(kept, base)
-    else:
-        bases, found = {}, {}
-        for signal in kept:
-            stamps = table.axes[signal]
-            if id(stamps) not in found:
-                own = time_base(stamps, table.lines, f"{path.name}, {signal}", table.row)
-                found[id(stamps)] = own.in_seconds(scale, offset)
-            bases[signal] = found[id(stamps)]
+    bases: dict[str, TimeBase] = {}
+    found: dict[int, TimeBase] = {}
+    for signal in kept:
+        stamps, where = table.clock_of(signal), f"{path.name}, {signal}" if table.axes else path.name
+        if id(stamps) not in found:
+            own = time_base(stamps, table.lines, where, table.row)
+            found[id(stamps)] = own.in_seconds(scale, offset)
+        bases[signal] = found[id(stamps)]
     raw = {signal: table.values[signal] for signal in kept}
     return joined(path.name, raw, bases, table.clocks, resample, holds)
 
@@ -308,4 +296,4 @@ def _joint_table(
         for file, own in files.items()
         if len(own) > 1 or file != path
     }
-    return side_by_side(path.name, TIME, tables)
+    return side_by_side(path.name, tables)

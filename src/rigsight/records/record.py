@@ -107,7 +107,13 @@ class Record:
             )
         object.__setattr__(self, "signals", MappingProxyType(signals))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
-        object.__setattr__(self, "constants", MappingProxyType(self._checked_constants()))
+        for constant, value in self.constants.items():
+            if not math.isfinite(value):
+                raise InputError(
+                    f"Record '{self.name}': constant '{constant}' must be finite, got {value!r}."
+                )
+        constants = {constant: float(value) for constant, value in self.constants.items()}
+        object.__setattr__(self, "constants", MappingProxyType(constants))
 
     def _checked(self, signal: str, samples: ArrayLike) -> Floats:
         """Return a private, read-only copy, so that a caller cannot change the record through its array."""
@@ -124,14 +130,6 @@ class Record:
             )
         array.flags.writeable = False
         return array
-
-    def _checked_constants(self) -> dict[str, float]:
-        for constant, value in self.constants.items():
-            if not math.isfinite(value):
-                raise InputError(
-                    f"Record '{self.name}': constant '{constant}' must be finite, got {value!r}."
-                )
-        return {constant: float(value) for constant, value in self.constants.items()}
 
     # A mappingproxy cannot be pickled, and records travel to worker processes.
     def __getstate__(self) -> dict[str, object]:
@@ -173,11 +171,8 @@ class Record:
         try:
             return self.signals[signal]
         except KeyError:
-            hint = nearest(signal, self.signals)
-            listed = ", ".join(self.signals)
-            raise InputError(
-                f"Record '{self.name}' has no signal '{signal}'.{hint} It has: {listed}."
-            ) from None
+            known = f"{nearest(signal, self.signals)} It has: {', '.join(self.signals)}."
+            raise InputError(f"Record '{self.name}' has no signal '{signal}'.{known}") from None
 
     def __contains__(self, signal: object) -> bool:
         return signal in self.signals

@@ -16,22 +16,15 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.channel_units import conversion, is_a
-from rigsight.records.column_mapping import ColumnMapping, Columns
+from rigsight.records.column_mapping import TIME, ColumnMapping, Columns
 from rigsight.records.record import Floats
 
 _CODE_SIZE = 1e30
 """From here on no reading in any unit: 9.9e37 and 9.91e37 (SCPI), 9.97e36 (NetCDF), 9.9e34 (DIAdem), 3.4e38 (end of a type)."""
-_CODES = np.array(
-    [
-        *(sign * (10.0**n - 1.0) for n in (3, 4, 5, 6, 7) for sign in (1.0, -1.0)),
-        -999.25,
-        *(
-            end
-            for n in (16, 24, 32)
-            for end in (2.0**n - 1, 2.0 ** (n - 1) - 1, 1 - 2.0 ** (n - 1), -(2.0 ** (n - 1)))
-        ),
-    ]
-)
+_NINES = [sign * (10.0**n - 1.0) for n in (3, 4, 5, 6, 7) for sign in (1.0, -1.0)]
+_HALVES = [2.0 ** (n - 1) for n in (16, 24, 32)]
+_ENDS = [end for half in _HALVES for end in (2.0 * half - 1.0, half - 1.0, 1.0 - half, -half)]
+_CODES = np.array([*_NINES, -999.25, *_ENDS])
 """Nines, the code of LAS files, and the ends of whole numbers of 16, 24 and 32 bits."""
 _MOST_CODES = 0.5
 """Share of the samples: what is there most of the time is a level of the signal."""
@@ -72,12 +65,10 @@ def codes(samples: Floats) -> tuple[Code, ...]:
         own = samples == value
         others = ~(own | huge)
         readings = samples[others]
+        if np.mean(own) >= _MOST_CODES or readings.size < 2:
+            continue
         # A command of two levels steps between them.
-        if (
-            np.mean(own) >= _MOST_CODES
-            or readings.size < 2
-            or (np.ptp(readings) == 0.0 and abs(value) < _CODE_SIZE)
-        ):
+        if np.ptp(readings) == 0.0 and abs(value) < _CODE_SIZE:
             continue
         steps = np.abs(np.diff(samples))[others[1:] & others[:-1]]
         if np.min(np.abs(readings - value)) > np.max(steps, initial=0.0):
@@ -149,20 +140,17 @@ def held(samples: Floats) -> Held | None:
 def refuse_codes(path: Path, table: Columns) -> None:
     """Refuse a signal among whose readings are codes for no reading."""
     for signal, samples in table.values.items():
-        found = codes(samples)
-        if not found:
-            continue
         reported = []
-        for code in found:
+        for code in codes(samples):
             rows = [str(table.lines[place]) for place in code.samples[:_ROWS_LISTED]]
             more = f" and {code.samples.size - _ROWS_LISTED} more" if code.samples.size > _ROWS_LISTED else ""
-            reported.append(
-                f"{code.value:.6g} in {table.row}{'s' if code.samples.size > 1 else ''} {', '.join(rows)}{more}"
+            which = f"{table.row}{'s' if code.samples.size > 1 else ''} {', '.join(rows)}{more}"
+            reported.append(f"{code.value:.6g} in {which}")
+        if reported:
+            raise InputError(
+                f"{path.name}, column '{table.labels[signal]}': {'; '.join(reported)}: such a number stands for a missing or "
+                "invalid reading. Cut the record there, or fill the gap before reading if you know what was there."
             )
-        raise InputError(
-            f"{path.name}, column '{table.labels[signal]}': {'; '.join(reported)}: such a number stands for a missing or invalid "
-            "reading. Cut the record there, or fill the gap before reading if you know what was there."
-        )
 
 
 def unwrapped(
@@ -222,9 +210,7 @@ def _period(
     return wrapping_counter(samples), " (the range of a counter)"
 
 
-def between_readings(
-    path: Path, time: str, table: Columns, sensors: Collection[str]
-) -> tuple[Columns, tuple[str, ...]]:
+def between_readings(path: Path, table: Columns, sensors: Collection[str]) -> tuple[Columns, tuple[str, ...]]:
     """Return a table in which a reading that is held over several rows is interpolated between its own rows, with notes."""
     # What the rig did meanwhile is smooth; what stands in the file is the last reading, too late by up to the
     # time between two of them. Rows before the first and behind the last reading are left out.
@@ -236,7 +222,7 @@ def between_readings(
 
     values = dict(table.values)
     for signal, slow in found.items():
-        stamps = table.axes.get(signal, table.values.get(time))
+        stamps = table.axes.get(signal, table.values.get(TIME))
         if stamps is None or not np.all(np.diff(stamps) > 0.0):
             stamps = np.arange(values[signal].size, dtype=np.float64)
         inside = np.clip(stamps, stamps[slow.fresh[0]], stamps[slow.fresh[-1]])

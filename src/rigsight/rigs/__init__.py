@@ -10,11 +10,11 @@ from rigsight.rigs.built_in import rotational as rotational
 from rigsight.rigs.controller import Controller as Controller
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.mechanism import has_short_inverse as has_short_inverse
-from rigsight.rigs.one_motion import Follower as Follower
-from rigsight.rigs.one_motion import Motion as Motion
 from rigsight.rigs.parts import Coordinate as Coordinate
 from rigsight.rigs.parts import Drive as Drive
+from rigsight.rigs.parts import Follower as Follower
 from rigsight.rigs.parts import Joint as Joint
+from rigsight.rigs.parts import Motion as Motion
 from rigsight.rigs.parts import Sensor as Sensor
 from rigsight.rigs.parts import Signal as Signal
 from rigsight.rigs.parts import acceleration as acceleration

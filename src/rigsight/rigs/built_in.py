@@ -67,11 +67,14 @@ def rig_file_text(name: str) -> str:
 
 
 @cache
+def tables_in(folder: str) -> Mapping[str, Traversable]:
+    """Return the files in TOML of a folder of this package by name, in alphabetical order."""
+    found = sorted(files("rigsight.rigs").joinpath(folder).iterdir(), key=lambda file: file.name)
+    return {file.name.removesuffix(".toml"): file for file in found if file.name.endswith(".toml")}
+
+
 def _files() -> Mapping[str, Traversable]:
-    found = (
-        file for file in files("rigsight.rigs").joinpath("files").iterdir() if file.name.endswith(".toml")
-    )
-    return {file.name.removesuffix(".toml"): file for file in sorted(found, key=lambda file: file.name)}
+    return tables_in("files")
 
 
 @cache

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice, permutations
+from itertools import islice, permutations, product
 
 import numpy as np
 import sympy as sp
@@ -52,9 +52,8 @@ class Mechanism:
     order: tuple[str, ...] = ()  # names of drives and sensors in an order in which none reads one behind it
     # What another program simulates; its mass matrix and forces are added to those of the energies.
     bodies: Bodies | None = None
-    asked: tuple[
-        sp.Symbol, ...
-    ] = ()  # parameters, constants and states that the bodies read, in the order of theirs
+    # Parameters, constants and states that the bodies read, in the order of theirs.
+    asked: tuple[sp.Symbol, ...] = ()
 
     @property
     def free(self) -> tuple[Coordinate, ...]:
@@ -76,6 +75,12 @@ class Mechanism:
     def joint_named(self, name: str | None) -> Joint:
         """Return a joint by its name; the first one for any other name."""
         return next((joint for joint in self.joints if joint.name == name), self.first_joint)
+
+    @property
+    def moving(self) -> set[sp.Symbol]:
+        """Coordinates, rates and states, and the named signals, which may hold these."""
+        own = {symbol for c in self.coordinates for symbol in (c.symbol, c.rate)}
+        return own | {state.symbol for state in self.states} | set(self.signals)
 
     @cached_property
     def has_one_motion(self) -> bool:
@@ -103,13 +108,11 @@ class Mechanism:
         own = sp.Symbol(drive.name, real=True)
         gain = derivative(drive.force, own)
         read = gain.free_symbols | {own, *drive.signal.free_symbols}
-        moving = {c.symbol for c in self.coordinates} | {c.rate for c in self.coordinates}
-        moving |= {state.symbol for state in self.states} | set(self.signals)
         return (
             drive.signal == sp.Symbol(self.inputs[0], real=True)
             and sp.expand(drive.force - gain * own) == 0
             and own not in gain.free_symbols
-            and not read & moving
+            and not read & self.moving
         )
 
     @cached_property
@@ -186,10 +189,8 @@ class Mechanism:
 
     def prescribed_rate(self, expression: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression of prescribed coordinates and their rates."""
-        along = sum(
-            (derivative(expression, c.rate) * acceleration(c) for c in self.prescribed), start=sp.Integer(0)
-        )
-        return self.rate(expression) + along
+        along = (derivative(expression, c.rate) * acceleration(c) for c in self.prescribed)
+        return sum(along, start=self.rate(expression))
 
     def written_out(self, expression: sp.Expr) -> sp.Expr:
         """Return an expression without named signals."""
@@ -297,30 +298,12 @@ def has_short_inverse(mass: sp.ImmutableMatrix) -> bool:
     """Return True if at most `MOST_COUPLED` coordinates move one another's inertia, directly or not, by short formulas."""
     return all(
         len(group) <= MOST_COUPLED and (len(group) == 1 or _products(mass, group) <= _MOST_PRODUCTS)
-        for group in _coupled(mass)
+        for group in mass.connected_components()
     )
-
-
-def _coupled(mass: sp.ImmutableMatrix) -> list[list[int]]:
-    """Return the rows of a mass matrix in groups that move one another."""
-    left, groups = set(range(mass.rows)), []
-    while left:
-        group, waiting = [], [left.pop()]
-        while waiting:
-            row = waiting.pop()
-            group.append(row)
-            moved = {column for column in left if mass[row, column] != 0}
-            left -= moved
-            waiting += moved
-        groups.append(group)
-    return groups
 
 
 def _products(mass: sp.ImmutableMatrix, group: list[int]) -> int:
     """Return the products in the determinant of a group's rows, each entry written out as a sum."""
-    terms = {
-        (i, j): len(sp.Add.make_args(mass[i, j])) if mass[i, j] != 0 else 0 for i in group for j in group
-    }
-    return sum(
-        math.prod(terms[i, j] for i, j in zip(group, order, strict=True)) for order in permutations(group)
-    )
+    terms = {place: len(sp.Add.make_args(mass[place])) for place in product(group, group) if mass[place] != 0}
+    orders = (zip(group, order, strict=True) for order in permutations(group))
+    return sum(math.prod(terms.get(place, 0) for place in places) for places in orders)

@@ -6,14 +6,13 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from typing import Any
 
 from rigsight.effects import effect_named
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter, ParameterSet
 from rigsight.rigs import RIGS
+from rigsight.rigs.built_in import tables_in
 
 _KEYS = ("title", "source", "rig", "amplitude", "notes", "constants", "parameters", "effects")
 
@@ -47,15 +46,8 @@ class PublishedSet:
 @cache
 def published_sets() -> Mapping[str, PublishedSet]:
     """Return the published sets by name, in alphabetical order."""
-    folder = files("rigsight.rigs").joinpath("parameter_sets")
-    found = sorted(
-        (file for file in folder.iterdir() if file.name.endswith(".toml")), key=lambda file: file.name
-    )
-    return {_name(file): parse_published_set(_name(file), file.read_text("utf-8")) for file in found}
-
-
-def _name(file: Traversable) -> str:
-    return file.name.removesuffix(".toml")
+    found = tables_in("parameter_sets").items()
+    return {name: parse_published_set(name, file.read_text("utf-8")) for name, file in found}
 
 
 def parse_published_set(name: str, text: str) -> PublishedSet:
@@ -76,10 +68,8 @@ def _checked(name: str, content: dict[str, Any]) -> PublishedSet:
     rig = RIGS[check_option("rig", content["rig"], RIGS)]
     constants = _values(rig.constants, content["constants"])
     alternatives = {p.name: p for p in rig.alternative_parameters}
-    given = {
-        key: alternatives[key].check(v) for key, v in content["parameters"].items() if key in alternatives
-    }
-    own = {key: value for key, value in content["parameters"].items() if key not in given}
+    own = dict(content["parameters"])
+    given = {key: alternatives[key].check(own.pop(key)) for key in [*own] if key in alternatives}
     own |= rig.in_own_parameters(given, constants)
     return PublishedSet(
         name=name,

@@ -16,8 +16,7 @@ from rigsight.rigs.controller import Controller, controller_of
 from rigsight.rigs.evaluation import evaluated
 from rigsight.rigs.mechanism import Mechanism
 from rigsight.rigs.offered import suits_place
-from rigsight.rigs.one_motion import Follower, Motion, follower_of
-from rigsight.rigs.parts import Drive, Joint, RateState, Sensor, Signal
+from rigsight.rigs.parts import Drive, Follower, Joint, Motion, RateState, Sensor, Signal, follower_of
 from rigsight.units import unit_text
 
 
@@ -149,16 +148,8 @@ class Rig:
             drive_gain = derivative(drive.force, sp.Symbol(drive.name, real=True))
             inertia = mechanism.mass_matrix[0, 0]
         bias = -joint.force if mechanism.free else joint.force
-        return Motion(
-            coordinate.symbol,
-            coordinate.rate,
-            joint.stiffness,
-            joint.damping,
-            drive_gain,
-            joint.rest,
-            bias,
-            inertia,
-        )
+        resisting = joint.stiffness, joint.damping, drive_gain, joint.rest
+        return Motion(coordinate.symbol, coordinate.rate, *resisting, bias, inertia)
 
     @cached_property
     def follower(self) -> Follower | None:
@@ -167,11 +158,8 @@ class Rig:
         if not len(mechanism.coordinates) == len(mechanism.joints) == 1:
             return None
         read = {symbol for drive in mechanism.drives for symbol in (drive.signal + drive.force).free_symbols}
-        found = (
-            follower_of(state, mechanism.coordinates[0])
-            for state in mechanism.states
-            if state.symbol not in read
-        )
+        states = (state for state in mechanism.states if state.symbol not in read)
+        found = (follower_of(state, mechanism.coordinates[0]) for state in states)
         return next((follower for follower in found if follower is not None), None)
 
     @property
@@ -182,15 +170,7 @@ class Rig:
     @property
     def downstream_parameters(self) -> frozenset[str]:
         """Names of the parameters of which the motion knows nothing."""
-        motion = self.motion
-        parts = (
-            motion.stiffness,
-            motion.damping,
-            motion.drive_gain,
-            motion.rest,
-            motion.bias,
-            motion.inertia,
-        )
+        parts = vars(self.motion).values()
         own = {symbol.name for part in parts if part is not None for symbol in part.free_symbols}
         return frozenset(parameter.name for parameter in self.parameters if parameter.name not in own)
 
@@ -208,7 +188,7 @@ class Rig:
             Its name; at a drive x and force are those of the first joint, at a sensor x is what it reads.
         """
         mechanism = self.mechanism
-        joint = next((joint for joint in mechanism.joints if joint.name == place), mechanism.first_joint)
+        joint = mechanism.joint_named(place)
         coordinates = [c for c in mechanism.coordinates if c.symbol in joint.motion.free_symbols]
         x = coordinates[0].unit if coordinates else "1"
         force = {"rad": "N m", "m": "N"}.get(x, f"J/{x}" if " " not in x else f"J/({x})")
@@ -276,10 +256,7 @@ class Rig:
         joint
             One of the rig's.
         """
-        mechanism = self.mechanism
-        moving = {c.symbol for c in mechanism.coordinates} | {c.rate for c in mechanism.coordinates}
-        moving |= {state.symbol for state in mechanism.states} | set(mechanism.signals)
-        own = {p.name for p in self.parameters}
+        moving, own = self.mechanism.moving, {p.name for p in self.parameters}
         pushing = {
             s.name
             for s in joint.force.free_symbols
@@ -291,12 +268,8 @@ class Rig:
     def _read_elsewhere(self, joint: Joint) -> set[str]:
         """Return the names of what the equations hold beside the force and the rest position of a joint."""
         mechanism = self.mechanism
-        parts = [
-            mechanism.kinetic,
-            mechanism.potential,
-            *mechanism.signals.values(),
-            *mechanism.initial.values(),
-        ]
+        parts = [mechanism.kinetic, mechanism.potential]
+        parts += [*mechanism.signals.values(), *mechanism.initial.values()]
         parts += [part for drive in mechanism.drives for part in (drive.signal, drive.force, drive.along)]
         parts += [sensor.reads for sensor in mechanism.sensors] + [state.rate for state in mechanism.states]
         for other in mechanism.joints:
@@ -313,16 +286,14 @@ class Rig:
             Kind of place.
         """
         mechanism = self.mechanism
-        found: Sequence[Drive | Joint | Sensor | RateState] = mechanism.joints
-        if kind is Place.ACTUATOR:
-            found = mechanism.drives
-        elif kind is Place.CONTROLLER:
-            found = [drive for drive in mechanism.drives if drive.name in self.controllers]
-        elif kind is Place.SENSOR:
-            found = mechanism.sensors
-        elif kind is Place.LATERAL_DYNAMICS:
-            found = mechanism.states
-        return tuple(place.name for place in found)
+        if kind is Place.CONTROLLER:
+            return tuple(drive.name for drive in mechanism.drives if drive.name in self.controllers)
+        parts: Mapping[Place, Sequence[Drive | Sensor | RateState]] = {
+            Place.ACTUATOR: mechanism.drives,
+            Place.SENSOR: mechanism.sensors,
+            Place.LATERAL_DYNAMICS: mechanism.states,
+        }
+        return tuple(place.name for place in parts.get(kind, mechanism.joints))
 
     @cached_property
     def controllers(self) -> dict[str, Controller]:
@@ -371,9 +342,8 @@ class Rig:
             return False
         if self.is_driven or effect.shifts_the_record:
             return True
-        return effect.place is Place.DYNAMICS and (
-            not effect.needs_inertia or joint_of(self, effect).inertia is not None
-        )
+        lacks_inertia = effect.needs_inertia and joint_of(self, effect).inertia is None
+        return effect.place is Place.DYNAMICS and not lacks_inertia
 
 
 def joint_of(rig: Rig, effect: Effect) -> Joint:

@@ -23,7 +23,6 @@ from rigsight.robots.free_joints import (
     sensors_of_free_joints,
     start_of,
 )
-from rigsight.robots.locked_joints import LockedJoint, check_locked
 from rigsight.robots.parts import TreeSensor, actuators_of, left_out_of, sensors_of
 from rigsight.robots.tables import (
     armature,
@@ -34,7 +33,7 @@ from rigsight.robots.tables import (
     split_joints,
     way_unit,
 )
-from rigsight.robots.tree import TreeJoint, bodies_of, gravity_of, load_spec
+from rigsight.robots.tree import LockedJoint, TreeJoint, bodies_of, check_locked, gravity_of, load_spec
 from rigsight.simulators import has_constraints
 
 if TYPE_CHECKING:
@@ -81,14 +80,12 @@ class RigDraft:
 
     def positions(self, model: mujoco.MjModel) -> dict[str, int]:
         """Return the place in ``qpos`` of each coordinate and of each state that is part of an attitude."""
-        joints = self.joint_of_coordinates()
-        own = {name: int(model.jnt_qposadr[joint]) for name, joint in joints.items()}
+        own = {name: int(model.jnt_qposadr[joint]) for name, joint in self.joint_of_coordinates().items()}
         return own | {name: place for joint in self.free_joints for name, place in joint.positions.items()}
 
     def rates(self, model: mujoco.MjModel) -> dict[str, int]:
         """Return the place of the rate of each coordinate in ``qvel``."""
-        joints = self.joint_of_coordinates()
-        own = {name: int(model.jnt_dofadr[joint]) for name, joint in joints.items()}
+        own = {name: int(model.jnt_dofadr[joint]) for name, joint in self.joint_of_coordinates().items()}
         return own | {name: place for joint in self.free_joints for name, place in joint.rates.items()}
 
     def held(self, values: Mapping[str, float]) -> dict[int, float]:
@@ -146,20 +143,15 @@ def draft_rig(
     coordinates = {
         index: names.free(joint.name or f"joint_{index + 1}", "joint") for index, joint in joints.items()
     }
-    held = {
-        index: numbers.symbol_of_constant(
-            f"{coordinates[index]}_held",
-            locked[joint.name],
-            way_unit(joint),
-            f"position in which {coordinates[index]} is locked",
-        )
-        for index, joint in joints.items()
-        if joint.name in locked
-    }
-    notes += [
-        f"Joint {coordinates[index]} is locked; a record may hold it elsewhere: constants = {{ {symbol.name} = ... }}."
-        for index, symbol in held.items()
-    ]
+    held: dict[int, sp.Symbol] = {}
+    for index, joint in joints.items():
+        if joint.name in locked:
+            q, position = coordinates[index], locked[joint.name]
+            about = f"position in which {q} is locked"
+            held[index] = numbers.symbol_of_constant(f"{q}_held", position, way_unit(joint), about)
+            notes.append(
+                f"Joint {q} is locked; a record may hold it elsewhere: constants = {{ {held[index].name} = ... }}."
+            )
     for kind, parts, left_out in (
         ("actuator", actuators, drives_left_out),
         ("sensor", sensors, sensors_left_out),
@@ -178,20 +170,21 @@ def draft_rig(
         sensors = [TreeSensor(-1, joint.index, "", 1.0, False) for joint, _ in own]
         of_free_joints = {-1 - i: {name: name for name in own.positions} for i, own in enumerate(free_joints)}
     joint_tables = {q: joint_table(model, joint, q, numbers) for joint, q in own}
+    geared: dict[str, Gear] = {}
     for joint, q in own:
         if joint.index in plays:
             play = coordinates[plays[joint.index].index]
             joint_tables[f"{q}_gear"] = gear_table(model, joint, q, play, gears[joint.name], numbers)
+            geared[f"{q}_gear"] = Gear(joint.index, play)
     rotors = [armature(model, joint, q, numbers) for joint, q in own]
     if as_it_is is not None and has_constraints(model):
         # What binds bodies goes with all that they move, rotors too, so they stay in MuJoCo.
         rotors = []
+    energies = Energies()
     if as_it_is is None:
         called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
         symbols = [held.get(index, sp.Symbol(q, real=True)) for index, q in coordinates.items()]
         energies = energies_of(bodies, called, symbols, gravity_of(model), numbers, frozenset(held.values()))
-    else:
-        energies = Energies()
     shown = _sensor_tables(sensors, joints, coordinates, names, numbers)
     beside = sensor_tables(of_free_joints, free_joints, names)
     tables: dict[str, Any] = {
@@ -217,11 +210,7 @@ def draft_rig(
     return RigDraft(
         with_known_constants(tables, numbers.constants),
         {q: joint.index for joint, q in own},
-        {
-            f"{q}_gear": Gear(joint.index, coordinates[plays[joint.index].index])
-            for joint, q in own
-            if joint.index in plays
-        },
+        geared,
         {drive.name: drive.index for drive in drives},
         {drive.reported: drive.control_index for drive in drives},
         {name: sensor.index for name, sensor, _ in shown} | dict.fromkeys(beside, -1),
@@ -288,12 +277,9 @@ def rig_text(draft: RigDraft, source: str, folder: Path) -> str:
     if draft.is_as_it_is:
         beside = Path(os.path.relpath(tables["simulator"]["file"], folder.resolve())).as_posix()
         tables["simulator"] = {**tables["simulator"], "file": beside}
-    return f"{_printable(head)}\n\n{tomli_w.dumps(tables)}"
-
-
-def _printable(text: str) -> str:
-    """Return text without the signs that TOML forbids in comments."""
-    return "".join(sign if sign in "\n\t" or sign.isprintable() else " " for sign in text)
+    # TOML forbids some signs in comments.
+    plain = "".join(sign if sign in "\n\t" or sign.isprintable() else " " for sign in head)
+    return f"{plain}\n\n{tomli_w.dumps(tables)}"
 
 
 def simulator_table(
@@ -305,28 +291,23 @@ def simulator_table(
 ) -> dict[str, Any]:
     """Return the table."""
     called = {joint.index: joint.name for joint, _ in joints} | {own.index: own.name for own in free_joints}
-    for index, name in called.items():
-        if not name:
-            raise InputError(
-                f"joint number {index} has no name, which is needed to access it in MuJoCo; give it one"
-            )
-    names = {joint.index: joint.name for joint, _ in joints}
-    parameters = {
-        name: f"dof_armature {names[own[0].index]}"
-        for name, own in fields.items()
-        if own[0].attribute == "armature" and has_constraints(model)
-    }
-    rotors = any(own[0].attribute == "armature" for own in fields.values())
+    nameless = next((index for index, name in called.items() if not name), None)
+    if nameless is not None:
+        raise InputError(
+            f"joint number {nameless} has no name, which is needed to access it in MuJoCo; give it one"
+        )
+    rotors = {name: own[0].index for name, own in fields.items() if own[0].attribute == "armature"}
+    constrained = has_constraints(model)
     moving, turned = names_in_simulator(free_joints)
-    coordinates = {q: joint.name for joint, q in joints if joint.name != q} | moving
-    return {
+    table = {
         "kind": "mujoco",
         "file": file,
-        **({"without_armature": True} if rotors and not parameters else {}),
-        **({"coordinates": coordinates} if coordinates else {}),
-        **({"states": turned} if turned else {}),
-        **({"parameters": parameters} if parameters else {}),
+        "without_armature": bool(rotors) and not constrained,
+        "coordinates": {q: joint.name for joint, q in joints if joint.name != q} | moving,
+        "states": turned,
+        "parameters": {name: f"dof_armature {called[i]}" for name, i in rotors.items() if constrained},
     }
+    return {key: value for key, value in table.items() if value}
 
 
 @dataclass(frozen=True, eq=False)

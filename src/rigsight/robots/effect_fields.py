@@ -86,13 +86,17 @@ def _add_idle_motor(joint: Any, spec: Any, what: str, **parts: list[float]) -> N
 
 
 def _limited(element: Any, values: Mapping[str, float], _: Any) -> str | None:
-    size = values["u_max"]
-    low, high = (-size, size)
-    if element.ctrlrange[0] < element.ctrlrange[1]:
-        low, high = max(low, float(element.ctrlrange[0])), min(high, float(element.ctrlrange[1]))
-    element.ctrlrange[:] = (low, high)
+    _narrow(element.ctrlrange, values["u_max"])
     element.ctrllimited = True
     return None
+
+
+def _narrow(ends: Any, size: float) -> None:
+    """Keep a range, which may be none yet, within +-size."""
+    if ends[0] < ends[1]:
+        ends[:] = (max(-size, float(ends[0])), min(size, float(ends[1])))
+    else:
+        ends[:] = (-size, size)
 
 
 def _filtered(element: Any, values: Mapping[str, float], spec: Any) -> str | None:
@@ -128,11 +132,7 @@ def _regulated(element: Any, values: Mapping[str, float], _: Any) -> str | None:
 def _force_limited(element: Any, values: Mapping[str, float], _: Any) -> str | None:
     if not _is_position_controller(element):
         return "the actuator is no position controller"
-    size = values["o_max"] * abs(float(element.biasprm[1]))
-    low, high = -size, size
-    if element.forcerange[0] < element.forcerange[1]:
-        low, high = max(low, float(element.forcerange[0])), min(high, float(element.forcerange[1]))
-    element.forcerange[:] = (low, high)
+    _narrow(element.forcerange, values["o_max"] * abs(float(element.biasprm[1])))
     element.forcelimited = True
     return None
 

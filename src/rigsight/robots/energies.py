@@ -66,17 +66,19 @@ def energies_of(
 ) -> Energies:
     """Return the energies of a tree, in which coordinates that are `held` are constants."""
     found = Energies()
-    up = [_gravity(gravity, axis, numbers) for axis in range(3)]
+    up = [
+        numbers.constant(f"gravity_{axis}", -float(value), "m/s^2", f"gravity against {axis} of the world")
+        for axis, value in zip(AXES, gravity, strict=True)
+    ]
     frames = {0: _Frame(sp.zeros(3, 1), sp.zeros(3, 1), sp.Matrix(up), sp.S.Zero)}
     for body, name in zip(bodies, names, strict=True):
         known = _Known(name, numbers)
         frame = frames[body.parent]
         # Where a tree begins changes no energy but by a constant.
         if not frame.is_still:
-            frame = frame.shifted(
-                known.length("at", body.position, "position of its attachment to its parent")
-            )
-        frame = frame.turned(_numbers(body.rotation))
+            about = "position of its attachment to its parent"
+            frame = frame.shifted(known.length("at", body.position, about))
+        frame = frame.turned(sp.Matrix(3, 3, lambda i, j, turn=body.rotation: _number(float(turn[i, j]))))
         together = _together(body.joints)
         for i, alike in enumerate(together):
             called = f"joint{i + 1 if len(together) > 1 else ''}"
@@ -122,15 +124,6 @@ class _Known:
         )
 
 
-def _gravity(gravity: Floats, axis: int, numbers: DeclaredNumbers) -> sp.Expr:
-    value = float(gravity[axis])
-    if value == 0.0:
-        return sp.S.Zero
-    return numbers.constant(
-        f"gravity_{AXES[axis]}", -value, "m/s^2", f"gravity against {AXES[axis]} of the world"
-    )
-
-
 def _together(joints: Sequence[TreeJoint]) -> list[list[TreeJoint]]:
     """Return the joints of a body in their order, those that follow one another about one axis together: their angles add up."""
     groups: list[list[TreeJoint]] = []
@@ -160,18 +153,10 @@ def _moved(
     axis = sp.Matrix([_number(value) for value in first.axis])
     rate = sp.Add(*(sp.Symbol(f"d({q.name})", real=True) for q in coordinates if q not in held))
     unit = "m" if first.slides else "rad"
-    way = sp.Add(
-        *(
-            coordinate
-            - known.numbers.constant(
-                f"{coordinate.name}_ref",
-                joint.reference,
-                unit,
-                f"{coordinate.name} in the reference pose of the model",
-            )
-            for joint, coordinate in zip(joints, coordinates, strict=True)
-        )
-    )
+    way = sp.S.Zero
+    for joint, coordinate in zip(joints, coordinates, strict=True):
+        name, about = f"{coordinate.name}_ref", f"{coordinate.name} in the reference pose of the model"
+        way += coordinate - known.numbers.constant(name, joint.reference, unit, about)
     if first.slides:
         frame = frame.shifted(axis * way)
         return replace(frame, moving=frame.moving + axis * rate)
@@ -191,21 +176,13 @@ def _rotation(axis: sp.Matrix, angle: sp.Expr) -> sp.Matrix:
 
 def _named(frame: _Frame, name: str, signals: dict[str, sp.Expr]) -> _Frame:
     """Return a frame whose longer parts are signals."""
-
-    def vector(what: str, values: sp.Matrix) -> sp.Matrix:
-        return sp.Matrix(
-            [
-                _signal(f"{name}_{what}_{axis}", value, signals)
-                for axis, value in zip(AXES, values, strict=True)
-            ]
+    turning, moving, up = (
+        sp.Matrix(
+            [_signal(f"{name}_{what}_{axis}", value, signals) for axis, value in zip(AXES, own, strict=True)]
         )
-
-    return _Frame(
-        vector("turns", frame.turning),
-        vector("moves", frame.moving),
-        vector("up", frame.up),
-        _signal(f"{name}_lift", frame.lift, signals),
+        for what, own in (("turns", frame.turning), ("moves", frame.moving), ("up", frame.up))
     )
+    return _Frame(turning, moving, up, _signal(f"{name}_lift", frame.lift, signals))
 
 
 def _signal(name: str, value: sp.Expr, signals: dict[str, sp.Expr]) -> sp.Expr:
@@ -221,20 +198,14 @@ def _add(found: Energies, body: TreeBody, frame: _Frame, known: _Known) -> None:
     constant, name = known.numbers.constant, known.body
     mass = constant(f"{name}_mass", body.mass, "kg", f"mass of {name}", Field("body", body.index, "mass"))
     center = frame.shifted(known.length("center", body.center, "its center of mass"))
-    inertia = sp.Matrix(
-        3,
-        3,
-        lambda i, j: (
-            constant(
-                f"{name}_inertia_{AXES[min(i, j)]}{AXES[max(i, j)]}",
-                float(body.inertia[i, j]),
-                "kg m^2",
-                f"{name}: inertia about its center",
-            )
-            if frame.turning[i] != 0 and frame.turning[j] != 0
-            else 0
-        ),
-    )
+
+    def about_center(i: int, j: int) -> sp.Expr:
+        if frame.turning[i] == 0 or frame.turning[j] == 0:
+            return sp.S.Zero
+        called = f"{name}_inertia_{AXES[min(i, j)]}{AXES[max(i, j)]}"
+        return constant(called, float(body.inertia[i, j]), "kg m^2", f"{name}: inertia about its center")
+
+    inertia = sp.Matrix(3, 3, about_center)
     squared = sp.Add(*(speed**2 for speed in center.moving))
     turning = sp.Add(*(inertia[i, i] * frame.turning[i] ** 2 for i in range(3)))
     turning += 2 * sp.Add(
@@ -247,10 +218,6 @@ def _add(found: Energies, body: TreeBody, frame: _Frame, known: _Known) -> None:
     for called, (terms, energy) in energies.items():
         if energy != 0:
             terms.append(_signal(called, energy, found.signals))
-
-
-def _numbers(matrix: Floats) -> sp.Matrix:
-    return sp.Matrix(3, 3, lambda i, j: _number(float(matrix[i, j])))
 
 
 def _number(value: float) -> sp.Expr:

@@ -152,19 +152,11 @@ def free_joints_of(model: mujoco.MjModel, names: Names) -> tuple[FreeJoint, ...]
     for index in range(model.njnt):
         if int(model.jnt_type[index]) not in (free, ball):
             continue
-        own = model.joint(index).name
+        own, places = model.joint(index).name, _AXES if int(model.jnt_type[index]) == free else ""
         called = names.free(own or f"joint_{index + 1}", "joint")
-        found.append(
-            FreeJoint(
-                own,
-                index,
-                int(model.jnt_qposadr[index]),
-                int(model.jnt_dofadr[index]),
-                tuple(names.free(f"{called}_{axis}") for axis in _AXES)
-                if int(model.jnt_type[index]) == free
-                else (),
-                tuple(names.free(f"{called}_turn_{axis}") for axis in _AXES),
-                tuple(names.free(f"{called}_quat_{part}") for part in f"w{_AXES}"),
-            )
-        )
+        moving = tuple(names.free(f"{called}_{axis}") for axis in places)
+        turns = tuple(names.free(f"{called}_turn_{axis}") for axis in _AXES)
+        quaternion = tuple(names.free(f"{called}_quat_{part}") for part in f"w{_AXES}")
+        position, dof = int(model.jnt_qposadr[index]), int(model.jnt_dofadr[index])
+        found.append(FreeJoint(own, index, position, dof, moving, turns, quaternion))
     return tuple(found)

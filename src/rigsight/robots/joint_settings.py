@@ -1,4 +1,8 @@
-"""Parameter values and effects of a model -> what a simulator of robots can set of each joint and its controller."""
+"""Parameter values and effects of a model -> what a simulator of robots can set of each joint and its controller.
+
+The settings of Isaac Lab are its actuators, a group for each joint, as of Isaac Lab 3.0 (`isaaclab.actuators.ActuatorBaseCfg`,
+`DelayedPDActuatorCfg`). Friction of joints is there since Isaac Sim 5.0; 2.x calls ``actuator_effort_limit`` ``effort_limit``.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.effects import kind_of
-from rigsight.errors import check_in_range
+from rigsight.errors import InputError, check_in_range
+from rigsight.robots.declared_numbers import Field
 from rigsight.robots.draft import RigDraft
-from rigsight.robots.writing_back import read_for
+from rigsight.robots.writing_back import WrittenBack, read_for
 from rigsight.simulate.model import Model
 
 _FIELDS: Mapping[tuple[str, str], tuple[str, ...]] = {
@@ -78,20 +83,13 @@ def joint_settings(
     _numbers(model, draft, settings)
     _force_limits(model, draft, compiled, settings)
     _effects(model, draft, drives, settings, has_integral_gain)
-    slide = int(mujoco.mjtJoint.mjJNT_SLIDE)
-    return JointSettings(
-        tuple(
-            SettingsOfJoint(
-                compiled.joint(index).name or place,
-                int(compiled.jnt_type[index]) == slide,
-                settings.by_joint[index],
-            )
-            for place, index in draft.joints.items()
-        ),
-        tuple(settings.written),
-        tuple(settings.without_field),
-        float(compiled.opt.timestep) if step is None else step,
+    slides = compiled.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    joints = tuple(
+        SettingsOfJoint(compiled.joint(index).name or place, bool(slides[index]), settings.by_joint[index])
+        for place, index in draft.joints.items()
     )
+    step = float(compiled.opt.timestep) if step is None else step
+    return JointSettings(joints, tuple(settings.written), tuple(settings.without_field), step)
 
 
 def _gains(model: Model, drive: str, joint: int, gear: float, settings: _Settings) -> None:
@@ -112,11 +110,7 @@ def _force_limits(model: Model, draft: RigDraft, compiled: Any, settings: _Setti
         names = {0: f"lower limit of {drive}", 1: f"upper limit of {drive}"}
         for name, value in model.values.items():
             field = draft.fields.get(name, (None,))[0]
-            if field is not None and (field.element, field.attribute, field.index) == (
-                "actuator",
-                "forcerange",
-                index,
-            ):
+            if field is not None and _limits_force(field) and field.index == index:
                 ends[field.entry], names[field.entry] = value, name
         weakest, strongest = (f"{names[end]} = {ends[end]:.4g}" for end in (0, 1))
         if ends[1] > 0.0:
@@ -130,12 +124,16 @@ def _force_limits(model: Model, draft: RigDraft, compiled: Any, settings: _Setti
             settings.without_field.append(f"{weakest}, unlike the upper end")
 
 
+def _limits_force(field: Field) -> bool:
+    return (field.element, field.attribute) == ("actuator", "forcerange")
+
+
 def _numbers(model: Model, draft: RigDraft, settings: _Settings) -> None:
     known = draft.tables.get("constants", {})
     for name, value in model.values.items():
         field = draft.fields.get(name, (None,))[0]
         setting = None if field is None or field.entry else _FIELDS.get((field.element, field.attribute))
-        if field is not None and (field.element, field.attribute) == ("actuator", "forcerange"):
+        if field is not None and _limits_force(field):
             continue
         if setting is not None and field is not None:
             for one in setting:
@@ -161,8 +159,8 @@ def _effects(
         joint, kp = draft.joints.get(place, driven), model.values.get(f"{place}_kp", 0.0)
         match kind:
             case "coulomb_friction" if joint >= 0:
-                settings.add(joint, "friction", values["T_c"])
-                settings.add(joint, "dynamic_friction", values["T_c"])
+                for own in ("friction", "dynamic_friction"):
+                    settings.add(joint, own, values["T_c"])
             case "stribeck_friction" if joint >= 0:
                 settings.add(joint, "friction", values["T_s"])
                 settings.add(joint, "dynamic_friction", values["T_c"])
@@ -175,3 +173,31 @@ def _effects(
                 settings.without_field.append(reported)
                 continue
         settings.written.append(reported)
+
+
+def isaac_settings(model: Model, source: Path, step: float | None = None) -> WrittenBack:
+    """Return the YAML of Isaac Lab's actuators for a model that was made from an MJCF or URDF file."""
+    try:
+        import yaml
+    except ImportError:
+        raise InputError(
+            "Writing for Isaac Lab needs PyYAML, which is not installed: pip install 'rigsight[mujoco]'."
+        ) from None
+    settings = joint_settings(model, source, step)
+    groups: dict[str, dict[str, Any]] = {}
+    for joint in settings.joints:
+        groups[joint.name] = {"joint_names_expr": [joint.name]}
+        for name, value in joint.values.items():
+            if name == "delay":
+                steps = round(value / settings.step)
+                groups[joint.name] |= {"min_delay": steps, "max_delay": steps}
+            else:
+                own = "actuator_effort_limit" if name == "effort_limit" else name
+                groups[joint.name][own] = value
+    head = [
+        f"Written by rigsight export from {source.name}, for Isaac Lab 3.0.",
+        f"Delays are steps of the physics of {settings.step:g} s each.",
+        *(f"Isaac Lab has no setting for {what}" for what in settings.without_field),
+    ]
+    text = "".join(f"# {line}\n" for line in head) + yaml.safe_dump({"actuators": groups}, sort_keys=False)
+    return WrittenBack(text, settings.written, settings.without_field)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -75,8 +75,8 @@ def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
         if dynamics not in (still, *filters):
             left_out.append(f"{called}: activation dynamics other than a filter")
             continue
-        bias = (
-            tuple(float(b) for b in model.actuator_biasprm[index, :3]) if bias_kind == affine else (0.0,) * 3
+        first, second, third = map(
+            float, model.actuator_biasprm[index, :3] if bias_kind == affine else (0.0,) * 3
         )
         control = int(model.actuator_ctrladr[index])
         clamped = bool(model.actuator_ctrllimited[control]) and not unclamped
@@ -88,7 +88,7 @@ def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
                 name,
                 float(model.actuator_gear[index, 0]),
                 float(model.actuator_gainprm[index, 0]),
-                (bias[0], bias[1], bias[2]),
+                (first, second, third),
                 _range(clamped, model.actuator_ctrlrange[control]),
                 _range(bool(model.actuator_forcelimited[index]), model.actuator_forcerange[index]),
                 float(model.actuator_dynprm[index, 0]) if dynamics in filters else 0.0,
@@ -174,20 +174,21 @@ def left_out_of(model: mujoco.MjModel, *, as_it_is: bool = False) -> list[str]:
     if any(model.jnt_springyield):
         found.append("springs that yield")
     if any(model.jnt_actfrclimited):
-        names = [
-            model.joint(j).name or f"number {j}" for j in range(model.njnt) if model.jnt_actfrclimited[j]
-        ]
-        found.append(f"range of the actuators' force at joints: {_listed(names)}")
+        found.append(
+            f"range of the actuators' force at joints: {_listed(_joints(model, model.jnt_actfrclimited))}"
+        )
     return found
+
+
+def _joints(model: mujoco.MjModel, chosen: Sequence[bool]) -> list[str]:
+    return [model.joint(j).name or f"number {j}" for j in range(model.njnt) if chosen[j]]
 
 
 def _between_bodies(model: mujoco.MjModel) -> list[str]:
     found = []
-    touching = _touching(model)
-    if touching:
+    if touching := _touching(model):
         found.append(f"contacts between bodies: {_listed(touching)}")
-    limited = [model.joint(j).name or f"number {j}" for j in range(model.njnt) if model.jnt_limited[j]]
-    if limited:
+    if limited := _joints(model, model.jnt_limited):
         found.append(
             f"range of joints: {_listed(limited)}; the rig has no end stops there; use the effect end_stop"
         )
@@ -230,11 +231,8 @@ def _touching(model: mujoco.MjModel) -> list[str]:
             bodies.setdefault(int(model.body_weldid[model.geom_bodyid[geom]]), []).append(geom)
     found = []
     for first, second in combinations(sorted(bodies), 2):
-        parents = (
-            int(model.body_weldid[model.body_parentid[first]]),
-            int(model.body_weldid[model.body_parentid[second]]),
-        )
-        related = first == parents[1] or second == parents[0]
+        above, over = (int(model.body_weldid[model.body_parentid[own]]) for own in (first, second))
+        related = first == over or second == above
         # The world collides with its children too, others do not.
         if (related and first != 0) or (first, second) in excluded or (second, first) in excluded:
             continue
@@ -244,12 +242,10 @@ def _touching(model: mujoco.MjModel) -> list[str]:
             for a in bodies[first]
             for b in bodies[second]
         ):
-            found.append(f"{_body(model, first)} and {_body(model, second)}")
+            found.append(
+                " and ".join(model.body(own).name or f"body number {own}" for own in (first, second))
+            )
     return found
-
-
-def _body(model: mujoco.MjModel, index: int) -> str:
-    return model.body(index).name or f"body number {index}"
 
 
 def _listed(names: list[str]) -> str:

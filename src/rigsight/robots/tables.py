@@ -57,15 +57,18 @@ class _Joint:
         about: str,
         at: str,
         entry: int = 0,
-        *,
         lower: float | None = 0.0,
     ) -> str:
         """Declare a parameter, given the element and attribute of its field, and return its name."""
         element, _, attribute = at.partition(" ")
         field = Field(element, self.joint.index, attribute, entry)
-        return self.numbers.parameter(
-            f"{self.name}_{what}", value, self.unit(unit), about, field, lower=lower
-        )
+        name = f"{self.name}_{what}"
+        return self.numbers.parameter(name, value, self.unit(unit), about, field, lower=lower)
+
+    def higher(self, what: str, power: int, value: float, unit: str, about: str) -> str:
+        """Declare the number in front of a power in a law, and return its name."""
+        about = f"{what} of {self.name} {about}"
+        return self.parameter(f"{what}_{power}", value, unit, about, f"joint {what}", power - 1, lower=None)
 
 
 def joint_table(
@@ -93,14 +96,8 @@ def joint_table(
     for power, law in ((2, f"d({name})*abs(d({name}))"), (3, f"d({name})^3")):
         value = float(model.dof_dampingpoly[joint.dof, power - 2])
         if value:
-            unit, about = (
-                f"{{force}} s^{power}/{{way}}^{power}",
-                f"damping of {name} with power {power} of the speed",
-            )
-            higher = own.parameter(
-                f"damping_{power}", value, unit, about, "joint damping", power - 1, lower=None
-            )
-            forces.append(f"{higher}*{law}")
+            unit, about = f"{{force}} s^{power}/{{way}}^{power}", f"with power {power} of the speed"
+            forces.append(f"{own.higher('damping', power, value, unit, about)}*{law}")
     spring, beside = _spring(model, own)
     if forces or beside:
         table["force"] = " + ".join([*forces, *beside])
@@ -128,14 +125,8 @@ def _spring(model: mujoco.MjModel, own: _Joint) -> tuple[dict[str, Any], list[st
     forces = []
     for power, value in enumerate(higher, start=2):
         if value:
-            unit, about = (
-                f"{{force}}/{{way}}^{power}",
-                f"stiffness of {name} with power {power} of the deflection",
-            )
-            stiffness = own.parameter(
-                f"stiffness_{power}", value, unit, about, "joint stiffness", power - 1, lower=None
-            )
-            forces.append(f"{stiffness}*{stretched}^{power}")
+            unit, about = f"{{force}}/{{way}}^{power}", f"with power {power} of the deflection"
+            forces.append(f"{own.higher('stiffness', power, value, unit, about)}*{stretched}^{power}")
     return table, forces
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ import numpy as np
 
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import InputError
+from rigsight.rigs import Rig
 from rigsight.robots.declared_numbers import Field
 from rigsight.robots.draft import Gear, RigDraft, RobotFile, read_robot
 from rigsight.robots.effect_fields import EFFECT_FIELDS
@@ -108,11 +109,14 @@ class _Writer:
     def __init__(self, robot: RobotFile, of_effects: frozenset[str]) -> None:
         spec, self._compiled, self._draft = robot.spec, robot.model, robot.draft
         self._spec = spec
+        kinds = {
+            "joint": spec.joints,
+            "actuator": spec.actuators,
+            "sensor": spec.sensors,
+            "body": spec.bodies,
+        }
         self._elements: Mapping[str, Mapping[int, Any]] = {
-            "joint": {joint.id: joint for joint in spec.joints},
-            "actuator": {actuator.id: actuator for actuator in spec.actuators},
-            "sensor": {sensor.id: sensor for sensor in spec.sensors},
-            "body": {body.id: body for body in spec.bodies},
+            kind: {element.id: element for element in elements} for kind, elements in kinds.items()
         }
         tables = {**robot.draft.tables.get("constants", {}), **robot.draft.tables["parameters"]}
         self._defaults = {name: float(table["default"]) for name, table in tables.items()}
@@ -168,11 +172,7 @@ class _Writer:
         first = self._elements["joint"][gear.joint]
         stiffness, damping = (model.values[f"{place}_{what}"] for what in ("stiffness", "damping"))
         structure = model.structure
-        loose = [
-            effect
-            for effect in model.effects
-            if kind_of(effect.name) == "free_play" and structure.rig.acts_at(effect) == place
-        ]
+        loose = [effect for effect in model.effects if _is_play_at(effect, structure.rig, {place})]
         play = structure.values_of(loose[0], model.values)["g"] if loose else 0.0
         name = add_second_joint(self._spec, first, stiffness, damping, play)
         reported = f", range +-{play:.4g} (free_play at {place})" if play > 0.0 else ""
@@ -182,7 +182,7 @@ class _Writer:
 
     def write_effect(self, effect: Effect, model: Model) -> None:
         structure = model.structure
-        if kind_of(effect.name) == "free_play" and structure.rig.acts_at(effect) in self._draft.gears:
+        if _is_play_at(effect, structure.rig, self._draft.gears.keys()):
             return
         place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
         values = structure.values_of(effect, model.values)
@@ -209,31 +209,24 @@ class _Writer:
             text = self._spec.to_xml()
         except ValueError as error:
             raise InputError(f"{source}: MuJoCo rejects it with the new values: {error}") from None
-        lines = [f"Written by rigsight export from {source.name}."]
-        lines += [f"{line}" for line in self._written]
-        lines += [f"MuJoCo has no field for {line}" for line in self._without_field]
+        written, without_field = tuple(self._written), tuple(self._without_field)
+        lines = [f"Written by rigsight export from {source.name}.", *written]
+        lines += [f"MuJoCo has no field for {line}" for line in without_field]
         # An XML comment must not contain two hyphens in a row.
         comment = "\n".join(lines).replace("--", "- -")
-        return WrittenModel(
-            f"<!-- {comment} -->\n{text}",
-            tuple(self._written),
-            tuple(self._without_field),
-            model,
-            self._draft,
-        )
+        return WrittenModel(f"<!-- {comment} -->\n{text}", written, without_field, model, self._draft)
+
+
+def _is_play_at(effect: Effect, rig: Rig, places: Set[str]) -> bool:
+    return kind_of(effect.name) == "free_play" and rig.acts_at(effect) in places
 
 
 def with_gears(spec: mujoco.MjSpec, draft: RigDraft) -> mujoco.MjModel:
     """Return the compiled model with the second joint of each gear, as a spring."""
     joints = {joint.id: joint for joint in spec.joints}
     for place, gear in draft.gears.items():
-        add_second_joint(
-            spec,
-            joints[gear.joint],
-            draft.values[f"{place}_stiffness"],
-            draft.values[f"{place}_damping"],
-            0.0,
-        )
+        stiffness, damping = (draft.values[f"{place}_{what}"] for what in ("stiffness", "damping"))
+        add_second_joint(spec, joints[gear.joint], stiffness, damping, 0.0)
     return spec.compile()
 
 

@@ -205,7 +205,7 @@ class simulated(sp.Function):  # type: ignore[misc]  # noqa: N801
 
     @staticmethod
     def _imp_(key: Any, index: Any, *arguments: Any) -> Any:
-        return _shaped(_values(int(key), _is_force(key, index), arguments)[_row(key, index)], arguments)
+        return _shaped(_values(key, index, arguments), arguments)
 
 
 class simulated_slope(sp.Function):  # type: ignore[misc]  # noqa: N801
@@ -223,9 +223,7 @@ class simulated_slope(sp.Function):  # type: ignore[misc]  # noqa: N801
         here = np.asarray(arguments[by], dtype=np.float64)
         step = STEP * np.maximum(np.abs(here), 1.0)
         moved = [*arguments[:by], here + step, *arguments[by + 1 :]]
-        before, behind = (
-            _values(int(key), _is_force(key, index), own)[_row(key, index)] for own in (arguments, moved)
-        )
+        before, behind = (_values(key, index, own) for own in (arguments, moved))
         return _shaped((behind - before) / step, arguments)
 
 
@@ -254,23 +252,16 @@ def force_leaf(
 def place_of(leaf: sp.Expr) -> tuple[int, ...]:
     """Return row and column of a leaf that is an entry of the mass matrix, and the row of one that is a force."""
     key, index = leaf.args[:2]
-    if _is_force(key, index):
-        return (_row(key, index),)
+    if (force := _of_force(key, index)) >= 0:
+        return (force,)
     row = next(i for i in range(bodies_of(int(key)).n) if int(index) < (i + 1) * (i + 2) // 2)
     return row, int(index) - row * (row + 1) // 2
 
 
-def _n_mass(key: Any) -> int:
+def _of_force(key: Any, index: Any) -> int:
+    """Return the row of a leaf that is a force; negative for an entry of the mass matrix."""
     n = bodies_of(int(key)).n
-    return n * (n + 1) // 2
-
-
-def _is_force(key: Any, index: Any) -> bool:
-    return int(index) >= _n_mass(key)
-
-
-def _row(key: Any, index: Any) -> int:
-    return int(index) - (_n_mass(key) if _is_force(key, index) else 0)
+    return int(index) - n * (n + 1) // 2
 
 
 def _shaped(values: Floats, arguments: Sequence[Any]) -> Any:
@@ -278,17 +269,18 @@ def _shaped(values: Floats, arguments: Sequence[Any]) -> Any:
     return values.reshape(shape) if shape else float(values[0])
 
 
-def _values(key: int, is_force: bool, arguments: Sequence[Any]) -> Floats:
-    """Return the lower half of the mass matrix, or the forces, shape (n_values, n_points)."""
-    columns = np.atleast_2d(
-        np.stack(np.broadcast_arrays(*(np.asarray(a, dtype=np.float64).ravel() for a in arguments)))
-    )
-    return _answered(key, is_force, columns.shape, columns.tobytes())
+def _values(key: Any, index: Any, arguments: Sequence[Any]) -> Floats:
+    """Return an entry of the mass matrix, or a force, shape (n_points,)."""
+    force = _of_force(key, index)
+    columns = np.stack(np.broadcast_arrays(*(np.asarray(a, dtype=np.float64).ravel() for a in arguments)))
+    found = _answered(int(key), force >= 0, columns.shape, columns.tobytes())
+    values: Floats = found[force if force >= 0 else int(index)]
+    return values
 
 
 @lru_cache(maxsize=_MOST_REMEMBERED)
 def _answered(key: int, is_force: bool, shape: tuple[int, ...], content: bytes) -> Floats:
-    """Return the same of points whose numbers are given as bytes; each entry of a mass matrix asks for the same."""
+    """Return the lower half of the mass matrix, or the forces, at points given as bytes; each entry asks for the same."""
     with _lock:
         return bodies_of(key).answers.at(np.frombuffer(content).reshape(shape), is_force=is_force)
 

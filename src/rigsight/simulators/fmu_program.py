@@ -98,34 +98,26 @@ class FmuProgram(Program):
         self._version = description.fmiVersion[0]
         self._variables = {variable.name: variable for variable in description.modelVariables}
         self._places = self._places_of(description, bodies)
-        self._step, self._longer = _steps_of(description, bodies) if self._steps else _none_of_steps(bodies)
+        self._step, self._longer = _steps_of(description, bodies) if self._steps else (0.0, 0.0)
+        if bodies.step and not self._steps:
+            raise InputError(
+                f"{bodies.file} is used for Model Exchange, which has no communication step. Remove step."
+            )
         self._signs = [-1.0 if name.startswith("-") else 1.0 for name in bodies.forces]
-        self._forces = [
-            self._reference(name.removeprefix("-"), "input", "[simulator.forces]") for name in bodies.forces
-        ]
-        self._parameters = [
-            self._reference(name, "parameter", "[simulator.parameters]") for name in bodies.parameters
-        ]
+        self._forces = [self._reference(name.removeprefix("-"), "input", "forces") for name in bodies.forces]
+        self._parameters = [self._reference(name, "parameter", "parameters") for name in bodies.parameters]
         folder = extract(bodies.file)
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
         self._binary = _binary(bodies.file, Path(folder), own.modelIdentifier)
         resources = Path(folder) / "resources"
         where = resources.as_uri() if self._version == "2" else f"{resources}/"
         self._failed = ctypes.c_int(0)
-        self._strings = [
-            text.encode()
-            for text in (own.modelIdentifier, description.guid or description.instantiationToken, where)
-        ]
-        kind = "fmu_steps.c.txt" if self._steps else "fmu_exchange.c.txt"
-        fragments = {
-            "KIND": template("simulators", kind),
-            "VERSION": self._version,
-            "STATES": len(description.derivatives),
-            "STEPS": int(self._steps),
-        }
-        self.c_text = filled(template("simulators", "fmu.c.txt"), fragments) + template(
-            "simulators", "probed.c.txt"
-        )
+        token = description.guid or description.instantiationToken
+        self._strings = [text.encode() for text in (own.modelIdentifier, token, where)]
+        texts = ("fmu.c.txt", "fmu_steps.c.txt" if self._steps else "fmu_exchange.c.txt", "probed.c.txt")
+        text, kind, probed = (template("simulators", name) for name in texts)
+        counts = {"STATES": len(description.derivatives), "STEPS": int(self._steps)}
+        self.c_text = filled(text, {"KIND": kind, "VERSION": self._version, **counts}) + probed
         self._kept: list[Any] = []
         self._compared = not self._steps
 
@@ -163,7 +155,11 @@ class FmuProgram(Program):
     def _reference(self, name: str, causality: str, table: str) -> int:
         known = self._reals(causality)
         if name not in known:
-            what = f"has no {causality} '{name}'" if name else f"needs a force for each coordinate in {table}"
+            what = (
+                f"has no {causality} '{name}'"
+                if name
+                else f"needs a force for each coordinate in [simulator.{table}]"
+            )
             raise InputError(
                 f"{self._file} {what}.{nearest(name, known)} It has: {', '.join(known) or 'none'}."
             )
@@ -223,14 +219,6 @@ def _steps_of(description: ModelDescription, bodies: Bodies) -> tuple[float, flo
             f"{bodies.file} takes communication steps of one length alone, and does not say of which: set step in [simulator]."
         )
     return float(given), float(given)
-
-
-def _none_of_steps(bodies: Bodies) -> tuple[float, float]:
-    if bodies.step:
-        raise InputError(
-            f"{bodies.file} is used for Model Exchange, which has no communication step. Remove step."
-        )
-    return 0.0, 0.0
 
 
 def _binary(file: str, folder: Path, identifier: str) -> Path:

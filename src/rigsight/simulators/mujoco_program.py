@@ -109,16 +109,10 @@ class MujocoProgram(Program):
             f"vector, the index of the entry from 0: 'body_mass hand', 'body_ipos hand 2'."
         )
         words = name.split()
-        field = (
-            getattr(self._model, words[0], None) if words and re.fullmatch(r"[a-z]+_\w+", words[0]) else None
-        )
-        kind = words[0].partition("_")[0] if words else ""
-        if (
-            not isinstance(field, np.ndarray)
-            or field.dtype != np.float64
-            or kind not in _OBJECTS
-            or len(words) < 2
-        ):
+        if len(words) < 2 or not re.fullmatch(rf"({'|'.join(_OBJECTS)})_\w+", words[0]):
+            raise InputError(wanted)
+        field, kind = getattr(self._model, words[0], None), words[0].partition("_")[0]
+        if not isinstance(field, np.ndarray) or field.dtype != np.float64:
             raise InputError(wanted)
         accessor = getattr(self._model, {"eq": "equality", "jnt": "joint", "dof": "joint"}.get(kind, kind))
         try:
@@ -143,11 +137,11 @@ class MujocoProgram(Program):
         if np.shares_memory(field, self._model.dof_frictionloss):
             return False
         before, other = float(field[place]), 1.25 * float(field[place]) + 0.5
-        field[place] = other
-        mujoco.mj_setConst(self._model, mujoco.MjData(self._model))
-        kept = float(field[place]) == other
-        field[place] = before
-        mujoco.mj_setConst(self._model, mujoco.MjData(self._model))
+        kept = False
+        for value in (other, before):
+            field[place] = value
+            mujoco.mj_setConst(self._model, mujoco.MjData(self._model))
+            kept = kept or float(field[place]) == other
         return kept
 
     def connect(self, library: ctypes.CDLL) -> None:
@@ -222,8 +216,7 @@ def has_constraints(model: mujoco.MjModel) -> bool:
     touches = bool(np.any(model.geom_contype) and np.any(model.geom_conaffinity)) or model.npair > 0
     return bool(
         (touches and not flags & int(off.mjDSBL_CONTACT))
-        or (np.any(model.jnt_limited) and not flags & int(off.mjDSBL_LIMIT))
-        or (np.any(model.tendon_limited) and not flags & int(off.mjDSBL_LIMIT))
+        or ((np.any(model.jnt_limited) or np.any(model.tendon_limited)) and not flags & int(off.mjDSBL_LIMIT))
         or np.any(model.tendon_frictionloss)
         or np.any(model.dof_frictionloss[~of_the_rig(model)[1]])
         or (model.neq > 0 and not flags & int(off.mjDSBL_EQUALITY))

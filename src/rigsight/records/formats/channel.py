@@ -66,20 +66,16 @@ class Stored:
             stored = stored.view(f"u{stored.dtype.itemsize}")
         # In single precision -9999.9 is the number next to it.
         alike = stored.dtype if stored.dtype.kind == "f" else np.dtype(np.float64)
-        invalid = (
-            np.isin(stored.astype(alike), np.array(self.missing).astype(alike))
-            | (stored < self.least)
-            | (stored > self.most)
-        )
+        missing = np.isin(stored.astype(alike), np.array(self.missing).astype(alike))
+        invalid = missing | (stored < self.least) | (stored > self.most)
         return np.where(invalid, np.nan, self.scale * stored.astype(np.float64) + self.offset)
 
     @property
     def note(self) -> str:
         """What was done to the numbers, empty where nothing was."""
-        converted = (self.scale, self.offset) != (1.0, 0.0)
-        return (
-            f"{self.scale:.9g} * stored number + {self.offset:.9g}, as the file states" if converted else ""
-        )
+        if (self.scale, self.offset) == (1.0, 0.0):
+            return ""
+        return f"{self.scale:.9g} * stored number + {self.offset:.9g}, as the file states"
 
 
 AS_STORED = Stored()
@@ -200,10 +196,6 @@ class Refused:
         object.__setattr__(self, "reason", printable(self.reason))
 
 
-def _each_by_itself(needed: Mapping[str, int], blank: bool) -> None:
-    """Read nothing ahead."""
-
-
 @dataclass(frozen=True, eq=False)
 class ChannelFile:
     """What a file holds, found out without reading any samples."""
@@ -217,7 +209,7 @@ class ChannelFile:
     lines: NDArray[np.int64] | None = None
     notes: tuple[str, ...] = ()
     has_names: bool = True
-    ahead: Callable[[Mapping[str, int], bool], None] = _each_by_itself
+    ahead: Callable[[Mapping[str, int], bool], None] | None = None
 
     @property
     def word(self) -> str:
@@ -335,8 +327,7 @@ def _upright(table: NDArray[Any]) -> NDArray[Any]:
 
 def stated_unit(text: object) -> str | None:
     """Return a unit as a file states it, None for the ways of saying that there is none."""
-    if isinstance(text, bytes):
-        text = text.decode("utf-8", errors="replace")
+    text = _text(text)
     if isinstance(text, np.ndarray) and text.size == 1:
         return stated_unit(text.reshape(-1)[0])
     if not isinstance(text, str):
@@ -354,9 +345,7 @@ def with_distinct_names(channels: Iterable[Channel]) -> tuple[Channel, ...]:
     """Return the channels with printable names, with a number behind each that is not the first of its name."""
     channels = tuple(channels)
     names = distinct_names([printable(channel.name) for channel in channels])
-    return tuple(
-        replace(channel, name=name, label=name) for channel, name in zip(channels, names, strict=True)
-    )
+    return tuple(replace(own, name=name, label=name) for own, name in zip(channels, names, strict=True))
 
 
 def distinct_names(names: Sequence[str]) -> list[str]:

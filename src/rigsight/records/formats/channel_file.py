@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -69,19 +68,15 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
     with contextlib.ExitStack() as stack:
         stack.enter_context(_silence())
         with _reported(path, known):
-            file = stack.enter_context(_reader(known.key)(path))
+            # Only its own library is imported.
+            isolated = known.key in PACKAGES
+            reader = partial(open_isolated, known.key) if isolated else reader_of(known.key)
+            file = stack.enter_context(contextlib.contextmanager(reader)(path))
             check_count(path.name, len(file.channels))
             check_total(path.name, sum(channel.n_samples for channel in file.channels))
             distinct = with_distinct_names(file.channels)
         channels = tuple(_guarded(path, known, channel) for channel in distinct)
         yield replace(file, channels=channels, format=known.name)
-
-
-def _reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
-    """Return the reader of a format; only its own library is imported."""
-    if kind in PACKAGES:
-        return contextlib.contextmanager(partial(open_isolated, kind))
-    return contextlib.contextmanager(reader_of(kind))
 
 
 def _guarded(path: Path, known: Format, channel: Channel) -> Channel:

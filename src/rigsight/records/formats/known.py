@@ -33,8 +33,8 @@ class Format:
     name: str  # name in messages and results
     # Of its files, lower case; empty where another format with the same suffix stands for it.
     suffixes: tuple[str, ...]
-    # Matches the first `HEAD` bytes of a file of this format, and of no other.
-    signature: re.Pattern[bytes]
+    # Pattern that matches the first `HEAD` bytes of a file of this format, and of no other.
+    signature: bytes
     package: str | None = None  # package that reads it; None where rigsight itself does
     # True if that package is written in C, so that a damaged file could crash it: it is called in a process
     # of its own.
@@ -46,40 +46,36 @@ class Format:
 
     def recognizes(self, head: bytes) -> bool:
         """Return True for the first `HEAD` bytes of a file of this format."""
-        return self.signature.match(head) is not None
-
-
-def _begins(pattern: bytes) -> re.Pattern[bytes]:
-    return re.compile(pattern, re.DOTALL)
+        return re.match(self.signature, head, re.DOTALL) is not None
 
 
 _HDF5 = rb"(?:.{512}|.{1024}|.{2048})?\x89HDF\r\n\x1a\n"
 _OF_MATLAB_7_3 = rb"MATLAB 7\.3 MAT-file"
 FORMATS = (
     Format(
-        "matlab", "MATLAB", (".mat",), _begins(rb"(?!%b).{124}(?:\x00\x01|\x01\x00)(?:IM|MI)" % _HDF5), "scipy", isolated=True,
+        "matlab", "MATLAB", (".mat",), rb"(?!%b).{124}(?:\x00\x01|\x01\x00)(?:IM|MI)" % _HDF5, "scipy", isolated=True,
         advice="MATLAB files before version 5 are not read: save it again with save -v7.",
     ),
-    Format("matlab_hdf5", "MATLAB 7.3", (), _begins(rb"(?=%b)%b" % (_HDF5, _OF_MATLAB_7_3)), "h5py", isolated=True),
-    Format("hdf5", "HDF5", (".h5", ".hdf5", ".hdf"), _begins(rb"(?!%b)%b" % (_OF_MATLAB_7_3, _HDF5)), "h5py", isolated=True),
-    Format("mdf", "MDF4", (".mf4", ".mdf"), _begins(rb"MDF     |UnFinMF "), "asammdf", isolated=True),
-    Format("tdms", "TDMS", (".tdms",), _begins(rb"TDS[mh]"), "nptdms"),
-    Format("parquet", "Parquet", (".parquet",), _begins(rb"PAR1"), "pyarrow", isolated=True),
+    Format("matlab_hdf5", "MATLAB 7.3", (), rb"(?=%b)%b" % (_HDF5, _OF_MATLAB_7_3), "h5py", isolated=True),
+    Format("hdf5", "HDF5", (".h5", ".hdf5", ".hdf"), rb"(?!%b)%b" % (_OF_MATLAB_7_3, _HDF5), "h5py", isolated=True),
+    Format("mdf", "MDF4", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", "asammdf", isolated=True),
+    Format("tdms", "TDMS", (".tdms",), rb"TDS[mh]", "nptdms"),
+    Format("parquet", "Parquet", (".parquet",), rb"PAR1", "pyarrow", isolated=True),
     # Bags hold images as well, which are passed over.
     Format(
-        "bag", "ROS bag", (".bag", ".mcap", ".db3"), _begins(rb"#ROSBAG V2\.0|\x89MCAP0\r\n|SQLite format 3\x00"), "rosbags",
+        "bag", "ROS bag", (".bag", ".mcap", ".db3"), rb"#ROSBAG V2\.0|\x89MCAP0\r\n|SQLite format 3\x00", "rosbags",
         extra="logs", largest=200_000_000_000,
         repair="A recording that was cut off is repaired by 'mcap recover', 'ros2 bag reindex' or 'rosbag reindex'.",
     ),
-    Format("ulog", "ULog", (".ulg",), _begins(rb"ULog\x01\x12\x35"), "pyulog", extra="logs"),
+    Format("ulog", "ULog", (".ulg",), rb"ULog\x01\x12\x35", "pyulog", extra="logs"),
     # pyuff holds every number of a text dataset as an object, thirty times the file.
     Format(
-        "uff", "UFF", (".uff", ".unv"), _begins(rb"[\r\n]*    -1\s*[\r\n]\s*\d"), "pyuff",
+        "uff", "UFF", (".uff", ".unv"), rb"[\r\n]*    -1\s*[\r\n]\s*\d", "pyuff",
         largest=300_000_000,
     ),
     # Every number becomes an object, ten times the file. A line in brackets may also be the head of a section in a text.
     Format(
-        "json", "JSON", (".json", ".jsonl", ".ndjson"), _begins(rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*[\[{]|\{\s*\")"),
+        "json", "JSON", (".json", ".jsonl", ".ndjson"), rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*[\[{]|\{\s*\")",
         largest=300_000_000,
     ),
 )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import UTC
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from rigsight.errors import InputError
 from rigsight.records.formats.channel import (
     Channel,
     ChannelFile,
-    Load,
     Refused,
     TimeAxis,
     listed,
@@ -58,7 +58,7 @@ def _parts(file: Any) -> Iterator[Channel | Refused]:
             if reason is not None:
                 yield Refused(name, reason)
             else:
-                yield Channel(name, n_samples, _load(file, number, index), unit, axis)
+                yield Channel(name, n_samples, partial(_samples, file, number, index), unit, axis)
 
 
 def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int) -> TimeAxis | None:
@@ -70,15 +70,12 @@ def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int
     return TimeAxis(n_samples, load=lambda: file.get_master(number), unit=unit, origin=start)
 
 
-def _load(file: Any, number: int, index: int) -> Load:
-    def samples() -> NDArray[Any]:
-        # Left to itself, the library drops the invalid samples, and the others would move to other times.
-        read, invalid = file.get(group=number, index=index, samples_only=True, ignore_invalidation_bits=True)
-        if invalid is None or not np.any(invalid):
-            return np.asarray(read)
-        return np.where(np.asarray(invalid, dtype=bool), np.nan, read)
-
-    return samples
+def _samples(file: Any, number: int, index: int) -> NDArray[Any]:
+    # Left to itself, the library drops the invalid samples, and the others would move to other times.
+    read, invalid = file.get(group=number, index=index, samples_only=True, ignore_invalidation_bits=True)
+    if invalid is None or not np.any(invalid):
+        return np.asarray(read)
+    return np.where(np.asarray(invalid, dtype=bool), np.nan, read)
 
 
 def _refusal(channel: Any, n_samples: int, axis: TimeAxis | None) -> str | None:

@@ -21,7 +21,6 @@ from rigsight.records.formats.channel import (
     MOST_COLUMNS,
     Channel,
     ChannelFile,
-    Load,
     Refused,
     as_stamps,
     check_count,
@@ -67,11 +66,13 @@ def _parts(file: Any, features: Mapping[str, Sequence[str]]) -> Iterator[Channel
         elif reason := too_short(n_rows):
             yield Refused(name, reason)
         else:
-            said = {
-                key.decode("utf-8", errors="replace"): value for key, value in (column.metadata or {}).items()
-            }
+            stated = (column.metadata or {}).items()
+            said = {key.decode("utf-8", errors="replace"): value for key, value in stated}
             own = origin if types.is_timestamp(kind) else None
-            unit, load = "s" if is_time else unit_of(said), _load(file, name, own, is_time=is_time)
+            unit, load = (
+                "s" if is_time else unit_of(said),
+                partial(_samples, file, name, own, is_time=is_time),
+            )
             if name == _STAMPS and _EPISODE in schema.names and types.is_floating(kind):
                 load = partial(_one_after_another, file)
             yield Channel(name, n_rows, load, unit, stored=stored_by(said), origin=own)
@@ -114,11 +115,13 @@ def _names_of_features(path: Path) -> dict[str, list[str]]:
         except (OSError, ValueError, KeyError, AttributeError, TypeError):
             continue
         # Older data sets have the names by kind: {"motors": ["shoulder", ...]}.
-        named = {name: own.get("names") for name, own in features if isinstance(own, dict)}
-        flat = {
-            n: next(iter(own.values()), None) if isinstance(own, dict) else own for n, own in named.items()
-        }
-        return {name: [str(label) for label in own] for name, own in flat.items() if isinstance(own, list)}
+        found = {}
+        for name, own in features:
+            named = own.get("names") if isinstance(own, dict) else None
+            labels = next(iter(named.values()), None) if isinstance(named, dict) else named
+            if isinstance(labels, list):
+                found[name] = [str(label) for label in labels]
+        return found
     return {}
 
 
@@ -141,10 +144,7 @@ def _one_after_another(file: Any) -> NDArray[Any]:
     return stamps
 
 
-def _load(file: Any, name: str, origin: np.datetime64 | None, *, is_time: bool) -> Load:
-    def samples() -> NDArray[Any]:
-        # Missing cells of whole numbers become NaN, and are told as such.
-        column = file.read(columns=[name]).column(name).to_numpy()
-        return seconds_since(column, origin) if is_time else np.asarray(column)
-
-    return samples
+def _samples(file: Any, name: str, origin: np.datetime64 | None, *, is_time: bool) -> NDArray[Any]:
+    # Missing cells of whole numbers become NaN, and are told as such.
+    column = file.read(columns=[name]).column(name).to_numpy()
+    return seconds_since(column, origin) if is_time else np.asarray(column)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 from rigsight.records.formats.channel import (
     Channel,
     ChannelFile,
-    Load,
     Refused,
     TimeAxis,
     listed,
@@ -62,7 +62,7 @@ def _parts(file: Any) -> Iterator[Channel | Refused]:
             unit = "s" if kind == "M" else unit_of(properties, UNIT_PROPERTIES)
             # Properties of waveforms and of scales are known; the others a person wrote.
             said = {key: value for key, value in properties.items() if not key.startswith(("NI_", "wf_"))}
-            axis, load = _axis(channel, origin), _load(channel, dated)
+            axis, load = _axis(channel, origin), partial(_samples, channel, dated)
             yield Channel(name, len(channel), load, unit, axis, stored_by(said), dated)
 
 
@@ -77,12 +77,9 @@ def _unknown_scales(*owners: Mapping[str, Any]) -> list[str]:
     return []
 
 
-def _load(channel: Any, origin: np.datetime64 | None) -> Load:
-    def samples() -> NDArray[Any]:
-        read: NDArray[Any] = channel[:]
-        return seconds_since(read, origin) if read.dtype.kind in "mM" else read
-
-    return samples
+def _samples(channel: Any, origin: np.datetime64 | None) -> NDArray[Any]:
+    read: NDArray[Any] = channel[:]
+    return seconds_since(read, origin) if read.dtype.kind in "mM" else read
 
 
 def _start(channel: Any) -> np.datetime64 | None:

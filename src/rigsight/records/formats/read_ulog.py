@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.records.formats.channel import Channel, ChannelFile, Refused, TimeAxis, listed, too_short
 
@@ -38,7 +37,7 @@ def _parts(log: Any) -> Iterator[Channel | Refused]:
         if reason := too_short(stamps.size):
             yield Refused(name, reason)
             continue
-        axis = TimeAxis(stamps.size, load=partial(_seconds, stamps))
+        axis = TimeAxis(stamps.size, load=partial(np.divide, stamps, 1e6))
         for field, samples in topic.data.items():
             if field == _STAMPS:
                 continue
@@ -46,7 +45,3 @@ def _parts(log: Any) -> Iterator[Channel | Refused]:
                 yield Channel(f"{name}/{field}", samples.size, partial(np.asarray, samples), axis=axis)
             else:
                 yield Refused(f"{name}/{field}", f"is of type {samples.dtype}, not numbers")
-
-
-def _seconds(stamps: NDArray[Any]) -> NDArray[Any]:
-    return stamps / 1e6

@@ -251,7 +251,7 @@ class TextColumns:
             usecols=columns,
             quotechar='"',
             comments=None,
-            converters=_number_or_blank if blank else None,
+            converters=(lambda cell: float(cell) if cell.strip() else np.nan) if blank else None,
             ndmin=2,
         )
 
@@ -350,7 +350,3 @@ class TextColumns:
                     if signal.startswith("time "):
                         what += " Time is a number, not a date."
                 raise InputError(f"{self._path.name}, line {number}, column '{names[position]}': {what}")
-
-
-def _number_or_blank(cell: str) -> float:
-    return float(cell) if cell.strip() else float("nan")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import operator
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NoReturn
 
 import sympy as sp
@@ -78,14 +79,18 @@ class Declaration:
             )
             if place is not None:
                 break
-        where = ""
+        where = self._source
         if place is not None:
             column = place[1] + (within + 1 if within is not None and len(path) == length else 0)
-            where = f", line {place[0]}, column {column}"
-        named = ".".join(map(str, path))
-        raise InputError(
-            f"{self._source}{where}: {named}: {message}." if named else f"{self._source}{where}: {message}."
-        )
+            where += f", line {place[0]}, column {column}"
+        named = f"{'.'.join(map(str, path))}: " if path else ""
+        raise InputError(f"{where}: {named}{message}.")
+
+    def check_known(self, path: Path, what: str, name: str, known: Collection[str]) -> None:
+        """Refuse a name that stands for something declared, and does not."""
+        if name not in known:
+            declared = ", ".join(known) or "none"
+            self.refuse(path, f"there is no {what} '{name}'.{nearest(name, known)} Declared: {declared}")
 
     def refuse_expression(self, path: Path, error: ExpressionError) -> NoReturn:
         """Raise what is wrong with an expression, with a quote of it."""
@@ -106,12 +111,11 @@ class Declaration:
 
     def sympy(self, path: Path) -> sp.Expr:
         """Return an expression as sympy sees it."""
-        symbols: dict[str, sp.Expr] = dict(self.symbols)
-        symbols |= {
+        readings = {
             name: reading_symbol(name) for name in self.table.sensors if self.reads_sensor(path, name)
         }
         try:
-            return to_sympy(self.expressions[path], symbols)
+            return to_sympy(self.expressions[path], self.symbols | readings)
         except ExpressionError as error:
             self.refuse_expression(path, error)
 
@@ -156,23 +160,19 @@ def to_sympy(expression: Expression, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
 
 
 def _built(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
-    value = _of_node(node, symbols)
+    value, place = _of_node(node, symbols), place_of(node)
+    size = value if value.is_Rational else sp.S.Zero
     if value.is_number and not value.is_Rational:
-        _check_number(value, place_of(node))
-    elif value.is_Rational and abs(value) > _LARGEST:
-        raise ExpressionError("a number is too large", place_of(node))
-    return value
-
-
-def _check_number(value: sp.Expr, place: int) -> None:
-    try:
-        number = complex(value)
-    except (OverflowError, TypeError, ValueError):
-        raise ExpressionError("a number is too large or undefined", place) from None
-    if number.imag != 0.0 or math.isnan(number.real):
-        raise ExpressionError("this has no real value", place)
-    if abs(number.real) > _LARGEST:
+        try:
+            number = complex(value)
+        except (OverflowError, TypeError, ValueError):
+            raise ExpressionError("a number is too large or undefined", place) from None
+        if number.imag != 0.0 or math.isnan(number.real):
+            raise ExpressionError("this has no real value", place)
+        size = number.real
+    if abs(size) > _LARGEST:
         raise ExpressionError("a number is too large", place)
+    return value
 
 
 def _of_node(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
@@ -190,19 +190,10 @@ def _of_node(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Ex
         name, *arguments = node.children
         return FUNCTIONS[str(name)].build(*(_built(argument, symbols) for argument in arguments))
     parts = [_built(child, symbols) for child in node.children]
-    match node.data:
-        case "sum":
-            return sp.Add(*parts)
-        case "product":
-            return sp.Mul(*parts)
-        case "negative" | "minus":
-            return -parts[0]
-        case "plus" | "times":
-            return parts[0]
-        case "over":
-            if parts[0].is_zero:
-                raise ExpressionError("a division by zero", place_of(node.children[0]))
-            return 1 / parts[0]
+    if node.data == "over" and parts[0].is_zero:
+        raise ExpressionError("a division by zero", place_of(node.children[0]))
+    if node.data in _OPERATIONS:
+        return _OPERATIONS[str(node.data)](*parts)
     base, exponent = parts
     if exponent.is_number and abs(float(exponent)) > MOST_POWER:
         raise ExpressionError(
@@ -216,6 +207,17 @@ def _of_node(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Ex
             place_of(node),
         )
     return power
+
+
+_OPERATIONS: Mapping[str, Callable[..., sp.Expr]] = {
+    "sum": sp.Add,
+    "product": sp.Mul,
+    "negative": operator.neg,
+    "minus": operator.neg,
+    "plus": operator.pos,
+    "times": operator.pos,
+    "over": lambda below: 1 / below,
+}
 
 
 def _number(text: str, place: int) -> sp.Expr:

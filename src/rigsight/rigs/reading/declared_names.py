@@ -9,6 +9,7 @@ from rigsight.rigs.reading.declaration import NAMED, Declaration, Path
 from rigsight.rigs.reading.expressions import FUNCTIONS, RATE, force_name, is_identifier, rate_name
 
 _LONGEST_NAME = 60
+_NUMBERS = "parameters and constants"
 _NEEDED = {
     "coordinates": "a motion, or a [states.NAME]",
     "joints": "a place where friction and other effects can act; one without resistance needs only a motion",
@@ -78,10 +79,8 @@ def _check_places(declaration: Declaration) -> None:
         for name in getattr(declaration.table, key):
             _check_name(declaration, (key, name), name)
             if name in places:
-                declaration.refuse(
-                    (key, name),
-                    f"[{places[name]}.{name}] has the same name; effects act at places, so each needs its own",
-                )
+                why = "has the same name; effects act at places, so each needs its own"
+                declaration.refuse((key, name), f"[{places[name]}.{name}] {why}")
             places[name] = key
 
 
@@ -89,74 +88,75 @@ def _check_references(declaration: Declaration) -> None:
     """Refuse names in keys and values that stand for a declared thing, and do not."""
     table = declaration.table
     for name, own in table.coordinates.items():
-        if own.prescribed_by is not None and own.prescribed_by not in table.inputs:
-            declaration.refuse(
-                ("coordinates", name, "prescribed_by"),
-                f"there is no input '{own.prescribed_by}'.{nearest(own.prescribed_by, table.inputs)} "
-                f"Declared: {_listed(table.inputs)}",
-            )
+        if own.prescribed_by is not None:
+            path = ("coordinates", name, "prescribed_by")
+            declaration.check_known(path, "input", own.prescribed_by, table.inputs)
     for name, alternative in table.alternatives.items():
-        if alternative.gives not in table.parameters:
-            declaration.refuse(
-                ("alternatives", name, "gives"),
-                f"there is no parameter '{alternative.gives}'.{nearest(alternative.gives, table.parameters)} "
-                f"Declared: {_listed(table.parameters)}",
-            )
+        path = ("alternatives", name, "gives")
+        declaration.check_known(path, "parameter", alternative.gives, table.parameters)
     free = [name for name, own in table.coordinates.items() if own.prescribed_by is None]
     known = [*free, *map(rate_name, free), *table.states]
     for name in table.initial:
         if name in table.states and table.states[name].start is not None:
-            declaration.refuse(
-                ("initial", name),
-                f"'{name}' has two start values: states.{name}.start gives it too; remove one",
-            )
-        if name in known:
+            why = f"has two start values: states.{name}.start gives it too; remove one"
+        elif name in known:
             continue
-        if (
+        elif (
             name in declaration.symbols
             and name.removeprefix(f"{RATE}(").removesuffix(")") in table.coordinates
         ):
-            declaration.refuse(
-                ("initial", name),
-                f"'{name}' is prescribed by an input, which also gives its start value; remove it",
-            )
-        declaration.refuse(
-            ("initial", name),
-            f"'{name}' is not a coordinate, rate or state.{nearest(name, known)} Known: {_listed(known)}",
-        )
+            why = "is prescribed by an input, which also gives its start value; remove it"
+        else:
+            why = f"is not a coordinate, rate or state.{nearest(name, known)} Known: {_listed(known)}"
+        declaration.refuse(("initial", name), f"'{name}' {why}")
 
 
 def check_names_read(declaration: Declaration) -> None:
     """Refuse names that an expression cannot read."""
     for path, expression in declaration.expressions.items():
-        allowed = _allowed(declaration, path)
+        allowed, said = _allowed(declaration, path)
         for name, place in expression.reads.items():
             if name not in allowed:
-                declaration.refuse(path, _why_not(declaration, path, name, allowed), place)
+                declaration.refuse(path, _why_not(declaration, name, allowed, said), place)
 
 
-def _allowed(declaration: Declaration, path: Path) -> set[str]:
-    """Return what an expression may read."""
+def _allowed(declaration: Declaration, path: Path) -> tuple[set[str], str]:
+    """Return what an expression may read, and the same in words."""
     names = declaration.names
     numbers, motion = names("constants", "parameters"), names("coordinates")
     rates = set(map(rate_name, motion))
     everything = numbers | motion | rates | names("inputs", "states", "signals", "drives", "sensors")
     match path:
-        case ("joints", _, "motion") | ("drives", _, "along"):
-            return numbers | motion
+        case ("joints", _, "motion"):
+            found, said = numbers | motion, "the motion of a joint may contain coordinates"
+        case ("drives", _, "along"):
+            found, said = numbers | motion, "the expression along which a force acts may contain coordinates"
         case ("energy", "potential"):
-            return _with_signals(declaration, numbers | motion)
+            readable = _with_signals(declaration, numbers | motion)
+            return (
+                readable,
+                f"a potential energy may contain coordinates, {_NUMBERS}, and signals made of these",
+            )
         case ("energy", "kinetic"):
-            return _with_signals(declaration, numbers | motion | rates)
+            readable = _with_signals(declaration, numbers | motion | rates)
+            return (
+                readable,
+                f"a kinetic energy may contain coordinates, rates, {_NUMBERS}, and signals made of these",
+            )
         case ("joints", _, "force"):
-            return numbers | motion | rates | names("states", "signals")
-        case ("joints", _, _) | ("initial", _) | ("states", _, "start"):
-            return numbers
+            found = numbers | motion | rates | names("states", "signals")
+            said = "the force of a joint may contain coordinates, rates, states, signals"
+        case ("joints", _, part):
+            return numbers, f"the {part} of a joint may contain {_NUMBERS}"
+        case ("initial", _) | ("states", _, "start"):
+            return numbers, f"a start value may contain {_NUMBERS}"
         case ("alternatives", name, _):
-            return names("constants") | {str(name)}
+            return names("constants") | {str(name)}, f"the derived value may contain '{name}' and constants"
         case ("sensors", _, _):
-            return everything | set(map(force_name, names("joints")))
-    return everything
+            return everything | set(map(force_name, names("joints"))), ""
+        case _:
+            return everything, ""
+    return found, f"{said}, {_NUMBERS}"
 
 
 def _with_signals(declaration: Declaration, readable: set[str]) -> set[str]:
@@ -170,27 +170,7 @@ def _with_signals(declaration: Declaration, readable: set[str]) -> set[str]:
     return found
 
 
-def _made_of(path: Path) -> str:
-    """Return in words what an expression is made of."""
-    match path:
-        case ("energy", "kinetic"):
-            return "a kinetic energy may contain coordinates, rates, parameters and constants, and signals made of these"
-        case ("energy", "potential"):
-            return "a potential energy may contain coordinates, parameters and constants, and signals made of these"
-        case ("joints", _, "motion"):
-            return "the motion of a joint may contain coordinates, parameters and constants"
-        case ("joints", _, "force"):
-            return "the force of a joint may contain coordinates, rates, states, signals, parameters and constants"
-        case ("joints", _, part):
-            return f"the {part} of a joint may contain parameters and constants"
-        case ("drives", _, "along"):
-            return "the expression along which a force acts may contain coordinates, parameters and constants"
-        case ("alternatives", name, _):
-            return f"the derived value may contain '{name}' and constants"
-    return "a start value may contain parameters and constants"
-
-
-def _why_not(declaration: Declaration, path: Path, name: str, allowed: set[str]) -> str:
+def _why_not(declaration: Declaration, name: str, allowed: set[str], said: str) -> str:
     """Return why an expression cannot read a name, and what to write."""
     table = declaration.table
     inner = name.partition("(")[2].removesuffix(")")
@@ -201,7 +181,7 @@ def _why_not(declaration: Declaration, path: Path, name: str, allowed: set[str])
             )
         if name in table.alternatives:
             return f"'{name}' is an alternative to '{table.alternatives[name].gives}'; use that one"
-        return f"'{name}' cannot be read here: {_made_of(path)}"
+        return f"'{name}' cannot be read here: {said}"
     if name == force_name(inner):
         return f"there is no joint '{inner}'.{nearest(inner, table.joints)} Joints: {_listed(table.joints)}"
     if inner:
@@ -236,10 +216,9 @@ def check_all_used(declaration: Declaration) -> None:
                 f"neither it nor another equation reads '{name}', the signal of the drive after its effects; use '{name}' in it",
             )
     for name in table.alternatives:
-        if name not in expressions["alternatives", name, "value"].reads:
-            declaration.refuse(
-                ("alternatives", name, "value"), f"it does not read '{name}', from which it should be derived"
-            )
+        path = ("alternatives", name, "value")
+        if name not in expressions[path].reads:
+            declaration.refuse(path, f"it does not read '{name}', from which it should be derived")
 
 
 def _listed(names: Iterable[str]) -> str:

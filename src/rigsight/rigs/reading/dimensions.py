@@ -1,4 +1,4 @@
-"""Dimensional analysis of an expression.
+"""Do the units of a rig file add up? Dimensional analysis of all its expressions.
 
 A number that is part of a formula (2, 0.5) is dimensionless. Any other (9.81) may be a constant without a stated unit, so a
 product with it may have any unit. Angles are dimensionless, as in SI.
@@ -15,13 +15,15 @@ from typing import Any
 
 from lark import Token, Tree
 
+from rigsight.rigs.reading.declaration import Declaration, Path, quoted
 from rigsight.rigs.reading.expressions import (
     FUNCTIONS,
     READS,
-    Expression,
     ExpressionError,
     constant,
+    force_name,
     place_of,
+    rate_name,
 )
 from rigsight.units import INPUT_UNIT
 
@@ -34,6 +36,7 @@ _LARGEST_POWER = 100
 """Largest power of a base unit in a message; equations whose units add up have small ones."""
 _FORMULA_NUMBER = re.compile(r"\d|\d\.(?:0|5|25|75)|0\.125")
 _WORD = re.compile(r"[A-Za-zΩ]+")
+_SIGNS = str.maketrans({"²": "^2", "³": "^3", "·": " "})
 _USUAL = {"Nm": "N m", "Nms": "N m s", "Ohm": "ohm", "Ω": "ohm"}
 
 
@@ -46,12 +49,7 @@ def dimension(unit: str) -> Dimension:
     """Return what a unit measures."""
     from pint.errors import PintError
 
-    text = (
-        _WORD.sub(lambda word: _USUAL.get(word[0], word[0]), unit.strip())
-        .replace("²", "^2")
-        .replace("³", "^3")
-        .replace("·", " ")
-    )
+    text = _WORD.sub(lambda word: _USUAL.get(word[0], word[0]), unit.strip()).translate(_SIGNS)
     if text in ("", "1"):
         return _registry().dimensionless.dimensionality
     if len(text) > _LONGEST:
@@ -99,11 +97,8 @@ def _registry() -> Any:
 def unit_of(of: Dimension) -> str:
     """Return an SI unit of a dimension in base units, for messages."""
     registry = _registry()
-    return _plain(
-        registry.get_base_units(registry.UnitsContainer({_BASES[name]: power for name, power in of.items()}))[
-            1
-        ]
-    )
+    powers = registry.UnitsContainer({_BASES[name]: power for name, power in of.items()})
+    return _plain(registry.get_base_units(powers)[1])
 
 
 def measured_in(of: Dimension) -> str:
@@ -125,13 +120,7 @@ _BASES = {
 
 
 def _plain(units: Any) -> str:
-    text = f"{units:~C}".replace("**", "^").replace("*", " ")
-    return text or "1"
-
-
-def dimension_of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimension:
-    """Return what an expression measures."""
-    return _Walk(expression.text, dimensions).of(expression.tree)
+    return f"{units:~C}".replace("**", "^").replace("*", " ") or "1"
 
 
 class _Walk:
@@ -212,6 +201,91 @@ class _Walk:
 def _end_of(node: Tree[Token] | Token) -> int:
     if isinstance(node, Token):
         return node.end_pos or 0
-    return max((_end_of(child) for child in node.children), default=0) + (
-        node.data in ("rate", "force", "call")
-    )
+    closed = node.data in ("rate", "force", "call")
+    return max((_end_of(child) for child in node.children), default=0) + closed
+
+
+class Units:
+    """The units of all expressions of a rig file."""
+
+    def __init__(self, declaration: Declaration) -> None:
+        self._declaration = declaration
+        self._table = declaration.table
+        self._second, self._energy = dimension("s"), dimension("J")
+        self._dimensions = self._declared()
+
+    def check(self, order: list[Path]) -> None:
+        """Reject unknown or inconsistent units; `order` are the paths of signals, each behind those that it reads."""
+        for name in self._table.joints:
+            motion = self._of(("joints", name, "motion"))
+            self._dimensions[force_name(name)] = None if motion is None else self._energy / motion
+        for path in order:
+            if path[0] == "sensors":
+                self._is(path, dimension(self._table.sensors[str(path[1])].unit), "as its unit says")
+            else:
+                self._dimensions[str(path[1])] = self._of(path)
+        for part in ("kinetic", "potential"):
+            self._is(("energy", part), self._energy, "as energies are")
+        for name in self._table.joints:
+            self._check_joint(name)
+        for name in self._table.drives:
+            along = self._of(("drives", name, "along"))
+            wanted = None if along is None else self._energy / along
+            why = "because force times the expression that it acts along is in J"
+            self._is(("drives", name, "force"), wanted, why)
+        for name, state in self._table.states.items():
+            measured = dimension(state.unit)
+            self._is(("states", name, "rate"), measured / self._second, "from the unit of the state")
+            if state.start is not None:
+                self._is(("states", name, "start"), measured, "as the state is")
+        for name, alternative in self._table.alternatives.items():
+            gives = alternative.gives
+            self._is(("alternatives", name, "value"), self._dimensions[gives], f"as {gives} is")
+        for name in self._table.initial:
+            self._is(("initial", name), self._dimensions[name], "as what starts is")
+
+    def _declared(self) -> dict[str, Dimension]:
+        found: dict[str, Dimension] = {}
+        for key in ("inputs", "constants", "parameters", "alternatives", "coordinates", "states", "sensors"):
+            for name, own in getattr(self._table, key).items():
+                try:
+                    measured = dimension(own.unit)
+                except UnitError as error:
+                    self._declaration.refuse((key, name, "unit"), str(error))
+                # A sensor may be called as the coordinate that it shows; what a control law reads of it is a reading.
+                found.setdefault(name, measured)
+                if key == "coordinates":
+                    found[rate_name(name)] = measured / self._second
+        return found
+
+    def _of(self, path: Path) -> Dimension:
+        expression = self._declaration.expressions[path]
+        read = {
+            name: dimension(self._table.sensors[name].unit)
+            for name in expression.reads
+            if self._declaration.reads_sensor(path, name)
+        }
+        try:
+            return _Walk(expression.text, {**self._dimensions, **read}).of(expression.tree)
+        except ExpressionError as error:
+            self._declaration.refuse_expression(path, error)
+
+    def _is(self, path: Path, wanted: Dimension, why: str) -> None:
+        got = self._of(path)
+        if got is not None and wanted is not None and got != wanted:
+            text = quoted(self._declaration.expressions[path].text)
+            self._declaration.refuse(
+                path, f"'{text}' is {measured_in(got)} but should be {measured_in(wanted)}, {why}"
+            )
+
+    def _check_joint(self, name: str) -> None:
+        motion, force = self._of(("joints", name, "motion")), self._dimensions[force_name(name)]
+        if motion is None or force is None:
+            return
+        derived = "from the unit of the motion"
+        self._is(("joints", name, "stiffness"), force / motion, derived)
+        self._is(("joints", name, "damping"), force * self._second / motion, derived)
+        self._is(("joints", name, "rest"), motion, "as the motion is")
+        self._is(("joints", name, "force"), force, derived)
+        if self._table.joints[name].inertia is not None:
+            self._is(("joints", name, "inertia"), force * self._second**2 / motion, derived)

@@ -164,11 +164,9 @@ def _parser() -> Lark:
 
 
 def _reported(error: UnexpectedInput, text: str) -> ExpressionError:
-    place = len(text.rstrip())
-    if (isinstance(error, UnexpectedToken) and error.token.type == "$END") or isinstance(
-        error, UnexpectedEOF
-    ):
-        return ExpressionError("the expression ends too early", max(place - 1, 0))
+    token = error.token if isinstance(error, UnexpectedToken) else None
+    if isinstance(error, UnexpectedEOF) or (token is not None and token.type == "$END"):
+        return ExpressionError("the expression ends too early", max(len(text.rstrip()) - 1, 0))
     place = error.pos_in_stream or 0
     found = text[place : place + 1]
     if isinstance(error, UnexpectedCharacters):
@@ -180,33 +178,28 @@ def _reported(error: UnexpectedInput, text: str) -> ExpressionError:
     if text[max(place - 1, 0) : place + 1] == "**":
         return ExpressionError("powers are written with ^", place - 1)
     before = text[:place].rstrip()[-1:]
-    remedy = (
-        " (a product needs *)"
-        if found and (found.isalnum() or found in "(_") and (before.isalnum() or before in ")_")
-        else ""
-    )
-    return ExpressionError(
-        f"'{error.token if isinstance(error, UnexpectedToken) else found}' is not expected here{remedy}",
-        place,
-    )
+    is_product = found and (found.isalnum() or found in "(_") and (before.isalnum() or before in ")_")
+    remedy = " (a product needs *)" if is_product else ""
+    return ExpressionError(f"'{found if token is None else token}' is not expected here{remedy}", place)
 
 
 def _checked(tree: Tree[Token]) -> Tree[Token]:
     """Return the tree with rates told from calls; calls of what is not known are refused."""
     for node in list(tree.iter_subtrees()):
         if node.data == "power":
-            _check_exponent(node.children[1])
+            exponent = node.children[1]
+            power = constant(exponent)
+            if power is not None and abs(power) > MOST_POWER:
+                why = f"an exponent must be within +-{MOST_POWER}, this one is {power:g}"
+                raise ExpressionError(why, place_of(exponent))
         if node.data != "call":
             continue
         name, *arguments = node.children
         place = name.start_pos or 0  # type: ignore[union-attr]
         if name in (RATE, FORCE):
             if len(arguments) != 1 or not isinstance(arguments[0], Tree) or arguments[0].data != "name":
-                meant = (
-                    "the rate of one coordinate: d(phi)"
-                    if name == RATE
-                    else "that of one joint: force(bearing)"
-                )
+                of_rate, of_force = "the rate of one coordinate: d(phi)", "that of one joint: force(bearing)"
+                meant = of_rate if name == RATE else of_force
                 raise ExpressionError(f"{name}(...) is {meant}", place)
             node.data = "rate" if name == RATE else "force"
             node.children = list(arguments[0].children)
@@ -224,14 +217,6 @@ def _checked(tree: Tree[Token]) -> Tree[Token]:
                 place,
             )
     return tree
-
-
-def _check_exponent(node: Tree[Token] | Token) -> None:
-    power = constant(node)
-    if power is not None and abs(power) > MOST_POWER:
-        raise ExpressionError(
-            f"an exponent must be within +-{MOST_POWER}, this one is {power:g}", place_of(node)
-        )
 
 
 def constant(node: Any) -> float | None:

@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections.abc import Mapping
+from functools import partial
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
 import sympy as sp
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, nearest
 from rigsight.parameters import Parameter
 from rigsight.records.formats.known import file_size
 from rigsight.rigs.mechanism import Mechanism
 from rigsight.rigs.parts import READING, Coordinate, Drive, Joint, RateState, Sensor, Signal
 from rigsight.rigs.reading.declaration import DRIVE_PARTS, JOINT_PARTS, Declaration
 from rigsight.rigs.reading.declared_names import check_all_used, check_declared_names, check_names_read
-from rigsight.rigs.reading.declared_units import check_units_add_up
+from rigsight.rigs.reading.dimensions import Units
 from rigsight.rigs.reading.expressions import rate_name
 from rigsight.rigs.reading.rig_tables import ConstantTable, ParameterTable
-from rigsight.rigs.reading.simulator import check_simulator, simulated_bodies, with_whole_path
 from rigsight.rigs.reading.sound_mechanism import check_mechanism
 from rigsight.rigs.reading.toml_places import Path as KeyPath
 from rigsight.rigs.reading.toml_places import Place, toml_tables, value_places
 from rigsight.rigs.rig import Alternative, Rig
+from rigsight.simulators import KINDS, Bodies
+from rigsight.simulators.bodies import model_digest
 from rigsight.units import size_of
 
 LARGEST_FILE = 1_000_000
+_SIMULATOR = "simulator"
+_OWNERS = {"states": "mujoco", "rates": "fmu", "forces": "fmu", "step": "fmu", "without_armature": "mujoco"}
+"""Keys that one kind of simulator alone has."""
 
 
 def read_rig_file(path: Path) -> Rig:
@@ -106,7 +112,7 @@ def _checked(declaration: Declaration, check_units: bool) -> Rig:
     check_names_read(declaration)
     order = signal_order(declaration)
     if check_units:
-        check_units_add_up(declaration, order)
+        Units(declaration).check(order)
     check_all_used(declaration)
     rig = rig_of(declaration, order)
     check_mechanism(declaration, rig.mechanism)
@@ -147,30 +153,24 @@ _LARGEST, _LEAST = 1e18, 1e-15
 
 def rig_of(declaration: Declaration, order: list[KeyPath]) -> Rig:
     """Return the rig."""
-    table = declaration.table
+    table, parameter = declaration.table, partial(_parameter, declaration)
     mechanism = _mechanism(declaration, order)
     one_motion = mechanism.has_one_motion
     return Rig(
         name=table.name,
         summary=table.summary,
         inputs=tuple(Signal(name, own.unit, own.about) for name, own in table.inputs.items()),
-        constants=tuple(
-            _parameter(declaration, "constants", name, own, "") for name, own in table.constants.items()
-        ),
+        constants=tuple(parameter("constants", name, own, "") for name, own in table.constants.items()),
         parameters=tuple(
-            _parameter(
-                declaration,
-                "parameters",
-                name,
-                own,
-                sized_by(name, own.unit, mechanism) if one_motion else size_of(name),
+            parameter(
+                "parameters", name, own, sized_by(name, own.unit, mechanism) if one_motion else size_of(name)
             )
             for name, own in table.parameters.items()
         ),
         mechanism=mechanism,
         alternatives=tuple(
             Alternative(
-                _parameter(declaration, "alternatives", name, own, ""),
+                parameter("alternatives", name, own, ""),
                 own.gives,
                 declaration.sympy(("alternatives", name, "value")),
             )
@@ -184,6 +184,10 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
     table, symbols, sympy = declaration.table, declaration.symbols, declaration.sympy
     signals = {symbols[str(path[1])]: sympy(path) for path in order if path[0] == "signals"}
     bodies = simulated_bodies(declaration)
+    started: list[tuple[KeyPath, str]] = [(("initial", name), name) for name in table.initial]
+    started += [
+        (("states", name, "start"), name) for name, own in table.states.items() if own.start is not None
+    ]
     return Mechanism(
         inputs=tuple(table.inputs),
         coordinates=tuple(
@@ -211,23 +215,11 @@ def _mechanism(declaration: Declaration, order: list[KeyPath]) -> Mechanism:
             for name, own in table.sensors.items()
         ),
         states=tuple(
-            RateState(
-                symbols[name],
-                sympy(("states", name, "rate")),
-                own.unit,
-                own.about,
-            )
+            RateState(symbols[name], sympy(("states", name, "rate")), own.unit, own.about)
             for name, own in table.states.items()
         ),
         signals=signals,
-        initial={
-            **{symbols[name]: sympy(("initial", name)) for name in table.initial},
-            **{
-                symbols[name]: sympy(("states", name, "start"))
-                for name, own in table.states.items()
-                if own.start is not None
-            },
-        },
+        initial={symbols[name]: sympy(path) for path, name in started},
         order=tuple(str(path[1]) for path in order if path[0] != "signals"),
         bodies=bodies,
         asked=tuple(symbols[name] for name in (*table.simulator.parameters, *table.simulator.states))
@@ -251,10 +243,8 @@ def _parameter(
     for end in ("lower", "upper"):
         bound = getattr(own, end)
         if log and bound is not None and bound <= 0.0:
-            declaration.refuse(
-                (key, name, end),
-                f"log = true searches its logarithm, so {end} must be above 0, got {bound:g}",
-            )
+            why = f"log = true searches its logarithm, so {end} must be above 0, got {bound:g}"
+            declaration.refuse((key, name, end), why)
     if key == "alternatives" and own.default is not None:
         declaration.refuse((key, name, "default"), "an alternative has none; give its parameter a default")
     lower = own.lower if own.lower is not None else (_LEAST if log else -_LARGEST)
@@ -265,14 +255,7 @@ def _parameter(
     if own.default is not None and not lower <= own.default <= upper:
         declaration.refuse((key, name, "default"), f"{own.default:g} is not within [{lower:g}, {upper:g}]")
     return Parameter(
-        name,
-        own.about,
-        dimension_text,
-        own.unit,
-        lower=lower,
-        upper=upper,
-        default=own.default,
-        logarithmic=log,
+        name, own.about, dimension_text, own.unit, lower, upper, default=own.default, logarithmic=log
     )
 
 
@@ -290,3 +273,87 @@ def sized_by(name: str, unit: str, mechanism: Mechanism) -> str:
 
 def _is(expression: sp.Expr, name: str) -> bool:
     return expression in (sp.Symbol(name, real=True), -sp.Symbol(name, real=True))
+
+
+def check_simulator(declaration: Declaration) -> None:
+    """Refuse a simulator of an unknown kind, and names in its table that are not declared."""
+    table, own = declaration.table, declaration.table.simulator
+    if own is None:
+        return
+    if own.kind not in KINDS:
+        allowed = f"{nearest(own.kind, KINDS)} Allowed: {', '.join(KINDS)}"
+        declaration.refuse((_SIMULATOR, "kind"), f"'{own.kind}' is not a simulator.{allowed}")
+    free = [name for name, coordinate in table.coordinates.items() if coordinate.prescribed_by is None]
+    if len(free) < len(table.coordinates) or not free:
+        declaration.refuse(
+            (_SIMULATOR,),
+            "every coordinate of a simulated rig must be a degree of freedom; remove prescribed_by",
+        )
+    for key, wanted in _OWNERS.items():
+        if getattr(own, key) and own.kind != wanted:
+            declaration.refuse(
+                (_SIMULATOR, key), f"it belongs to {wanted}, but this is {own.kind}; remove it"
+            )
+    if own.digest and own.kind == "python":
+        declaration.refuse(
+            (_SIMULATOR, "digest"), "it is of a model's file, and a Python function has none; remove it"
+        )
+    for key in ("coordinates", "rates", "forces"):
+        for name in getattr(own, key):
+            declaration.check_known((_SIMULATOR, key, name), "coordinate", name, free)
+        names = list(getattr(own, key).values())
+        for name, there in getattr(own, key).items():
+            if names.count(there) > 1:
+                declaration.refuse((_SIMULATOR, key, name), f"'{there}' is used twice; each needs its own")
+    for name, there in own.parameters.items():
+        if list(own.parameters.values()).count(there) > 1:
+            declaration.refuse(
+                (_SIMULATOR, "parameters", name), f"'{there}' is given by two numbers; remove one"
+            )
+    for name in own.states:
+        declaration.check_known((_SIMULATOR, "states", name), "state", name, table.states)
+    numbers = declaration.names("constants", "parameters")
+    for name in own.parameters:
+        if name not in numbers:
+            why = f"is neither a constant nor a parameter of this file.{nearest(name, numbers)} Declare it"
+            declaration.refuse((_SIMULATOR, "parameters", name), f"'{name}' {why}")
+
+
+def simulated_bodies(declaration: Declaration) -> Bodies | None:
+    """Return the bodies that a rig file leaves to another program, or None; the program is opened to see that it has them."""
+    table, own = declaration.table, declaration.table.simulator
+    if own is None:
+        return None
+    free = list(table.coordinates)
+    is_file = own.kind != "python"
+    try:
+        bodies = Bodies(
+            own.kind,
+            own.file,
+            (own.digest or model_digest(own.kind, Path(own.file))) if is_file else "",
+            tuple(own.coordinates.get(name, name) for name in free),
+            tuple(own.parameters.values()),
+            states=tuple(own.states.values()),
+            rates=tuple(own.rates.get(name, "") for name in free),
+            forces=tuple(own.forces.get(name, "") for name in free),
+            step=own.step or 0.0,
+            without_armature=own.without_armature,
+        )
+        _ = bodies.program
+    except InputError as error:
+        declaration.refuse((_SIMULATOR, "file"), str(error).removesuffix("."))
+    return bodies
+
+
+def with_whole_path(content: dict[str, object], folder: Path) -> dict[str, object]:
+    """Return the tables of a rig file with the simulator's model by its absolute path, so that results find it."""
+    own = content.get(_SIMULATOR)
+    if not isinstance(own, dict) or own.get("kind") == "python" or not isinstance(own.get("file"), str):
+        return content
+    # What is wrong with the file is told with its place, once the tables are read.
+    with contextlib.suppress(ValueError):
+        own = {**own, "file": (folder / str(own["file"])).resolve().as_posix()}
+    with contextlib.suppress(InputError):
+        # A digest that stands there is kept: a model of another content is then refused.
+        own = {"digest": model_digest(str(own.get("kind")), Path(str(own["file"]))), **own}
+    return {**content, _SIMULATOR: own}

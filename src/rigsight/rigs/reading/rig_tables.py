@@ -139,18 +139,14 @@ def path_and_sentence(error: Any) -> tuple[tuple[str | int, ...], str]:
     key = str(path[-1]) if path else ""
     if error["type"] == "extra_forbidden":
         allowed = _keys_at(path[:-1])
-        return (
-            path,
-            f"'{key}' is not a key of this table.{nearest(key, allowed)} Allowed: {', '.join(allowed)}",
-        )
+        known = f"{nearest(key, allowed)} Allowed: {', '.join(allowed)}"
+        return path, f"'{key}' is not a key of this table.{known}"
     if error["type"] == "missing":
         return path[:-1], f"the line '{key} = ...' is missing"
     if error["type"] == "string_too_long":
+        most, count = error["ctx"]["max_length"], len(error["input"])
         own = path[:-1] if key == _FORMULA else path
-        return (
-            own,
-            f"it may have at most {error['ctx']['max_length']} characters but has {len(error['input'])}",
-        )
+        return own, f"it may have at most {most} characters but has {count}"
     got = shown(error.get("input"))
     if error["type"] in ("model_type", "dict_type", "model_attributes_type"):
         return path, f"this is a table: write [{'.'.join(map(str, path))}] and its keys below, got {got}"
