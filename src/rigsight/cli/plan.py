@@ -31,7 +31,7 @@ def plan(
         str | None,
         typer.Option(
             metavar="NAME,NAME",
-            show_default="those of the diagnosis",
+            show_default="those of the diagnosis, else what 'rigsight check' leaves open",
             help="Effects to be told apart, A+B for two at once.",
         ),
     ] = None,
@@ -40,7 +40,8 @@ def plan(
         typer.Option(
             metavar="NAME=VALUE",
             show_default="inputs as large as in the records",
-            help="Largest absolute value of an input or a sensor, or of its rate: x=0.02, d(x)=0.5, u=3. May be repeated.",
+            help="Largest absolute value of an input or a sensor, or of its rate: x=0.02, d(x)=0.5, u=3. Of a constant, such "
+            "as a payload, a value that it may have: m=2. May be repeated.",
         ),
     ] = None,
     seconds: Annotated[float, typer.Option(help="Duration of the experiment.")] = 20.0,
@@ -51,9 +52,10 @@ def plan(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Plan the experiment that separates the rivals of a verdict, and say what probability to expect afterwards.
+    """Plan the experiment that separates rivals, and say what probability to expect afterwards.
 
-    Writes plan.csv to be played, plan.json, plan.svg and plan.png into DIR.
+    Without a verdict it is planned for effects that 'rigsight check' leaves open. CAMPAIGN may be a rig file, before there are
+    records. Writes plan.csv to be played, plan.json, plan.svg and plan.png into DIR.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.own.own_effects import own_effects
@@ -97,7 +99,7 @@ def _summary(found: Plan) -> Group:
         f"Play: {escape(found.what)}, {found.record.duration:g} s{f', with {constants}' if constants else ''}.",
         rivals,
         limits,
-        f"Expected probability of the cause afterwards: {found.promised:.2f}, now {found.rivals[0].probability:.2f}. "
+        f"Expected probability of the cause afterwards: {found.promised:.2f}, now {found.now:.2f}. "
         f"In {trials.n} simulated outcomes the cause was the most probable in {trials.right:.0%}, "
         f"decided in {trials.decided:.0%}, wrongly in {trials.wrong:.0%}.",
     )

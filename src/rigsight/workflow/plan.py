@@ -1,4 +1,4 @@
-"""The work of `rigsight plan`: a campaign and its rivals -> the experiment that separates them, as a CSV to play."""
+"""The work of `rigsight plan`: a campaign or a rig, and rivals -> the experiment that separates them, as a CSV to play."""
 
 from __future__ import annotations
 
@@ -9,17 +9,19 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
+from rigsight.check import Holes, check_campaign, holes_of
+from rigsight.check.campaign_check import PARTS
 from rigsight.diagnose.policy import FAMILIES
 from rigsight.effects import AT, CATALOGUE, Effect
 from rigsight.errors import InputError
-from rigsight.plan import Named, Plan, plan_experiment, read_limits
+from rigsight.plan import Named, Plan, Sizes, plan_experiment, read_limits, read_payloads, use_of
 from rigsight.plot import planned_experiment, png_bytes, svg_text
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import json_object
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.campaign.without_records import is_rig_file
-from rigsight.workflow.own.effect_names import effect_on
-from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.campaign.without_records import campaign_of_rig, is_rig_file
+from rigsight.workflow.own.effect_names import candidates_of, effect_on
+from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.record_csv import csv_text
 from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, write_together
 
@@ -69,36 +71,39 @@ def run_plan(
 ) -> Plan:
     """Return the experiment that separates rivals best, and write it into a folder: plan.csv, plan.json and pictures.
 
+    The rivals are those of a diagnosis, or those named; without either, effects that the check of the campaign or of a rig file
+    leaves open.
+
     Raises
     ------
     InputError
-        If the campaign, the diagnosis, a limit or a rival cannot be used, or no experiment keeps the limits.
+        If the campaign, the diagnosis, a limit or a rival cannot be used, nothing is open, or no experiment keeps the limits.
     SimulationError
         If a rival cannot be simulated near the records.
     """
     if out is not None:
         check_writable(Path(out), PLAN_FILE, PLAN_RECORD, *PLAN_PICTURES)
-    if (diagnosis is None) == (rivals is None):
-        raise InputError(
-            "Give the rivals: either --diagnosis DIR, the results of 'rigsight diagnose', or --rivals NAME,NAME. "
-            "'rigsight check' lists the effects that the records do not tell apart."
-        )
-    if is_rig_file(Path(campaign)):
-        raise InputError(
-            f"{campaign} is the file of a rig. A plan needs a campaign with at least one record, which gives the rivals their "
-            "sizes. Before there is one, 'rigsight check' says of a rig file what its sensors could show."
-        )
-    read = read_campaign(campaign, own_effects, own_rigs)
-    known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
-    asked = read_limits(read.rig, limits)
-    named = (
-        _of_diagnosis(read, Path(diagnosis), known)
-        if diagnosis is not None
-        else _listed(read, rivals or "", known)
+    if diagnosis is not None and rivals is not None:
+        raise InputError("Give the rivals once: with --diagnosis DIR, or with --rivals NAME,NAME.")
+    before = is_rig_file(Path(campaign))
+    read = (
+        _before_records(Path(campaign), limits) if before else read_campaign(campaign, own_effects, own_rigs)
     )
-    stage = Stage("Planning", _STEPS, listener)
+    known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
+    asked, payloads = read_limits(read.rig, limits), read_payloads(read.rig, limits)
+    sizes: Sizes = "usual, no records" if before else "fitted"
     with threadpool_limits(limits=1, user_api="blas"):
-        plan = plan_experiment(read, named, asked, seconds, seed, stage.finished)
+        if diagnosis is not None:
+            named = _of_diagnosis(read, Path(diagnosis), known)
+        elif rivals is not None:
+            named = _listed(read, rivals, known)
+        else:
+            named = _of_holes(read, list(known.values()), listener)
+            sizes = sizes if before else "usual"
+        stage = Stage("Planning", _STEPS, listener)
+        plan = plan_experiment(
+            read, named, asked, seconds, seed, stage.finished, sizes=sizes, payloads=payloads
+        )
     if out is not None:
         figure = planned_experiment(plan)
         svg, png = PLAN_PICTURES
@@ -112,6 +117,47 @@ def run_plan(
             },
         )
     return plan
+
+
+def _before_records(path: Path, limits: Sequence[str]) -> Campaign:
+    """Return a campaign of a rig file whose simulated sweep is about as large as the limits allow."""
+    plain = campaign_of_rig(path)
+    asked = read_limits(plain.rig, limits)
+    room = {limit.signal: limit.value for limit in asked if not limit.is_rate}
+    missing = [signal.name for signal in plain.rig.inputs if signal.name not in room]
+    if missing:
+        raise InputError(
+            f"{path}: without records no input has a size yet. Give the largest value of each: "
+            f"{' '.join(f'--limit {name}=VALUE' for name in missing)}."
+        )
+    largest = {signal.name: room[signal.name] for signal in plain.rig.inputs}
+    use = use_of(asked, campaign_of_rig(path, largest).estimation[0])
+    return campaign_of_rig(path, {name: value / use for name, value in largest.items()})
+
+
+def _of_holes(campaign: Campaign, effects: Sequence[Effect], listener: Listener) -> list[Named]:
+    """Return effects that the check of a campaign leaves open, and no effect where one of them does not show."""
+    candidates = candidates_of(campaign, effects)
+    found = check_campaign(campaign, candidates, Stage("Checking", len(PARTS), listener).finished)
+    if found.matrix.reason:
+        raise InputError(f"{found.matrix.reason} Name the rivals with --rivals NAME,NAME.")
+    holes = holes_of(found.matrix, _MOST_RIVALS)
+    if not holes.effects:
+        raise InputError(
+            "These records tell all effects of different families apart already. Name rivals with --rivals NAME,NAME."
+        )
+    report_notes([_note_of(holes)], listener)
+    by_name = {effect.name: effect for effect in candidates}
+    named = [Named((by_name[name],)) for name in holes.effects]
+    return [*named, Named(())] if holes.hidden else named
+
+
+def _note_of(holes: Holes) -> str:
+    return (
+        f"{holes.n_open} pairs of effects are open; this plan is for {', '.join(holes.effects)}"
+        f"{', which may not show' if holes.hidden else ''}. Plan again once its record is in the campaign, or name others with "
+        "--rivals."
+    )
 
 
 def _listed(campaign: Campaign, text: str, known: Mapping[str, Effect]) -> list[Named]:
