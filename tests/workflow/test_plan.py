@@ -66,7 +66,11 @@ def test_a_plan_is_a_file_to_play_with_its_promise(axis_campaign: Path, tmp_path
     asked = ["--diagnosis", results, "--seconds", "2.5", "--limit", "x=0.01", "-o", out, "--json"]
     code, stdout, stderr = run("plan", axis_campaign, *asked)
     assert code == 0, stderr
-    assert sorted(path.name for path in out.iterdir()) == ["plan.csv", "plan.json", "plan.png", "plan.svg"]
+    written = ["plan.csv", "plan.html", "plan.json", "plan.png", "plan.svg"]
+    assert sorted(path.name for path in out.iterdir()) == written
+    page = (out / "plan.html").read_text()
+    assert "<script" not in page
+    assert all(text in page for text in ("Cubic stiffness", "rigsight plan", "<svg"))
     assert json.loads(stdout) == json.loads((out / "plan.json").read_text())
     rows = (out / "plan.csv").read_text().splitlines()
     assert (rows[0], len(rows)) == ("t,u", 501)

@@ -37,7 +37,7 @@ RUNS = (
     Run("check", "Check", "check", "check", "check.html", "What do the records allow to find?"),
     Run("diagnosis", "Diagnosis", "diagnose", RESULTS, REPORT_FILE,
         "Which effect does the simulation lack? Finished fits are kept: a canceled diagnosis goes on from there."),
-    Run("plan", "Next experiment", "plan", "plan", "plan.svg",
+    Run("plan", "Next experiment", "plan", "plan", "plan.html",
         "Which record would tell the rivals of the diagnosis apart? plan.csv is played on the bench.",
         ("--diagnosis", RESULTS)),
 )  # fmt: skip

@@ -16,6 +16,7 @@ from rigsight.effects import AT, CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.plan import Named, Plan, Sizes, plan_experiment, read_limits, read_payloads, use_of
 from rigsight.plot import planned_experiment, png_bytes, svg_text
+from rigsight.report.plan_page import render_plan
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import json_object
 from rigsight.workflow.campaign.read_campaign import read_campaign
@@ -23,9 +24,9 @@ from rigsight.workflow.campaign.without_records import campaign_of_rig, is_rig_f
 from rigsight.workflow.own.effect_names import candidates_of, effect_on
 from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
 from rigsight.workflow.run.record_csv import csv_text
-from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, write_together
+from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, json_text, versions, write_together
 
-PLAN_FILE, PLAN_RECORD = "plan.json", "plan.csv"
+PLAN_FILE, PLAN_PAGE, PLAN_RECORD = "plan.json", "plan.html", "plan.csv"
 PLAN_PICTURES = ("plan.svg", "plan.png")
 _MOST_RIVALS = 4
 _STEPS = 40
@@ -68,6 +69,7 @@ def run_plan(
     own_rigs: Iterable[Rig] = (),
     seed: int = 0,
     listener: Listener = silent,
+    command: str = "",
 ) -> Plan:
     """Return the experiment that separates rivals best, and write it into a folder: plan.csv, plan.json and pictures.
 
@@ -82,7 +84,7 @@ def run_plan(
         If a rival cannot be simulated near the records.
     """
     if out is not None:
-        check_writable(Path(out), PLAN_FILE, PLAN_RECORD, *PLAN_PICTURES)
+        check_writable(Path(out), PLAN_FILE, PLAN_PAGE, PLAN_RECORD, *PLAN_PICTURES)
     if diagnosis is not None and rivals is not None:
         raise InputError("Give the rivals once: with --diagnosis DIR, or with --rivals NAME,NAME.")
     before = is_rig_file(Path(campaign))
@@ -112,6 +114,7 @@ def run_plan(
             {
                 PLAN_RECORD: csv_text(plan.record, [signal.name for signal in read.rig.inputs]),
                 PLAN_FILE: json_text(plan.to_json()),
+                PLAN_PAGE: render_plan(plan, figure, command, versions(), seed),
                 svg: svg_text(figure, "plan"),
                 png: png_bytes(figure, dpi=150),
             },
