@@ -30,7 +30,7 @@ def test_where_all_are_told_apart_there_is_no_hole() -> None:
 def test_pairs_that_another_motion_tells_apart_come_before_those_that_push_alike() -> None:
     found = holes_of(matrix({(2, 0): "other motion", (4, 3): "alike"}), 4)
     assert set(found.effects) == {"a", "c"}
-    assert (found.hidden, found.n_open) == (False, 2)
+    assert (found.hidden, found.others) == (False, ("d", "e"))
 
 
 def test_one_form_of_each_family_and_no_more_than_asked() -> None:
@@ -46,4 +46,4 @@ def test_one_form_of_each_family_and_no_more_than_asked() -> None:
 
 def test_what_does_not_show_has_no_effect_as_its_rival() -> None:
     found = holes_of(matrix({}, ("yes", "yes", "no", "yes", "at some sizes")), 2)
-    assert (found.effects, found.hidden) == (("c",), True)
+    assert (found.effects, found.hidden, found.others) == (("c",), True, ("e",))

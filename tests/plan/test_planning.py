@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
+from rigsight.check import check_campaign
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.plan import Named, Plan, plan_experiment, read_limits, read_payloads
@@ -185,6 +186,26 @@ def test_a_payload_is_taken_where_friction_depends_on_the_load(tmp_path: Path) -
     )
     # Both the record without a payload and the one with it were tried.
     assert found.record.constants == {"payload": 3.0}
+
+
+@pytest.mark.slow
+def test_what_a_motion_hides_the_planned_record_shows() -> None:
+    """A mass that rises all the time: dry friction is a constant force."""
+    t = DT * np.arange(3000)
+    first = measured(Record("first", DT, {"u": 40.0 * t + 5.0 * np.sin(np.pi * t)}, {}), 0)
+    given = {name: VALUES[name] for name in ("m", "d", "k", "x_off", "force_off")}
+    own = Campaign("axis", AXIS, {"gain": 1.0}, given, (first,))
+    pair = [Named((effect_named("coulomb_friction"),)), Named(())]
+
+    def visible(campaign: Campaign) -> tuple[str, ...]:
+        return check_campaign(campaign, [effect_named("coulomb_friction")], lambda _: None).matrix.visible
+
+    found = plan_experiment(
+        own, pair, read_limits(AXIS, ["u=1500"]), 6.0, 0, lambda _: None, 1, sizes="usual"
+    )
+    assert found.promised > found.now
+    after = replace(own, records=(first, replace(measured(found.record, 1), name="plan")))
+    assert (visible(own), visible(after)) == (("no",), ("yes",))
 
 
 def test_limits_that_no_experiment_keeps_are_refused(one_amplitude: Campaign) -> None:

@@ -21,13 +21,13 @@ class Holes:
         Their names, the one with the most open pairs first; empty where nothing is open.
     hidden
         Whether one of them does not show beside the parameters at some or all sizes, so that no effect is their rival, too.
-    n_open
-        Pairs of different families or places that are open in all.
+    others
+        Names of further effects that are open.
     """
 
     effects: tuple[str, ...]
     hidden: bool
-    n_open: int
+    others: tuple[str, ...]
 
 
 def holes_of(matrix: EffectMatrix, most: int) -> Holes:
@@ -47,7 +47,7 @@ def holes_of(matrix: EffectMatrix, most: int) -> Holes:
     ]
     left = [i for i in everyone if hidden[i] or any(numbers[i])]
     if not left:
-        return Holes((), False, 0)
+        return Holes((), False, ())
     first = max(left, key=lambda i: numbers[i])
     partners = [i for i in left if (first, i) in pairs or (hidden[first] and hidden[i])]
     partners.sort(key=lambda i: pairs.get((first, i), len(_OPEN)))
@@ -57,5 +57,6 @@ def holes_of(matrix: EffectMatrix, most: int) -> Holes:
         # One form of each family.
         if families[i] not in [families[k] for k in chosen] and len(chosen) + with_no_effect < most:
             chosen.append(i)
-    names = tuple(matrix.effects[i] for i in chosen)
-    return Holes(names, any(hidden[i] for i in chosen), len(pairs) // 2)
+    others = [i for i in left if i not in chosen]
+    names, further = (tuple(matrix.effects[i] for i in those) for those in (chosen, others))
+    return Holes(names, any(hidden[i] for i in chosen), further)

@@ -20,6 +20,8 @@ _SIZES: Mapping[Sizes, str] = {
     "one were true.",
     "usual, no records": "There are no records yet: the rivals have a usual size, the rig the numbers of its file.",
 }
+_GAIN = 0.05
+"""Gain of probability below which an experiment is not worth its time (a convention)."""
 
 
 def render_plan(plan: Plan, picture: Figure, command: str, versions: Mapping[str, str], seed: int) -> str:
@@ -62,7 +64,9 @@ def headline(plan: Plan) -> str:
 def promise(plan: Plan) -> str:
     """Return what to expect afterwards."""
     trials = plan.trials
+    gains = plan.promised > plan.now + _GAIN
     return (
+        f"{'' if gains else 'No record within these limits tells these rivals apart. '}"
         f"Expected probability of the cause afterwards: {plan.promised:.2f}, now {plan.now:.2f}. "
         f"In {trials.n} simulated outcomes the cause was the most probable in {percent(trials.right)}, "
         f"decided in {percent(trials.decided)}, wrongly in {percent(trials.wrong)}."

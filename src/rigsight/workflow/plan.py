@@ -156,11 +156,9 @@ def _of_holes(campaign: Campaign, effects: Sequence[Effect], listener: Listener)
 
 
 def _note_of(holes: Holes) -> str:
-    return (
-        f"{holes.n_open} pairs of effects are open; this plan is for {', '.join(holes.effects)}"
-        f"{', which may not show' if holes.hidden else ''}. Plan again once its record is in the campaign, or name others with "
-        "--rivals."
-    )
+    others = f" Open too, to be named with --rivals: {', '.join(holes.others)}." if holes.others else ""
+    hidden = ", of which one may not show" if holes.hidden else ""
+    return f"Planned for effects that the check leaves open: {', '.join(holes.effects)}{hidden}.{others}"
 
 
 def _listed(campaign: Campaign, text: str, known: Mapping[str, Effect]) -> list[Named]:
