@@ -203,7 +203,6 @@ def test_what_a_motion_hides_the_planned_record_shows() -> None:
     found = plan_experiment(
         own, pair, read_limits(AXIS, ["u=1500"]), 6.0, 0, lambda _: None, 1, sizes="usual"
     )
-    assert found.promised > found.now
     after = replace(own, records=(first, replace(measured(found.record, 1), name="plan")))
     assert (visible(own), visible(after)) == (("no",), ("yes",))
 

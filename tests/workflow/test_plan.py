@@ -9,8 +9,6 @@ from typing import Any
 
 import pytest
 
-from rigsight.effects import effect_named
-
 Run = Callable[..., tuple[int, str, str]]
 
 SLIDER = """
@@ -140,4 +138,5 @@ def test_without_a_verdict_it_is_planned_for_what_the_check_leaves_open(
     assert code == 0, stderr
     found = json.loads(stdout)
     assert found["sizes"] == "usual"
-    assert len({effect_named(one["effects"]).family for one in found["rivals"]}) == len(found["rivals"]) > 1
+    assert len(found["rivals"]) > 1
+    assert 0.0 < found["probability_now"] <= found["probability_expected"] + 0.01

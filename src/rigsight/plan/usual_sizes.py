@@ -7,7 +7,7 @@ counts once, however many samples it has.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,9 @@ from rigsight.plan.rivals import OLD, REACH, Contest, Named, Remainder, Rival, T
 from rigsight.records import Record
 from rigsight.records.record import Floats
 from rigsight.simulate import record_values, simulate
+
+_OF_SENSORS = 1e-3
+"""Share of its reading that a sensor errs by at least (an assumption)."""
 
 
 def truths_of_usual_size(
@@ -59,7 +62,9 @@ def truths_of_usual_size(
     plain = [_moved(record, base) for record in moving]
     usual = [_of_usual_size(context, one, base) for one in named]
     readings = [[_moved(record, fit) for record in plain] for fit in usual]
-    remainders = [_of_laws(context, plain, own, n_samples) for own in readings]
+    # What one effect changes, the laws beside it may err by as well.
+    shares = {name: max(_share_of_laws(plain, own, name) for own in readings) for name in context.noise}
+    remainders = [_of_laws(context, own, shares, n_samples) for own in readings]
     if not records_count:
         return _before_records(context, windowing, named, usual, remainders)
     truths = []
@@ -131,18 +136,20 @@ def _noisy(context: FitContext, record: Record, rng: np.random.Generator) -> Rec
     return record.with_signals(**noise)
 
 
+def _share_of_laws(plain: Sequence[Record], moved: Sequence[Record], name: str) -> float:
+    """Return what laws err by in a reading that an effect moved, of its standard deviation."""
+    without, having = (_samples(records, name) for records in (plain, moved))
+    return max(LAW_ERROR * float(np.std(having - without)) / (float(np.std(having)) or 1.0), _OF_SENSORS)
+
+
 def _of_laws(
-    context: FitContext, plain: Sequence[Record], moved: Sequence[Record], n_samples: int
+    context: FitContext, moved: Sequence[Record], shares: Mapping[str, float], n_samples: int
 ) -> Remainder:
-    """Return what laws err by in readings that an effect moved, beside the noise of a whole record."""
-    shares, floors = {}, {}
-    for name in (name for name in context.noise if any(name in record for record in moved)):
-        without, having = (_samples(records, name) for records in (plain, moved))
-        shares[name] = LAW_ERROR * float(np.std(having - without)) / (float(np.std(having)) or 1.0)
-        floors[name] = context.noise[name] / float(np.sqrt(n_samples))
+    """Return what laws leave of readings, beside the noise of a whole record; it moves as the readings do."""
     columns = np.column_stack([_samples(moved, signal.name) for signal in context.rig.outputs])
     size = np.std(columns, axis=0)
     spectra = (columns - np.mean(columns, axis=0)) / np.where(size > 0.0, size, 1.0)
+    floors = {name: floor / float(np.sqrt(n_samples)) for name, floor in context.noise.items()}
     return Remainder(floors, shares, float(n_samples), spectra)
 
 
