@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from rigsight.errors import InputError, nearest
-from rigsight.rigs import RIGS, Rig, read_rig_file
+from rigsight.rigs import RIGS, KnownRigs, Rig, read_rig_file
 from rigsight.simulators import give_function
 from rigsight.workflow.own.python_file import run_python_file
 
@@ -29,8 +29,8 @@ def own_rigs(files: Iterable[str | Path]) -> dict[Path, Rig]:
 
 
 def known_rigs(own: Iterable[Rig] = ()) -> Mapping[str, Rig]:
-    """Return all rigs by name."""
-    return {**RIGS, **{rig.name: rig for rig in own}}
+    """Return all rigs by name; a built-in one is read when it is asked for."""
+    return KnownRigs({rig.name: rig for rig in own})
 
 
 def own_simulators(named: Iterable[str]) -> None:
