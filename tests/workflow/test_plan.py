@@ -112,6 +112,10 @@ def test_before_records_every_input_needs_a_limit(tmp_path: Path, run: Run) -> N
     code, _, stderr = run("plan", tmp_path / "slider.toml", "-o", tmp_path / "out", "-q")
     assert (code, (tmp_path / "out").exists()) == (2, False)
     assert "--limit force=VALUE" in stderr
+    code, _, stderr = run(
+        "plan", tmp_path / "slider.toml", "--diagnosis", tmp_path, "-o", tmp_path / "out", "-q"
+    )
+    assert (code, "is the file of a rig" in stderr) == (2, True)
 
 
 @pytest.mark.slow

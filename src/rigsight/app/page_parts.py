@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
@@ -110,7 +111,7 @@ def _copied(line: str) -> None:
 class Option:
     """An option of a command that is asked for on a page."""
 
-    element: ValueElement
+    element: ValueElement[Any]
     name: str
 
     @property

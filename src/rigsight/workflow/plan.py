@@ -88,6 +88,10 @@ def run_plan(
     if diagnosis is not None and rivals is not None:
         raise InputError("Give the rivals once: with --diagnosis DIR, or with --rivals NAME,NAME.")
     before = is_rig_file(Path(campaign))
+    if before and diagnosis is not None:
+        raise InputError(
+            f"{campaign} is the file of a rig: a diagnosis has rivals in the records of its campaign; name that one."
+        )
     read = (
         _before_records(Path(campaign), limits) if before else read_campaign(campaign, own_effects, own_rigs)
     )
