@@ -19,7 +19,7 @@ from rigsight.app import jobs
 
 from ..chromium import BROWSERS, Chromium, find
 from . import first_use
-from .served import Server, Visitor
+from .served import Server, Visitor, wait_for
 
 pytestmark = pytest.mark.release
 Window = Callable[[Server], Visitor]
@@ -109,7 +109,17 @@ def test_every_page_has_names_and_can_be_used_by_keyboard(
     axis_campaign: Path, serve: Callable[..., Server], window: Window
 ) -> None:
     visitor = window(serve(axis_campaign))
-    for path in ("/", "/file?name=fit.csv", "/rig", "/campaign", "/diagnosis", "/export"):
+    for path in (
+        "/",
+        "/file?name=fit.csv",
+        "/rig",
+        "/campaign",
+        "/diagnosis",
+        "/plan",
+        "/power",
+        "/discovery",
+        "/export",
+    ):
         visitor.go(path)
         visitor.chromium.wait(
             "!document.querySelector('.editor') || !!document.querySelector('.cm-content[aria-label]')"
@@ -134,6 +144,27 @@ def test_every_page_has_names_and_can_be_used_by_keyboard(
     visitor.chromium.evaluate("[...document.querySelectorAll('nav a')][1].focus()")
     visitor.chromium.key("Enter", text="\r")
     visitor.wait_to_see("Its rig")
+
+
+def test_what_is_typed_or_chosen_is_in_the_command_and_there_again_after_a_run(
+    axis_campaign: Path, serve: Callable[..., Server], window: Window
+) -> None:
+    for name in ("own.py", "other.py"):
+        (axis_campaign / name).write_text("")
+    earlier = jobs.start(axis_campaign, "power", ("power", "nowhere", "--effects", "own.py"))
+    visitor = window(serve(axis_campaign))
+    visitor.go("/power")
+    visitor.wait_to_see("A file chosen here is run")
+    wait_for(lambda: not earlier.is_running, "the end of the earlier run")
+    visitor.wait_to_see("rigsight power . --out power --effects own.py")
+    visitor.choose("other.py")
+    visitor.wait_to_see("--effects own.py --effects other.py")
+    visitor.go("/plan")
+    visitor.chromium.evaluate("document.querySelector('input[aria-label^=Limits]').focus()")
+    visitor.chromium.send("Input.insertText", text="u=3 x=0.02")
+    visitor.wait_to_see("rigsight plan . --out plan --limit u=3 --limit x=0.02")
+    visitor.go("/rig")
+    assert not visitor.sees("Joints that a brake holds")
 
 
 def test_two_windows_a_reload_and_a_closed_browser_lose_nothing(

@@ -117,3 +117,12 @@ def test_the_state_of_the_steps_is_the_folder(axis_campaign: Path) -> None:
     os.utime(axis_campaign / "diagnosis" / "report.html", (1, 1))
     assert site.is_outdated("diagnosis/report.html")
     assert site.results("diagnosis") == ["diagnosis/report.html"]
+
+
+def test_a_plan_is_for_the_rivals_of_the_diagnosis_once_there_is_one(axis_campaign: Path) -> None:
+    site = Site(axis_campaign, ("plan",))
+    (step,) = site.runs
+    assert site.arguments(step, ["--limit", "u=3"]) == ("plan", ".", "--out", "plan", "--limit", "u=3")
+    (axis_campaign / "diagnosis").mkdir()
+    (axis_campaign / "diagnosis" / "diagnosis.json").write_text("{}")
+    assert site.arguments(step) == ("plan", ".", "--out", "plan", "--diagnosis", "diagnosis")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
@@ -113,7 +114,7 @@ def test_what_cannot_be_compared_is_told(tmp_path: Path, run: Run) -> None:
     broken = diagnosed(tmp_path / "broken", 1, lambda content: content.pop("candidates"))
     for arguments, told in (
         ([a], "at least two"),
-        ([a, tmp_path / "gone"], "contains no diagnosis.json"),
+        ([a, tmp_path / "gone"], "contains neither diagnosis.json nor campaign.toml"),
         ([a, other], "of 'servo'"),
         ([a, broken], "candidates"),
         ([a, a, "--at", "1,2"], "three or more"),
@@ -125,24 +126,46 @@ def test_what_cannot_be_compared_is_told(tmp_path: Path, run: Run) -> None:
     assert not out.exists()
 
 
+def unit(folder: Path, seed: int, amplitudes: Sequence[float], head: str = "", **changed: float) -> Path:
+    """Write a campaign of sweeps of an axis, with dry friction if a T_c is given."""
+    folder.mkdir()
+    rng, t = np.random.default_rng(seed), 0.01 * np.arange(1500)
+    structure = compose(AXIS, [effect_named("coulomb_friction")] if "T_c" in changed else [])
+    lines = [f'[rig]\nmodel = "axis"\n{head}\n[rig.constants]\ngain = 1.0\n']
+    for i, amplitude in enumerate(amplitudes):
+        u = amplitude * linear_sweep(t, 1.0, 3.0, 50.0)
+        asked = Record("r", 0.01, {"u": u}, {"u": "N", "x": "m"})
+        x = simulate(structure, {**VALUES, **changed}, asked)["x"] + rng.normal(0.0, 2e-5, t.size)
+        rows = np.column_stack([t, u, x])
+        np.savetxt(folder / f"{i}.csv", rows, delimiter=",", header="t,u,x", comments="")
+        lines.append(f'[[records]]\nfile = "{i}.csv"\nrole = "estimation"\n')
+    (folder / "campaign.toml").write_text("".join(lines))
+    return folder
+
+
 def test_campaigns_are_identified_and_compared(tmp_path: Path, run: Run) -> None:
-    folders = []
-    for number, damping in enumerate((5.0, 7.0)):
-        folder = tmp_path / f"unit_{number}"
-        folder.mkdir()
-        rng, t = np.random.default_rng(number), 0.01 * np.arange(1500)
-        lines = ['[rig]\nmodel = "axis"\n[rig.constants]\ngain = 1.0\n']
-        for i, amplitude in enumerate((2.0, 3.0)):
-            u = amplitude * linear_sweep(t, 1.0, 3.0, 50.0)
-            asked = Record("r", 0.01, {"u": u}, {"u": "N", "x": "m"})
-            x = simulate(compose(AXIS), {**VALUES, "d": damping}, asked)["x"] + rng.normal(0.0, 2e-5, t.size)
-            np.savetxt(
-                folder / f"{i}.csv", np.column_stack([t, u, x]), delimiter=",", header="t,u,x", comments=""
-            )
-            lines.append(f'[[records]]\nfile = "{i}.csv"\nrole = "estimation"\n')
-        (folder / "campaign.toml").write_text("".join(lines))
-        folders.append(folder)
+    folders = [unit(tmp_path / f"unit_{d}", i, (2.0, 3.0), d=d) for i, d in enumerate((5.0, 7.0))]
     code, stdout, stderr = run("difference", *folders, "-o", tmp_path / "out", "--json", "-j", "1")
     assert code == 0, stderr
     changed = [row["name"] for row in json.loads(stdout)["numbers"] if row["verdict"] == "changed"]
     assert changed == ["d"]
+
+
+FRICTION = 'effects = ["coulomb_friction"]\n[rig.parameters]\nm = 2.0\nd = 5.0\nk = 800.0\nT_c = 0.1'
+
+
+def test_what_one_model_has_is_identified_in_the_other_campaigns_too(tmp_path: Path) -> None:
+    folders = [
+        unit(tmp_path / "new", 0, (2.0, 3.0)),
+        unit(tmp_path / "worn", 1, (2.0, 3.0), FRICTION, T_c=0.2),
+    ]
+    found = run_difference(folders, n_jobs=1)
+    assert (found.other_effects, verdicts(found)["T_c"]) == ({}, Verdict.CHANGED)
+    assert verdicts(found)["m"] is Verdict.SAME
+
+
+def test_one_record_does_not_show_what_differs_between_records(tmp_path: Path) -> None:
+    folders = [unit(tmp_path / f"unit_{d}", i, (2.0,), d=d) for i, d in enumerate((5.0, 7.0))]
+    found = run_difference(folders, n_jobs=1)
+    assert [own.has_one_record for own in found.units] == [True, True]
+    assert "only look so" in found.conclusion

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,36 @@ import pytest
 
 Run = Callable[..., tuple[int, str, str]]
 
+SLIDER = """
+name = "slider"
+summary = "A mass on a spring."
+[inputs.force]
+unit = "N"
+[parameters.m]
+unit = "kg"
+default = 2.0
+[parameters.k]
+unit = "N/m"
+default = 800.0
+[parameters.d]
+unit = "N s/m"
+default = 5.0
+[coordinates.x]
+unit = "m"
+[energy]
+kinetic = "m*d(x)^2/2"
+[joints.guide]
+motion = "x"
+stiffness = "k"
+damping = "d"
+[drives.motor]
+signal = "force"
+force = "motor"
+along = "x"
+[sensors.position]
+reads = "x"
+unit = "m"
+"""
 CANDIDATES: list[dict[str, Any]] = [
     {
         "effects": ["cubic_stiffness"],
@@ -37,7 +66,11 @@ def test_a_plan_is_a_file_to_play_with_its_promise(axis_campaign: Path, tmp_path
     asked = ["--diagnosis", results, "--seconds", "2.5", "--limit", "x=0.01", "-o", out, "--json"]
     code, stdout, stderr = run("plan", axis_campaign, *asked)
     assert code == 0, stderr
-    assert sorted(path.name for path in out.iterdir()) == ["plan.csv", "plan.json", "plan.png", "plan.svg"]
+    written = ["plan.csv", "plan.html", "plan.json", "plan.png", "plan.svg"]
+    assert sorted(path.name for path in out.iterdir()) == written
+    page = (out / "plan.html").read_text()
+    assert "<script" not in page
+    assert all(text in page for text in ("Cubic stiffness", "rigsight plan", "<svg"))
     assert json.loads(stdout) == json.loads((out / "plan.json").read_text())
     rows = (out / "plan.csv").read_text().splitlines()
     assert (rows[0], len(rows)) == ("t,u", 501)
@@ -49,7 +82,6 @@ def test_a_plan_is_a_file_to_play_with_its_promise(axis_campaign: Path, tmp_path
 
 
 REFUSED = {
-    "no rivals": [],
     "rivals twice": ["--rivals", "cubic_stiffness,quadratic_damping", "--diagnosis", "results"],
     "one rival": ["--rivals", "cubic_stiffness"],
     "unknown rival": ["--rivals", "cubic_stiffness,friction"],
@@ -75,11 +107,40 @@ def test_what_cannot_be_used_is_refused_before_anything_is_written(
     assert "Traceback" not in stderr
 
 
-def test_the_file_of_a_rig_is_refused_as_one(tmp_path: Path, run: Run) -> None:
-    file = resources.files("rigsight.rigs") / "files/axis.toml"
+def test_before_records_every_input_needs_a_limit(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "slider.toml").write_text(SLIDER)
+    code, _, stderr = run("plan", tmp_path / "slider.toml", "-o", tmp_path / "out", "-q")
+    assert (code, (tmp_path / "out").exists()) == (2, False)
+    assert "--limit force=VALUE" in stderr
     code, _, stderr = run(
-        "plan", file, "--rivals", "cubic_stiffness,quadratic_damping", "-o", tmp_path / "out"
+        "plan", tmp_path / "slider.toml", "--diagnosis", tmp_path, "-o", tmp_path / "out", "-q"
     )
-    assert code == 2
-    assert len(stderr.splitlines()) <= 2
-    assert "is the file of a rig" in stderr
+    assert (code, "is the file of a rig" in stderr) == (2, True)
+
+
+@pytest.mark.slow
+def test_a_rig_file_is_planned_for_before_there_are_records(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "slider.toml").write_text(SLIDER)
+    limits = ["--limit", "force=20", "--limit", "position=0.05"]
+    asked = ["--rivals", "coulomb_friction,quadratic_damping", "--seconds", "3"]
+    code, stdout, stderr = run(
+        "plan", tmp_path / "slider.toml", *asked, *limits, "-o", tmp_path / "out", "--json"
+    )
+    assert code == 0, stderr
+    found = json.loads(stdout)
+    assert found["sizes"] == "usual, no records"
+    assert found["probability_now"] == 0.5 < found["probability_expected"]
+    assert all(own["largest"] <= own["limit"] for own in found["limits"])
+
+
+@pytest.mark.slow
+def test_without_a_verdict_it_is_planned_for_what_the_check_leaves_open(
+    axis_campaign: Path, tmp_path: Path, run: Run
+) -> None:
+    asked = ["--limit", "u=20", "--limit", "x=0.05", "--seconds", "3"]
+    code, stdout, stderr = run("plan", axis_campaign, *asked, "-o", tmp_path / "out", "--json")
+    assert code == 0, stderr
+    found = json.loads(stdout)
+    assert found["sizes"] == "usual"
+    assert len(found["rivals"]) > 1
+    assert 0.0 < found["probability_now"] <= found["probability_expected"] + 0.01

@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import ui
 
 from rigsight.app import jobs
-from rigsight.app.page_parts import address_of, page_of, run_panel, telling, text, watch
+from rigsight.app.page_parts import address_of, page_of, run_panel, telling, text, typed_option, watch
 from rigsight.app.steps import ROBOT_SUFFIXES, Site, picture_of
 from rigsight.app.workspace import (
     CAMPAIGN,
@@ -26,6 +26,10 @@ from rigsight.app.workspace import (
 from rigsight.errors import InputError
 
 _GUESS = ""
+_OF_ROBOT = (
+    ("--gear", "Compliant gears with their stiffness in N m/rad, such as elbow=500 wrist=200"),
+    ("--lock", "Joints that a brake holds, and where in rad, such as elbow=0.5"),
+)
 _PICTURE = "picture"
 _WORDS = "Which column is which signal, in which unit, and the values of the given simulation. Comments mark guesses."
 # The editor has no option for what a screen reader calls it, and is loaded after the page.
@@ -79,7 +83,8 @@ def _choice(site: Site) -> None:
 
     def arguments() -> tuple[str, ...]:
         option, _, name = str(choice.value).partition(" ")
-        return ("init", ".", *((option, name) if name else ()))
+        joints = [part for own in of_robot for part in own.arguments] if option == "--mjcf" else []
+        return ("init", ".", *((option, name) if name else ()), *joints)
 
     def chosen() -> None:
         show_command()
@@ -88,12 +93,18 @@ def _choice(site: Site) -> None:
             drawn.clear()
             found = {"--model": {"model": name}, "--rigs": {"file": name}}.get(option)
             _picture(site, None if found is None else picture_arguments(site.root, **found))
+        for own in of_robot:
+            own.element.visible = option == "--mjcf"
 
     text("p", "What do the records come from? This writes the campaign, with every guess marked in it.")
     choice = ui.select(options, value=_GUESS, label="Rig").classes("wide")
     drawn = ui.element("div")
+    of_robot = [typed_option(site, "init", name, label) for name, label in _OF_ROBOT]
     show_command = run_panel(site, "init", "Begin the campaign", arguments)
     choice.on_value_change(chosen)
+    for own in of_robot:
+        own.element.visible = False
+        own.element.on_value_change(show_command)
 
 
 def picture_arguments(

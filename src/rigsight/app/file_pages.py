@@ -11,12 +11,13 @@ from nicegui import ui
 
 from rigsight.app import jobs
 from rigsight.app.page_parts import address_of, page_of, run_panel, telling, text, watch
-from rigsight.app.steps import ROBOT_SUFFIXES, Site, inspection_key, picture_of
+from rigsight.app.steps import OWN_EFFECTS, ROBOT_SUFFIXES, Site, inspection_key, picture_of
 from rigsight.app.workspace import inside, set_aside
 from rigsight.records.formats.known import LARGEST_FILE
 from rigsight.workflow.init import MEASURED_SUFFIXES, measured_files
 
 _UPLOAD = (Path(__file__).parent / "upload.js").read_text(encoding="utf-8")
+_FURTHER = (".toml", OWN_EFFECTS, *ROBOT_SUFFIXES)
 _HEADINGS = ("channel", "unit", "samples", "minimum", "maximum", "not finite")
 
 
@@ -25,9 +26,10 @@ def files_page(site: Site) -> None:
     with page_of(site, "/", "Files"):
         text(
             "p",
-            "Measured files, a rig file or the model of a robot: drop them anywhere on this page, or choose them.",
+            "Measured files, a rig file, the model of a robot or effects of your own in Python: drop them anywhere on this "
+            "page, or choose them.",
         )
-        accepted = ",".join((*MEASURED_SUFFIXES, ".toml", *ROBOT_SUFFIXES))
+        accepted = ",".join((*MEASURED_SUFFIXES, *_FURTHER))
         ui.html(
             f'<div class="drop"><label for="files">Files</label> '
             f'<input type="file" id="files" multiple accept="{accepted}"> up to {LARGEST_FILE / 1e9:g} GB each'
@@ -55,7 +57,7 @@ def files_page(site: Site) -> None:
 
 def _listed(site: Site) -> list[tuple[str, int, bool]]:
     measured = {file.name for file in measured_files(site.root)}
-    names = sorted(measured.union(site.files(".toml", *ROBOT_SUFFIXES)))
+    names = sorted(measured.union(site.files(*_FURTHER)))
     return [(name, (site.root / name).stat().st_size, name in measured) for name in names]
 
 

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
+from nicegui.elements.mixins.value_element import ValueElement
 
 from rigsight.app import jobs
-from rigsight.app.steps import Site
+from rigsight.app.steps import OWN_EFFECTS, Site
 from rigsight.errors import RigsightError
 
 _COLOR = "#0b5a91"
 """Of buttons; white on it can be read."""
+_RUNS_CODE = (
+    "A file chosen here is run: it can read, change and delete all that you can. "
+    "Choose only files that you wrote or have read."
+)
 _EVERY = 0.5
 """Interval [s] at which a page looks into the folder."""
 STYLE = (Path(__file__).parent / "pages.css").read_text(encoding="utf-8")
@@ -99,6 +107,43 @@ def _copied(line: str) -> None:
     ui.notify("Copied.")
 
 
+@dataclass(frozen=True)
+class Option:
+    """An option of a command that is asked for on a page."""
+
+    element: ValueElement[Any]
+    name: str
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """The option with each of its values."""
+        value = self.element.value
+        values = value.split() if isinstance(value, str) else value or ()
+        return tuple(part for own in values for part in (self.name, own))
+
+
+def typed_option(site: Site, job: str, name: str, label: str) -> Option:
+    """Ask for the values of an option, with those of the last run."""
+    return Option(ui.input(label, value=" ".join(_last(site, job, name))).classes("wide"), name)
+
+
+def own_effects_option(site: Site, job: str) -> Option | None:
+    """Ask which Python files to run for effects of one's own, with a warning; None where there is no such file."""
+    files = site.files(OWN_EFFECTS)
+    if not files:
+        return None
+    chosen = [file for file in _last(site, job, "--effects") if file in files]
+    field = ui.select(files, value=chosen, multiple=True, label="Effects of your own").classes("wide")
+    text("p", _RUNS_CODE, "bad")
+    return Option(field, "--effects")
+
+
+def _last(site: Site, job: str, option: str) -> list[str]:
+    """Return the values of an option in the last run of a command."""
+    found = jobs.find(site.root, job)
+    return [] if found is None else [own for name, own in pairwise(found.arguments) if name == option]
+
+
 def run_panel(
     site: Site,
     name: str,
@@ -106,6 +151,7 @@ def run_panel(
     arguments: Callable[[], Sequence[str]],
     ended: Callable[[], object] = lambda: None,
     shows_output: bool = True,
+    is_open: bool = False,
 ) -> Callable[[], object]:
     """Show a command with its button, its run and its outcome; return what shows the command anew."""
 
@@ -128,7 +174,7 @@ def run_panel(
         command_shown(arguments())
         ui.button(label, on_click=begin)
         if job is not None:
-            _outcome(job, shows_output)
+            _outcome(job, shows_output, is_open)
 
     def changed() -> None:
         panel.refresh()
@@ -162,7 +208,7 @@ def _time(seconds: float) -> str:
     return f"about {seconds:.0f} s" if seconds < 90 else f"about {seconds / 60:.0f} min"
 
 
-def _outcome(job: jobs.Job, shows_output: bool) -> None:
+def _outcome(job: jobs.Job, shows_output: bool, is_open: bool) -> None:
     code = job.exit_code
     kind, words = ("bad", "Ended without a result: its process was killed. Start it again.")
     if code == 0:
@@ -175,7 +221,7 @@ def _outcome(job: jobs.Job, shows_output: bool) -> None:
     for message in job.messages():
         text("p", message, "message")
     if shows_output and (output := job.output):
-        with ui.element("details"):
+        with ui.element("details").props("open" if is_open else ""):
             text("summary", "What the command printed")
             text("pre", output).props('tabindex="0" aria-label="Output of the command"')
 

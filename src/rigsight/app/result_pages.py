@@ -7,18 +7,29 @@ from functools import partial
 
 from nicegui import ui
 
-from rigsight.app.page_parts import downloads, page_of, run_panel, shown_page, text, watch
-from rigsight.app.steps import EXPORTS, RESULTS, ROBOT_SUFFIXES, Run, Site
+from rigsight.app.page_parts import (
+    downloads,
+    own_effects_option,
+    page_of,
+    run_panel,
+    shown_page,
+    text,
+    typed_option,
+    watch,
+)
+from rigsight.app.steps import EXPORTS, RESULTS, ROBOT_SUFFIXES, SHOWN, Run, Site
 from rigsight.app.workspace import CAMPAIGN
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 
 
 def result_page(site: Site, step: Run) -> None:
-    """Run one command on the campaign, and show the page that it wrote."""
+    """Run one command on the campaign, and show what it found."""
+    is_page = step.page.endswith(SHOWN)
 
     @ui.refreshable
     def results() -> None:
-        shown_page(site, f"{step.out}/{step.page}", step.title)
+        if is_page:
+            shown_page(site, f"{step.out}/{step.page}", step.title)
         downloads(site.results(step.out))
 
     with page_of(site, f"/{step.key}", step.title):
@@ -27,7 +38,16 @@ def result_page(site: Site, step: Run) -> None:
             text("p", "This folder has no campaign yet.")
             ui.link("Begin one: the rig", "/rig").classes("next")
             return
-        run_panel(site, step.key, "Run", lambda: step.arguments, results.refresh)
+        options = [typed_option(site, step.key, name, label) for name, label in step.fields]
+        if step.takes_own_effects and (own := own_effects_option(site, step.key)):
+            options.append(own)
+
+        def arguments() -> tuple[str, ...]:
+            return site.arguments(step, [part for option in options for part in option.arguments])
+
+        show_command = run_panel(site, step.key, "Run", arguments, results.refresh, is_open=not is_page)
+        for option in options:
+            option.element.on_value_change(show_command)
         results()
         titles = [(address, title) for address, title, _ in site.steps()]
         address, title = titles[[own for own, _ in titles].index(f"/{step.key}") + 1]

@@ -17,12 +17,10 @@ from rigsight.app.campaign_pages import campaign_page, rig_page
 from rigsight.app.file_pages import file_page, files_page
 from rigsight.app.gate import Gate
 from rigsight.app.result_pages import export_page, result_page
-from rigsight.app.steps import Run, Site
+from rigsight.app.steps import SHOWN, Run, Site
 from rigsight.app.workspace import inside, opened, receive
 from rigsight.errors import InputError, MachineError, RigsightError
 
-_SHOWN = (".html", ".png", ".svg")
-"""Suffixes of files that a browser shows; others are downloaded."""
 _ALONE = {"Content-Security-Policy": "sandbox allow-scripts allow-downloads", "Cache-Control": "no-cache"}
 _CLOSING = 1
 """Time [s] that open pages get when the server ends."""
@@ -67,7 +65,7 @@ def pages(site: Site) -> FastAPI:
         found = inside(site.root, path)
         if found is None:
             return PlainTextResponse("There is no such file.", 404)
-        kind = "inline" if found.suffix in _SHOWN else "attachment"
+        kind = "inline" if found.suffix in SHOWN else "attachment"
         return FileResponse(found, filename=found.name, content_disposition_type=kind, headers=_ALONE)
 
     ui.button.default_props("no-caps")

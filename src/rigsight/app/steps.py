@@ -2,44 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rigsight.app.workspace import CAMPAIGN, OWN, find_draft
 from rigsight.workflow.init import measured_files
-from rigsight.workflow.run.results import REPORT_FILE
+from rigsight.workflow.run.results import DIAGNOSIS_FILE, REPORT_FILE
 
 RESULTS = "diagnosis"
 EXPORTS = "exports"
 ROBOT_SUFFIXES = (".xml", ".mjcf", ".urdf")
+OWN_EFFECTS = ".py"
+SHOWN = (".html", ".png", ".svg")
+"""Suffixes of files that a browser shows; others are downloaded."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A step that is one command on the whole campaign, whose result is a page."""
+    """A step that is one command on the whole campaign."""
 
     key: str  # address of its page
     title: str
     command: str  # its name, and the folder of its results
     out: str
-    page: str  # of its results, to be shown
+    page: str  # of its results, to be shown; what the command prints is shown where a browser cannot show it
     words: str  # what it does
-    options: tuple[str, ...] = ()  # beside that folder
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `rigsight`."""
-        return (self.command, ".", "--out", self.out, *self.options)
+    takes_own_effects: bool = True
+    fields: tuple[tuple[str, str], ...] = ()  # options to be typed, each with what is asked for
 
 
 RUNS = (
     Run("check", "Check", "check", "check", "check.html", "What do the records allow to find?"),
     Run("diagnosis", "Diagnosis", "diagnose", RESULTS, REPORT_FILE,
         "Which effect does the simulation lack? Finished fits are kept: a canceled diagnosis goes on from there."),
-    Run("plan", "Next experiment", "plan", "plan", "plan.svg",
-        "Which record would tell the rivals of the diagnosis apart? plan.csv is played on the bench.",
-        ("--diagnosis", RESULTS)),
+    Run("plan", "Next experiment", "plan", "plan", "plan.html",
+        "Which record would tell the rivals of the diagnosis apart, or, before there is one, what the check leaves open? "
+        "plan.csv is played on the bench.",
+        fields=(("--limit", "Limits, such as x=0.02 u=3 d(x)=0.5"), ("--seconds", "Duration in seconds"))),
+    Run("power", "Smallest effects", "power", "power", "power.json",
+        "How small may an effect be and still be named by these records?"),
+    Run("discovery", "Equation", "discover", "discovery", "discovery.svg",
+        "Which equation do the records give by sparse regression, without naming an effect?", takes_own_effects=False),
 )  # fmt: skip
 
 
@@ -54,6 +58,12 @@ class Site:
     def runs(self) -> tuple[Run, ...]:
         """The runs that this rigsight can do."""
         return tuple(run for run in RUNS if run.command in self.commands)
+
+    def arguments(self, run: Run, options: Sequence[str] = ()) -> tuple[str, ...]:
+        """Return what follows `rigsight` to do a run."""
+        diagnosed = run.command == "plan" and (self.root / RESULTS / DIAGNOSIS_FILE).is_file()
+        rivals = ("--diagnosis", RESULTS) if diagnosed else ()
+        return (run.command, ".", "--out", run.out, *rivals, *options)
 
     def steps(self) -> list[tuple[str, str, bool]]:
         """Return address, title and whether it is done of every step."""

@@ -7,5 +7,7 @@ from rigsight.check.channels import CheckedRecord as CheckedRecord
 from rigsight.check.effect_matrix import EffectMatrix as EffectMatrix
 from rigsight.check.effect_matrix import Told as Told
 from rigsight.check.effect_matrix import Visible as Visible
+from rigsight.check.holes import Holes as Holes
+from rigsight.check.holes import holes_of as holes_of
 from rigsight.check.parameters import CheckedParameter as CheckedParameter
 from rigsight.check.remarks import Remark as Remark

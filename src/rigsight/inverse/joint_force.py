@@ -188,7 +188,7 @@ def _periodic(effect: Effect, values: Mapping[str, float], motion: JointMotion) 
 
 @cache
 def _element() -> Rig:
-    return rig_of_tables(_ELEMENT, "Measured joint")
+    return rig_of_tables(_ELEMENT, "Measured joint", check_units=False)
 
 
 @cache

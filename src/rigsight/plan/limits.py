@@ -1,9 +1,9 @@
-"""Limits of stroke, speed, force and their rates, as a user gives them, and how much of them a record uses."""
+"""Limits of stroke, speed, force and their rates, and payloads, as a user gives them; how much of them a record uses."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,35 +35,56 @@ class Limit:
 
 
 def read_limits(rig: Rig, asked: Sequence[str]) -> tuple[Limit, ...]:
-    """Return the limits that texts such as ``x=0.02`` and ``d(x)=0.5`` state.
+    """Return the limits that texts such as ``x=0.02`` and ``d(x)=0.5`` state; those on constants are left to `read_payloads`.
 
     Raises
     ------
     InputError
-        If a signal is unknown or stated twice, or a value is not a positive number.
+        If a name is unknown, a signal stated twice, or a value not a positive number.
     """
     known = {
         limit.name: limit
         for signal in (*rig.inputs, *rig.outputs)
         for limit in (Limit(signal.name, 0.0), Limit(signal.name, 0.0, is_rate=True))
     }
+    constants = [constant.name for constant in rig.constants]
     found: dict[str, Limit] = {}
-    for text in asked:
-        name, _, number = (part.strip() for part in text.partition("="))
+    for text, name, value in _read(asked):
+        if name in constants:
+            continue
         if name not in known:
+            allowed = (*known, *constants)
             raise InputError(
-                f"--limit {text}: '{name}' is unknown.{nearest(name, known)} Allowed: {', '.join(known)}, each as NAME=VALUE."
+                f"--limit {text}: '{name}' is unknown.{nearest(name, allowed)} Allowed: {', '.join(allowed)}, each as NAME=VALUE."
             )
         if name in found:
             raise InputError(f"--limit {text}: '{name}' is limited twice; give one value.")
-        try:
-            value = float(number)
-        except ValueError:
-            value = math.nan
         if not 0.0 < value < math.inf:
-            raise InputError(f"--limit {text}: the value must be a positive number, got '{number}'.")
+            raise InputError(f"--limit {text}: the value must be a positive number.")
         found[name] = Limit(known[name].signal, value, known[name].is_rate)
     return tuple(found.values())
+
+
+def read_payloads(rig: Rig, asked: Sequence[str]) -> tuple[Mapping[str, float], ...]:
+    """Return the values that constants of a rig may have in an experiment, such as an added mass, by texts such as ``m=2``.
+
+    Raises
+    ------
+    InputError
+        If a value lies outside of the range of its constant.
+    """
+    constants = {constant.name: constant for constant in rig.constants}
+    return tuple({name: constants[name].check(value)} for _, name, value in _read(asked) if name in constants)
+
+
+def _read(asked: Sequence[str]) -> Iterator[tuple[str, str, float]]:
+    """Yield each text with its name and its value, which is NaN where it is no number."""
+    for text in asked:
+        name, _, number = (part.strip() for part in text.partition("="))
+        try:
+            yield text, name, float(number)
+        except ValueError:
+            yield text, name, math.nan
 
 
 def with_recorded_range(limits: Sequence[Limit], rig: Rig, records: Sequence[Record]) -> tuple[Limit, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,12 +14,15 @@ from rigsight.json_data import json_data
 from rigsight.plan.discrimination import posterior, predicted, refitted
 from rigsight.plan.experiments import Bench
 from rigsight.plan.limits import Limit, with_recorded_range
-from rigsight.plan.rivals import Contest, Named, Rival, contest_of
+from rigsight.plan.rivals import Named, Truth, contest_of, truths_of
 from rigsight.plan.search import Scored, Search
+from rigsight.plan.usual_sizes import truths_of_usual_size
 from rigsight.records import Record
 from rigsight.records.record import Floats
 
 SCHEMA_VERSION = 1
+Sizes = Literal["fitted", "usual", "usual, no records"]
+"""Sizes of the rivals: fitted to the records; usual ones beside the records; or usual ones before there are any."""
 DRAWS = 6
 """Simulated outcomes for each rival as the truth."""
 _FEWEST, _MOST = 500, 100_000
@@ -33,7 +36,7 @@ class Prediction:
     """What a rival says of the experiment."""
 
     effects: str
-    probability: float  # before
+    probability: float  # before, if it is the truth
     values: Mapping[str, float]  # of its free numbers
     readings: Record  # with the numbers before
     # Of the readings of the most probable model once it is fitted again, in units of the errors, shape (n_samples, n_outputs).
@@ -61,6 +64,8 @@ class Plan:
     ----------
     title, rig
         Of the campaign.
+    sizes
+        Whether the rivals were fitted to the records or are of a usual size.
     what
         The experiment in words.
     record
@@ -71,6 +76,8 @@ class Plan:
         Most probable first.
     errors
         Error to be expected of each output.
+    now
+        Expected probability of the truth before.
     without_noise
         Expected probability of the truth afterwards for the numbers so far and readings without noise.
     trials
@@ -81,11 +88,13 @@ class Plan:
 
     title: str
     rig: str
+    sizes: Sizes
     what: str
     record: Record
     limits: tuple[tuple[Limit, float], ...]
     rivals: tuple[Prediction, ...]
     errors: Mapping[str, float]
+    now: float
     without_noise: float
     trials: Trials
     others: tuple[Scored, ...]
@@ -101,6 +110,7 @@ class Plan:
             "schema_version": SCHEMA_VERSION,
             "title": self.title,
             "rig": self.rig,
+            "sizes": self.sizes,
             "experiment": self.what,
             "dt": self.record.dt,
             "n_samples": self.record.n_samples,
@@ -121,7 +131,7 @@ class Plan:
                 for one in self.rivals
             ],
             "error": self.errors,
-            "probability_now": self.rivals[0].probability,
+            "probability_now": self.now,
             "probability_expected": self.promised,
             "probability_without_noise": self.without_noise,
             "simulated": vars(self.trials),
@@ -141,6 +151,9 @@ def plan_experiment(
     seed: int,
     say: Callable[[str], None],
     draws: int = DRAWS,
+    *,
+    sizes: Sizes = "fitted",
+    payloads: Sequence[Mapping[str, float]] = (),
 ) -> Plan:
     """Return the experiment that separates rivals best.
 
@@ -160,6 +173,10 @@ def plan_experiment(
         Called with what has been done.
     draws
         Simulated outcomes for each rival as the truth.
+    sizes
+        Sizes of the rivals.
+    payloads
+        Values that constants of the rig may have in the experiment, beside those of the records.
 
     Raises
     ------
@@ -178,86 +195,104 @@ def plan_experiment(
         )
     n_samples, rng = round(seconds / dt), np.random.default_rng(seed)
     kept = with_recorded_range(limits, rig, campaign.records)
-    contest = contest_of(campaign, named, say)
-    bench = Bench.of(rig, campaign.estimation, kept, n_samples, 1.0 / contest.context.scales["time"])
-    constants = list({tuple(sorted(r.constants.items())): r.constants for r in campaign.estimation}.values())
-    search = Search(contest, bench, kept).best(constants, rng, say)
+    if sizes == "fitted":
+        truths = truths_of(contest_of(campaign, named, say))
+    else:
+        truths = truths_of_usual_size(campaign, named, n_samples, sizes == "usual", say)
+    first = truths[0].contest
+    bench = Bench.of(rig, campaign.estimation, kept, n_samples, 1.0 / first.context.scales["time"])
+    search = Search(truths, bench, kept).best(_constants(campaign, payloads), rng, say)
     chosen = search[0]
-    errors = contest.remainder.errors(chosen.readings)
-    again = [refitted(contest, rival, chosen.readings, errors) for rival in contest.rivals]
+    errors = first.remainder.errors(chosen.readings)
+    again = {rival.label: refitted(first, rival, chosen.readings, errors) for rival in first.rivals}
+    best = again[truths[0].rival.label]
     say("fitted again")
-    readings = [predicted(rival, bench.record(chosen.experiment)) for rival in contest.rivals]
-    trials, without_noise = _simulated(contest, readings, draws, rng, say)
+    readings = [predicted(truth.rival, bench.record(chosen.experiment)) for truth in truths]
+    trials, without_noise = _simulated(truths, readings, draws, rng, say)
+    predictions = []
+    for truth, shown in zip(truths, readings, strict=True):
+        rival = truth.rival
+        own, values = again[rival.label], {name: rival.fit.values[name] for name in rival.fit.free}
+        rms, before = float(np.sqrt(np.nanmean(own.left**2))), truth.contest.rivals[truth.index].probability
+        evidence = own.against - best.against
+        predictions.append(Prediction(rival.label, before, values, shown, own.left, rms, evidence))
     return Plan(
         campaign.title,
         rig.name,
+        sizes,
         chosen.experiment.what,
         bench.record(chosen.experiment),
         tuple((limit, max(limit.reached(one) for one in readings)) for limit in kept),
-        tuple(
-            Prediction(
-                rival.label,
-                rival.probability,
-                {name: rival.fit.values[name] for name in rival.fit.free},
-                shown,
-                own.left,
-                float(np.sqrt(np.nanmean(own.left**2))),
-                own.against - again[0].against,
-            )
-            for rival, shown, own in zip(contest.rivals, readings, again, strict=True)
-        ),
+        tuple(predictions),
         errors,
+        # Of a contest the most probable rival is the verdict so far; of usual sizes any may be.
+        float(np.mean([one.probability for one in predictions]))
+        if sizes != "fitted"
+        else predictions[0].probability,
         without_noise,
         trials,
         _different(search),
     )
 
 
+def _constants(campaign: Campaign, payloads: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
+    """Return the sets of constants that are tried: those of the records, each with every payload as well."""
+    recorded = {tuple(sorted(r.constants.items())): r.constants for r in campaign.estimation}
+    return [{**own, **payload} for payload in ({}, *payloads) for own in recorded.values()]
+
+
 def _simulated(
-    contest: Contest,
+    truths: Sequence[Truth],
     readings: Sequence[Record],
     draws: int,
     rng: np.random.Generator,
     say: Callable[[str], None],
 ) -> tuple[Trials, float]:
     """Return the outcomes of simulated experiments, and the probability of the truth that is expected without noise."""
-    probabilities = [rival.probability for rival in contest.rivals]
-    names = list(contest.remainder.floors)
-    columns = [[s.name for s in contest.context.rig.outputs].index(name) for name in names]
     right, decided, wrong, expected, without_noise = np.zeros(5)
-    for truth, (weight, shown) in enumerate(zip(probabilities, readings, strict=True)):
-
-        def outcome(record: Record, clean: Record) -> Floats:
-            errors = contest.remainder.errors(clean)
-            return posterior(
-                probabilities, [refitted(contest, rival, record, errors).against for rival in contest.rivals]
-            )
-
-        without_noise += weight * outcome(shown, shown)[truth]
+    for truth, shown in zip(truths, readings, strict=True):
+        weight, index = truth.weight, truth.index
+        without_noise += weight * _outcome(truth, shown, shown)[index]
         for _ in range(draws):
-            clean = _drawn_readings(contest, contest.rivals[truth], shown, rng)
-            errors, noise = contest.remainder.errors(clean), contest.remainder.drawn(shown.n_samples, rng)
-            noisy = {
-                name: clean[name] + errors[name] * noise[:, i]
-                for name, i in zip(names, columns, strict=True)
-                if name in clean
-            }
-            found = outcome(clean.with_signals(**noisy), clean)
-            right += weight / draws * (int(np.argmax(found)) == truth)
-            expected += weight / draws * found[truth]
-            decided += weight / draws * (found[truth] >= DECIDED)
-            wrong += weight / draws * (np.max(np.delete(found, truth)) >= DECIDED)
+            drawn, clean = _drawn_readings(truth, shown, rng)
+            found = _outcome(drawn, _with_noise(drawn, clean, rng), clean)
+            right += weight / draws * (int(np.argmax(found)) == index)
+            expected += weight / draws * found[index]
+            decided += weight / draws * (found[index] >= DECIDED)
+            wrong += weight / draws * (np.max(np.delete(found, index)) >= DECIDED)
             say("simulated outcome")
     trials = Trials(draws * len(readings), *map(float, (expected, right, decided, wrong)))
     return trials, float(without_noise)
 
 
-def _drawn_readings(contest: Contest, rival: Rival, shown: Record, rng: np.random.Generator) -> Record:
-    """Return the readings that a rival predicts with drawn numbers; those with its own numbers where they cannot be simulated."""
+def _outcome(truth: Truth, record: Record, clean: Record) -> Floats:
+    """Return the probabilities of the rivals after a record, whose errors are those of its readings without noise."""
+    contest = truth.contest
+    errors = contest.remainder.errors(clean)
+    against = [refitted(contest, rival, record, errors).against for rival in contest.rivals]
+    return posterior([rival.probability for rival in contest.rivals], against)
+
+
+def _with_noise(truth: Truth, clean: Record, rng: np.random.Generator) -> Record:
+    """Return readings with drawn errors."""
+    remainder = truth.contest.remainder
+    names = [signal.name for signal in truth.contest.context.rig.outputs]
+    errors, noise = remainder.errors(clean), remainder.drawn(clean.n_samples, rng)
+    noisy = {
+        name: clean[name] + error * noise[:, names.index(name)]
+        for name, error in errors.items()
+        if name in clean
+    }
+    return clean.with_signals(**noisy)
+
+
+def _drawn_readings(truth: Truth, shown: Record, rng: np.random.Generator) -> tuple[Truth, Record]:
+    """Return a truth with drawn numbers and its readings; the same with its own numbers where they cannot be simulated."""
+    drawn = truth.drawn(rng)
     try:
-        return predicted(rival.drawn(contest.context.scales, rng), shown)
+        return drawn, predicted(drawn.rival, shown)
     except SimulationError:
-        return shown
+        return truth, shown
 
 
 def _different(search: Sequence[Scored]) -> tuple[Scored, ...]:

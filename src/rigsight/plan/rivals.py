@@ -22,11 +22,11 @@ from rigsight.identify.fit.windows import Windowing, liveliest
 from rigsight.records import Record
 from rigsight.records.record import Floats
 
-_OLD = 8000
+OLD = 8000
 """Samples of the most excited stretches of all records together that rivals are fitted to again and again. Fewer than there are
 leave the rivals more freedom, so that a plan promises less."""
 
-_REACH = 0.3
+REACH = 0.3
 """Largest standard deviation of a drawn coordinate: a factor of 1.35 for a positive number."""
 
 
@@ -58,7 +58,7 @@ class Rival:
         coordinates = Coordinates.of(self.fit.structure, self.fit.free, self.fit.values, scales)
         eigenvalues, vectors = np.linalg.eigh(self.information)
         # Directions that the records leave open are drawn within reach of the fit.
-        spread = 1.0 / np.sqrt(np.maximum(eigenvalues, 1.0 / _REACH**2))
+        spread = 1.0 / np.sqrt(np.maximum(eigenvalues, 1.0 / REACH**2))
         place = coordinates.from_values(self.fit.values) + vectors @ (
             spread * rng.standard_normal(spread.size)
         )
@@ -102,7 +102,7 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Contest:
-    """The rivals, most probable first, with the records that they were fitted to."""
+    """The rivals, most probable first, with the records that they were fitted to; without any where these do not count."""
 
     context: FitContext
     windowing: Windowing
@@ -117,14 +117,40 @@ class Contest:
         return self.rivals[0]
 
 
-def contest_of(campaign: Campaign, named: Sequence[Named], say: Callable[[str], None]) -> Contest:
-    """Fit rivals to the estimation records of a campaign.
+@dataclass(frozen=True)
+class Truth:
+    """A rival that is taken for the truth, and the contest that its records leave."""
 
-    Raises
-    ------
-    SimulationError
-        If a rival cannot be simulated near the records.
-    """
+    contest: Contest
+    rival: Rival
+    weight: float  # how often it is the truth
+
+    @property
+    def index(self) -> int:
+        """Its place in the contest."""
+        return [one.label for one in self.contest.rivals].index(self.rival.label)
+
+    def drawn(self, rng: np.random.Generator) -> Truth:
+        """Return the same with drawn numbers."""
+        rival = self.rival.drawn(self.contest.context.scales, rng)
+        if self.contest.records:
+            return replace(self, rival=rival)
+        # Without earlier fits the numbers of the rig are where those of a first identification would be.
+        numbers = {p.name: rival.fit.values[p.name] for p in self.contest.context.rig.parameters}
+        rivals = [
+            replace(one, fit=replace(one.fit, values={**one.fit.values, **numbers}))
+            for one in self.contest.rivals
+        ]
+        return replace(self, rival=rival, contest=replace(self.contest, rivals=tuple(rivals)))
+
+
+def truths_of(contest: Contest) -> list[Truth]:
+    """Return each rival as the truth as often as it is probable."""
+    return [Truth(contest, rival, rival.probability) for rival in contest.rivals]
+
+
+def prepared(campaign: Campaign) -> tuple[FitContext, Windowing]:
+    """Return what rivals are fitted with, and how records are cut."""
     campaign = with_weighed_spring(campaign)
     start = start_values_of(campaign)
     drifts = campaign.drifts or not restores(campaign)
@@ -132,8 +158,25 @@ def contest_of(campaign: Campaign, named: Sequence[Named], say: Callable[[str], 
     windowing = windowing_of(campaign, floors, 1, start)[0] if drifts else Windowing()
     context = fit_context_of(campaign, floors, windowing, None, IdleThreads(1), start)
     if windowing.length is None:
-        records = liveliest(context.estimation, campaign.rig, _OLD)
+        records = liveliest(context.estimation, campaign.rig, OLD)
         context = replace(context, estimation=records, scoring=records)
+    return context, windowing
+
+
+def contest_of(
+    campaign: Campaign,
+    named: Sequence[Named],
+    say: Callable[[str], None],
+    remainder: Remainder | None = None,
+) -> Contest:
+    """Fit rivals to the estimation records of a campaign; `remainder` is what the best model leaves if these do not show it.
+
+    Raises
+    ------
+    SimulationError
+        If a rival cannot be simulated near the records.
+    """
+    context, windowing = prepared(campaign)
     alone = reidentify(context, context.start)
     fits = []
     for one in named:
@@ -144,7 +187,8 @@ def contest_of(campaign: Campaign, named: Sequence[Named], say: Callable[[str], 
         raise SimulationError(
             f"The rival '{failed}' cannot be simulated near the records; leave it out with --rivals."
         )
-    return _weighed(context, windowing, named, fits)
+    left = _remainder(context, min(fits, key=lambda fit: fit.cost)) if remainder is None else remainder
+    return _weighed(context, windowing, named, fits, left)
 
 
 def _fit(context: FitContext, one: Named, alone: FitResult) -> FitResult:
@@ -160,13 +204,16 @@ def _fit(context: FitContext, one: Named, alone: FitResult) -> FitResult:
 
 
 def _weighed(
-    context: FitContext, windowing: Windowing, named: Sequence[Named], fits: Sequence[FitResult]
+    context: FitContext,
+    windowing: Windowing,
+    named: Sequence[Named],
+    fits: Sequence[FitResult],
+    remainder: Remainder,
 ) -> Contest:
     """Return the contest, with all fits in units of what the best of them leaves."""
     given = all(one.probability is not None for one in named)
     costs = [fit.cost for fit in fits]
     first = int(np.argmax([one.probability or 0.0 for one in named]) if given else np.argmin(costs))
-    remainder = _remainder(context, fits[int(np.argmin(costs))])
     spread = [
         np.concatenate([r[n] for r in context.estimation if n in r] or [np.zeros(1)])
         for n in remainder.floors

@@ -11,7 +11,7 @@ from rigsight.errors import InputError, SimulationError
 from rigsight.plan.discrimination import predicted, worth
 from rigsight.plan.experiments import SHARES, Bench, Experiment
 from rigsight.plan.limits import Limit, use_of
-from rigsight.plan.rivals import Contest
+from rigsight.plan.rivals import Truth
 from rigsight.records import Record
 
 _CHANGED, _CHANGES = 3, 40
@@ -39,9 +39,9 @@ class Scored:
 class Search:
     """Scores experiments whose simulations of all rivals keep the limits."""
 
-    def __init__(self, contest: Contest, bench: Bench, limits: Sequence[Limit]) -> None:
-        self._contest, self._bench, self._limits = contest, bench, limits
-        self._truths = list(enumerate(contest.rivals))
+    def __init__(self, truths: Sequence[Truth], bench: Bench, limits: Sequence[Limit]) -> None:
+        self._bench, self._limits = bench, limits
+        self._truths, self._judged = truths, list(truths)
 
     def best(
         self, constants: Sequence[Mapping[str, float]], rng: np.random.Generator, say: Callable[[str], None]
@@ -66,9 +66,7 @@ class Search:
                 "the models exceed one of them even at rest, or with the smallest inputs. Give larger limits."
             )
         found.sort(key=lambda scored: -scored.worth)
-        scales = self._contest.context.scales
-        drawn = [(i, r.drawn(scales, rng)) for i, r in enumerate(self._contest.rivals) for _ in range(_DRAWN)]
-        self._truths += drawn
+        self._judged += [truth.drawn(rng) for truth in self._truths for _ in range(_DRAWN)]
         again = [self.scored(scored.experiment) for scored in found[:_AGAIN]]
         found = [scored for scored in again if scored is not None] or found
         found.sort(key=lambda scored: -scored.worth)
@@ -82,11 +80,13 @@ class Search:
         """Return an experiment with its worth; None if a model exceeds the limits or cannot be simulated."""
         record = self._bench.record(experiment)
         try:
-            readings = predicted(self._contest.best, record)
+            readings = predicted(self._truths[0].rival, record)
             if self._use(experiment) > 1.0:
                 return None
-            each = [worth(self._contest, i, predicted(truth, record)) for i, truth in self._truths]
-            weights = [truth.probability for _, truth in self._truths]
+            each = [
+                worth(truth.contest, truth.index, predicted(truth.rival, record)) for truth in self._judged
+            ]
+            weights = [truth.weight for truth in self._judged]
             # A concave mean: to decide whichever is true counts more than to decide still more surely in one case.
             return Scored(experiment, readings, float(np.sinh(np.average(np.arcsinh(each), weights=weights))))
         except SimulationError:
@@ -95,7 +95,7 @@ class Search:
     def _use(self, experiment: Experiment) -> float:
         """Return the largest share of a limit that any of the models uses."""
         record = self._bench.record(experiment)
-        return max(use_of(self._limits, predicted(rival, record)) for rival in self._contest.rivals)
+        return max(use_of(self._limits, predicted(truth.rival, record)) for truth in self._truths)
 
     def _largest(self, experiment: Experiment) -> Experiment | None:
         """Return an experiment with about the largest amplitude that keeps the limits."""

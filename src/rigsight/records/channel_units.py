@@ -16,6 +16,8 @@ from rigsight.units import INPUT_UNIT
 
 DRIVES = ("A", "V", "N", "N m")
 """What amplifiers are told, and what motors give."""
+_SI = frozenset({"", INPUT_UNIT, "m", "rad", "m/s", "rad/s", "kg", "s", "A", "V", "N", "N m", "K"})
+"""Units of which no two measure the same: pint, which takes half a second to load, need not be asked about a pair of them."""
 # Only products of units with small powers reach pint: its parser would work out 9**9**9 for as long as that takes.
 _UNIT = r"[A-Za-zµμΩ°%]+(?:(?:\^|\*\*)?-?[1-4])?"
 _PRODUCT = re.compile(rf"{_UNIT}(?:\s*[*/·.⋅ ]\s*{_UNIT}){{0,5}}")
@@ -57,6 +59,8 @@ def conversion(unit: str, si: str) -> tuple[float, float]:
 
 @cache
 def _conversion(unit: str, si: str) -> tuple[float, float]:
+    if unit != si and {unit, si} <= _SI:
+        raise UnknownUnitError(f"does not measure the same as {si}")
     from pint.errors import PintError
 
     if unit in _MISLEADING:

@@ -7,28 +7,34 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from types import MappingProxyType
 from typing import Any
 
 from rigsight.rigs.reading.rig_file import rig_of_tables, rig_of_text
 from rigsight.rigs.rig import Rig
 
 
-class BuiltInRigs(Mapping[str, Rig]):
-    """Name -> rig."""
+class KnownRigs(Mapping[str, Rig]):
+    """Name -> rig: the built-in ones, then others."""
+
+    def __init__(self, others: Mapping[str, Rig] = MappingProxyType({})) -> None:
+        self._others = others
 
     def __getitem__(self, name: str) -> Rig:
+        if name in self._others:
+            return self._others[name]
         if name not in _files():
             raise KeyError(name)
         return _rig(name)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_files())
+        return iter({**dict.fromkeys(_files()), **dict.fromkeys(self._others)})
 
     def __len__(self) -> int:
-        return len(_files())
+        return len({*_files(), *self._others})
 
 
-RIGS = BuiltInRigs()
+RIGS = KnownRigs()
 
 
 def declared_rig(name: str, declaration: Mapping[str, Any], source: str = "declaration") -> Rig | None:

@@ -17,8 +17,9 @@ from rigsight.identify.record_identification import EstimationOptions
 from rigsight.json_data import json_data
 from rigsight.plot import GroupPanel, parameters_by_group, png_bytes
 from rigsight.rigs import Rig
+from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.differing.identified import unit_of_records
+from rigsight.workflow.differing.identified import unit_of_records, with_effects_of
 from rigsight.workflow.differing.rows import FALSE_ALARMS, Row, Verdict, rows_of
 from rigsight.workflow.differing.units import Unit, read_unit, refuse_other_rigs
 from rigsight.workflow.identification.rig import identify_rig
@@ -57,11 +58,17 @@ class Difference:
     def conclusion(self) -> str:
         """What the changed numbers have in common, in a sentence or two."""
         others = ", ".join(self.other_effects)
+        alone = [unit.name for unit in self.units if unit.has_one_record]
+        scatter = (
+            f" {', '.join(alone)}: one record, so that the scatter between records is not known; what changed may only look so."
+            if alone and self.changed
+            else ""
+        )
         besides = (
             f" The models differ in {others}: numbers of the rig may differ because of that. Diagnose all with the same --effect."
             if others
             else ""
-        )
+        ) + scatter
         if not self.changed:
             return f"No number changed beyond what records of one campaign differ.{besides}"
         names = ", ".join(row.name for row in self.changed)
@@ -133,15 +140,7 @@ def run_difference(
     if out is not None:
         check_writable(Path(out), DIFFERENCE_FILE, PICTURE_FILE)
 
-    def unit(path: Path) -> Unit:
-        if not _is_campaign(path):
-            return read_unit(path, own_effects, own_rigs)
-        campaign = read_campaign(path, own_effects, own_rigs)
-        identification = identify_rig(campaign, EstimationOptions(), jobs, listener)
-        return unit_of_records(str(path), campaign, identification)
-
-    units = [unit(Path(folder)) for folder in folders]
-    refuse_other_rigs(units)
+    units = _units([Path(folder) for folder in folders], own_effects, own_rigs, jobs, listener)
     along = tuple(at) if at is not None else tuple(map(float, range(len(units))))
     found = Difference(tuple(units), along, rows_of(units, along))
     if out is not None:
@@ -150,6 +149,28 @@ def run_difference(
             files[PICTURE_FILE] = png_bytes(parameters_by_group(panels), _DPI)
         write_together(Path(out), files)
     return found
+
+
+def _units(
+    paths: Sequence[Path],
+    own_effects: Sequence[Effect],
+    own_rigs: Sequence[Rig],
+    jobs: int,
+    listener: Listener,
+) -> list[Unit]:
+    """Return what diagnoses found, and what the records of campaigns give with the same effects in all models."""
+    read = {path: read_campaign(path, own_effects, own_rigs) for path in paths if _is_campaign(path)}
+    found = {path: read_unit(path, own_effects, own_rigs) for path in paths if path not in read}
+    refuse_other_rigs({str(path): read[path].rig.name if path in read else found[path].rig for path in paths})
+    models = [(campaign.modelled, campaign.given) for campaign in read.values()]
+    for model in (read_model(path, own_effects, own_rigs) for path in found):
+        models.append((model.effects, model.values))
+    for path, campaign in read.items():
+        whole = with_effects_of(campaign, models)
+        found[path] = unit_of_records(
+            str(path), whole, identify_rig(whole, EstimationOptions(), jobs, listener)
+        )
+    return [found[path] for path in paths]
 
 
 def _is_campaign(path: Path) -> bool:

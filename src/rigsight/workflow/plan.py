@@ -1,4 +1,4 @@
-"""The work of `rigsight plan`: a campaign and its rivals -> the experiment that separates them, as a CSV to play."""
+"""The work of `rigsight plan`: a campaign or a rig, and rivals -> the experiment that separates them, as a CSV to play."""
 
 from __future__ import annotations
 
@@ -9,20 +9,30 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
+from rigsight.check import Holes, check_campaign, holes_of
+from rigsight.check.campaign_check import PARTS
 from rigsight.diagnose.policy import FAMILIES
 from rigsight.effects import AT, CATALOGUE, Effect
 from rigsight.errors import InputError
-from rigsight.plan import Named, Plan, plan_experiment, read_limits
+from rigsight.plan import Named, Plan, Sizes, plan_experiment, read_limits, read_payloads, use_of
 from rigsight.plot import planned_experiment, png_bytes, svg_text
+from rigsight.report.plan_page import render_plan
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign.in_memory import is_rig_file
+from rigsight.workflow.campaign.in_memory import campaign_of_rig, is_rig_file
 from rigsight.workflow.campaign.model_file import json_object
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.own.own_effects import effect_on
-from rigsight.workflow.run.progress import Listener, Stage, silent
-from rigsight.workflow.run.results import DIAGNOSIS_FILE, check_writable, csv_text, json_text, write_together
+from rigsight.workflow.own.own_effects import candidates_of, effect_on
+from rigsight.workflow.run.progress import Listener, Stage, report_notes, silent
+from rigsight.workflow.run.results import (
+    DIAGNOSIS_FILE,
+    check_writable,
+    csv_text,
+    json_text,
+    versions,
+    write_together,
+)
 
-PLAN_FILE, PLAN_RECORD = "plan.json", "plan.csv"
+PLAN_FILE, PLAN_PAGE, PLAN_RECORD = "plan.json", "plan.html", "plan.csv"
 PLAN_PICTURES = ("plan.svg", "plan.png")
 _MOST_RIVALS = 4
 _STEPS = 40
@@ -65,39 +75,47 @@ def run_plan(
     own_rigs: Iterable[Rig] = (),
     seed: int = 0,
     listener: Listener = silent,
+    command: str = "",
 ) -> Plan:
     """Return the experiment that separates rivals best, and write it into a folder: plan.csv, plan.json and pictures.
+
+    The rivals are those of a diagnosis, or those named; without either, effects that the check of the campaign or of a rig file
+    leaves open.
 
     Raises
     ------
     InputError
-        If the campaign, the diagnosis, a limit or a rival cannot be used, or no experiment keeps the limits.
+        If the campaign, the diagnosis, a limit or a rival cannot be used, nothing is open, or no experiment keeps the limits.
     SimulationError
         If a rival cannot be simulated near the records.
     """
     if out is not None:
-        check_writable(Path(out), PLAN_FILE, PLAN_RECORD, *PLAN_PICTURES)
-    if (diagnosis is None) == (rivals is None):
+        check_writable(Path(out), PLAN_FILE, PLAN_PAGE, PLAN_RECORD, *PLAN_PICTURES)
+    if diagnosis is not None and rivals is not None:
+        raise InputError("Give the rivals once: with --diagnosis DIR, or with --rivals NAME,NAME.")
+    before = is_rig_file(Path(campaign))
+    if before and diagnosis is not None:
         raise InputError(
-            "Give the rivals: either --diagnosis DIR, the results of 'rigsight diagnose', or --rivals NAME,NAME. "
-            "'rigsight check' lists the effects that the records do not tell apart."
+            f"{campaign} is the file of a rig: a diagnosis has rivals in the records of its campaign; name that one."
         )
-    if is_rig_file(Path(campaign)):
-        raise InputError(
-            f"{campaign} is the file of a rig. A plan needs a campaign with at least one record, which gives the rivals their "
-            "sizes. Before there is one, 'rigsight check' says of a rig file what its sensors could show."
-        )
-    read = read_campaign(campaign, own_effects, own_rigs)
-    known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
-    asked = read_limits(read.rig, limits)
-    named = (
-        _of_diagnosis(read, Path(diagnosis), known)
-        if diagnosis is not None
-        else _listed(read, rivals or "", known)
+    read = (
+        _before_records(Path(campaign), limits) if before else read_campaign(campaign, own_effects, own_rigs)
     )
-    stage = Stage("Planning", _STEPS, listener)
+    known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
+    asked, payloads = read_limits(read.rig, limits), read_payloads(read.rig, limits)
+    sizes: Sizes = "usual, no records" if before else "fitted"
     with threadpool_limits(limits=1, user_api="blas"):
-        plan = plan_experiment(read, named, asked, seconds, seed, stage.finished)
+        if diagnosis is not None:
+            named = _of_diagnosis(read, Path(diagnosis), known)
+        elif rivals is not None:
+            named = _listed(read, rivals, known)
+        else:
+            named = _of_holes(read, list(known.values()), listener)
+            sizes = sizes if before else "usual"
+        stage = Stage("Planning", _STEPS, listener)
+        plan = plan_experiment(
+            read, named, asked, seconds, seed, stage.finished, sizes=sizes, payloads=payloads
+        )
     if out is not None:
         figure = planned_experiment(plan)
         svg, png = PLAN_PICTURES
@@ -106,11 +124,51 @@ def run_plan(
             {
                 PLAN_RECORD: csv_text(plan.record, [signal.name for signal in read.rig.inputs]),
                 PLAN_FILE: json_text(plan.to_json()),
+                PLAN_PAGE: render_plan(plan, figure, command, versions(), seed),
                 svg: svg_text(figure, "plan"),
                 png: png_bytes(figure, dpi=150),
             },
         )
     return plan
+
+
+def _before_records(path: Path, limits: Sequence[str]) -> Campaign:
+    """Return a campaign of a rig file whose simulated sweep is about as large as the limits allow."""
+    plain = campaign_of_rig(path)
+    asked = read_limits(plain.rig, limits)
+    room = {limit.signal: limit.value for limit in asked if not limit.is_rate}
+    missing = [signal.name for signal in plain.rig.inputs if signal.name not in room]
+    if missing:
+        raise InputError(
+            f"{path}: without records no input has a size yet. Give the largest value of each: "
+            f"{' '.join(f'--limit {name}=VALUE' for name in missing)}."
+        )
+    largest = {signal.name: room[signal.name] for signal in plain.rig.inputs}
+    use = use_of(asked, campaign_of_rig(path, largest).estimation[0])
+    return campaign_of_rig(path, {name: value / use for name, value in largest.items()})
+
+
+def _of_holes(campaign: Campaign, effects: Sequence[Effect], listener: Listener) -> list[Named]:
+    """Return effects that the check of a campaign leaves open, and no effect where one of them does not show."""
+    candidates = candidates_of(campaign, effects)
+    found = check_campaign(campaign, candidates, Stage("Checking", len(PARTS), listener).finished)
+    if found.matrix.reason:
+        raise InputError(f"{found.matrix.reason} Name the rivals with --rivals NAME,NAME.")
+    holes = holes_of(found.matrix, _MOST_RIVALS)
+    if not holes.effects:
+        raise InputError(
+            "These records tell all effects of different families apart already. Name rivals with --rivals NAME,NAME."
+        )
+    report_notes([_note_of(holes)], listener)
+    by_name = {effect.name: effect for effect in candidates}
+    named = [Named((by_name[name],)) for name in holes.effects]
+    return [*named, Named(())] if holes.hidden else named
+
+
+def _note_of(holes: Holes) -> str:
+    others = f" Open too, to be named with --rivals: {', '.join(holes.others)}." if holes.others else ""
+    hidden = ", of which one may not show" if holes.hidden else ""
+    return f"Planned for effects that the check leaves open: {', '.join(holes.effects)}{hidden}.{others}"
 
 
 def _listed(campaign: Campaign, text: str, known: Mapping[str, Effect]) -> list[Named]:

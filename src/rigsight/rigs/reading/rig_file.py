@@ -64,7 +64,7 @@ def rig_of_text(
     return _rig_of(content, value_places(text), source, check_units)
 
 
-def rig_of_tables(tables: Mapping[str, Any], source: str) -> Rig:
+def rig_of_tables(tables: Mapping[str, Any], source: str, *, check_units: bool = True) -> Rig:
     """Return the rig that the tables of a file declare.
 
     Parameters
@@ -73,13 +73,15 @@ def rig_of_tables(tables: Mapping[str, Any], source: str) -> Rig:
         As `tomllib` returns them.
     source
         How messages call it.
+    check_units
+        Whether to check that units add up, which loads the library that knows them.
 
     Raises
     ------
     InputError
         Naming the table and key of what was wrong, and what to write instead.
     """
-    return _rig_of(tables, {}, source, check_units=True)
+    return _rig_of(tables, {}, source, check_units)
 
 
 _read: dict[str, Rig] = {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import get_args
 
 import numpy as np
@@ -267,8 +268,8 @@ def is_rig_file(path: Path) -> bool:
     return "sensors" in tables and not {"rig", "records"} & tables.keys()
 
 
-def campaign_of_rig(path: Path) -> Campaign:
-    """Return a campaign whose one record is simulated with the numbers of a rig file."""
+def campaign_of_rig(path: Path, amplitudes: Mapping[str, float] = MappingProxyType({})) -> Campaign:
+    """Return a campaign whose one record, a sweep of amplitudes or 1, is simulated with the numbers of a rig file."""
     rig = read_rig_file(path)
     numbers = {p.name: p.default for p in (*rig.constants, *rig.parameters)}
     values = {name: value for name, value in numbers.items() if value is not None}
@@ -283,11 +284,12 @@ def campaign_of_rig(path: Path) -> Campaign:
             f"{path}: the rig has no input, so nothing moves it without records. Check a campaign."
         )
     try:
-        record, low, high = _swept(rig, values)
+        record, low, high = _swept(rig, values, amplitudes)
     except SimulationError as error:
         raise InputError(f"{path}: cannot be simulated with its numbers: {error}") from None
+    sizes = ", ".join(f"{amplitudes.get(signal.name, 1.0):.3g} in {signal.name}" for signal in rig.inputs)
     note = (
-        f"There are no records: a sweep from {low:.3g} to {high:.3g} rad/s with an amplitude of 1 in each input was simulated "
+        f"There are no records: a sweep from {low:.3g} to {high:.3g} rad/s with an amplitude of {sizes} was simulated "
         f"with the numbers of {path.name}, and noise of {_RELATIVE_NOISE:.1%} was added to each reading."
     )
     return Campaign(
@@ -300,7 +302,9 @@ def campaign_of_rig(path: Path) -> Campaign:
     )
 
 
-def _swept(rig: Rig, values: dict[str, float]) -> tuple[Record, float, float]:
+def _swept(
+    rig: Rig, values: Mapping[str, float], amplitudes: Mapping[str, float]
+) -> tuple[Record, float, float]:
     """Return the simulated sweep with noise, and its first and last angular frequency [rad/s]."""
     structure = compose(rig)
     natural = np.abs(linearize(structure, values).poles)
@@ -310,7 +314,7 @@ def _swept(rig: Rig, values: dict[str, float]) -> tuple[Record, float, float]:
     dt = 2.0 * np.pi / (_PER_PERIOD * high)
     t = np.asarray(dt * np.arange(_SAMPLES), dtype=np.float64)
     inputs = {
-        signal.name: log_sweep(t, 1.0, _ASIDE**i * low, _ASIDE**i * high)
+        signal.name: log_sweep(t, amplitudes.get(signal.name, 1.0), _ASIDE**i * low, _ASIDE**i * high)
         for i, signal in enumerate(rig.inputs)
     }
     units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}

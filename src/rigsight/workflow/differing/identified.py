@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.compare.usual_gap import Prediction
 from rigsight.diagnose.trust.patterns import roles
+from rigsight.effects import Effect
 from rigsight.identify.identification import Identification
 from rigsight.simulate import compose
 from rigsight.workflow.differing.units import Known, Unit
@@ -39,6 +43,23 @@ def unit_of_records(name: str, campaign: Campaign, identification: Identificatio
         {number: identification.units[number] for number in joint.names},
         {**roles(structure.rig, []), **families},
     )
+
+
+def with_effects_of(
+    campaign: Campaign, models: Iterable[tuple[Sequence[Effect], Mapping[str, float]]]
+) -> Campaign:
+    """Return a campaign whose model has the effects of all these models, each with the values where it was first."""
+    for effects, values in models:
+        names = {effect.name for effect in campaign.modelled}
+        added = tuple(effect for effect in effects if effect.name not in names)
+        modelled = (*campaign.modelled, *added)
+        own = {p.name: values[p.name] for p in compose(campaign.rig, modelled).parameters if p.name in values}
+        campaign = (
+            replace(campaign, modelled=modelled, parameters={**own, **campaign.parameters})
+            if added
+            else campaign
+        )
+    return campaign
 
 
 def _known(name: str, identification: Identification) -> Known:

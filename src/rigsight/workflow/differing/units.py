@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -49,6 +49,11 @@ class Unit:
     units: Mapping[str, str]
     roles: Mapping[str, Role | Family]  # of each number in the equations, the family for one of an effect
 
+    @property
+    def has_one_record(self) -> bool:
+        """Whether its records do not show how far the numbers of one record differ from those of another."""
+        return max((own.n_records for own in self.numbers.values()), default=0) < 2
+
 
 class _Estimate(BaseModel):
     value: _Number
@@ -94,13 +99,13 @@ class _Diagnosis(BaseModel):
     trust: _Trust | None
 
 
-def refuse_other_rigs(units: Sequence[Unit]) -> None:
-    """Raise InputError for units of different rigs."""
-    for other in units[1:]:
-        if other.rig != units[0].rig:
+def refuse_other_rigs(rigs: Mapping[str, str]) -> None:
+    """Raise InputError if those of these names have different rigs."""
+    first, *others = rigs.items()
+    for name, rig in others:
+        if rig != first[1]:
             raise InputError(
-                f"{units[0].name} is of the rig '{units[0].rig}', {other.name} of '{other.rig}': only those of one rig can be "
-                "compared."
+                f"{first[0]} is of the rig '{first[1]}', {name} of '{rig}': only those of one rig can be compared."
             )
 
 
@@ -108,7 +113,7 @@ def read_unit(folder: Path, own_effects: Iterable[Effect], own_rigs: Iterable[Ri
     """Return what a diagnosis found, by its folder."""
     file = folder / DIAGNOSIS_FILE
     if not file.is_file():
-        raise InputError(f"{folder} contains no {DIAGNOSIS_FILE}. {_MEND}")
+        raise InputError(f"{folder} contains neither {DIAGNOSIS_FILE} nor campaign.toml. {_MEND}")
     try:
         found = _Diagnosis.model_validate(json_object(file, "diagnosis", _MEND))
     except ValidationError as error:

@@ -10,7 +10,7 @@ from types import ModuleType
 
 from rigsight.errors import InputError, RigsightError, nearest
 from rigsight.records.formats.known import file_size
-from rigsight.rigs import RIGS, Rig, read_rig_file
+from rigsight.rigs import RIGS, KnownRigs, Rig, read_rig_file
 from rigsight.simulators import give_function
 
 _WRITTEN = "--simulator expects a Python file and a function in it, for instance arm.py:accelerations."
@@ -33,8 +33,8 @@ def own_rigs(files: Iterable[str | Path]) -> dict[Path, Rig]:
 
 
 def known_rigs(own: Iterable[Rig] = ()) -> Mapping[str, Rig]:
-    """Return all rigs by name."""
-    return {**RIGS, **{rig.name: rig for rig in own}}
+    """Return all rigs by name; a built-in one is read when it is asked for."""
+    return KnownRigs({rig.name: rig for rig in own})
 
 
 def own_simulators(named: Iterable[str]) -> None:
