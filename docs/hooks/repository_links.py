@@ -27,6 +27,7 @@ MOVED = {
     "experiments/linear_recovery/README.md": "experiments/linear_recovery.md",
     "experiments/engine_accuracy/README.md": "experiments/engine_accuracy.md",
     "experiments/rounding/README.md": "experiments/rounding.md",
+    "experiments/bam/README.md": "experiments/bam.md",
     "experiments/robots/README.md": "experiments/robots.md",
     "experiments/simulators/README.md": "experiments/simulators.md",
     "experiments/sensitivities/README.md": "experiments/sensitivities.md",

@@ -8,7 +8,7 @@ import pytest
 from rigsight.effects import effect_named, placed
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
-from rigsight.rigs.reading.rig_file import rig_of_text
+from rigsight.rigs.reading.rig_file import rig_of_tables, rig_of_text
 from rigsight.simulate import compose, simulate
 
 SERVO = RIGS["servo"]
@@ -95,6 +95,20 @@ def test_without_an_excess_at_standstill_it_is_the_simpler_form(
     plain = moved(SERVO, VALUES, simpler, **own)
     assert moved(SERVO, VALUES, name, **own, s=0.0, w_s=0.1) == pytest.approx(plain, abs=1e-6)
     assert np.std(moved(SERVO, VALUES, name, **own, s=1.0, w_s=0.1) - plain) > 1e-4
+
+
+def test_a_limit_of_the_force_that_is_not_reached_leaves_the_motion_under_loaded_friction() -> None:
+    # To find out whether the friction sticks took minutes where its load is limited.
+    def motion(force: str) -> np.ndarray:
+        motor = {**SERVO.declaration["drives"]["motor"], "force": force}
+        tables = {**SERVO.declaration, "drives": {"motor": motor}, "joints": {"gearbox": {"motion": "q"}}}
+        rig = rig_of_tables(tables, "servo.toml")
+        return moved(rig, VALUES, "load_dependent_friction", T_c=0.05, mu=0.1)
+
+    free, limited = (
+        motion(force) for force in ("k_v*motor - d*d(q)", "clip(k_v*motor - d*d(q), -1e3*m, 1e3*m)")
+    )
+    assert limited == pytest.approx(free, abs=1e-6)
 
 
 def test_friction_of_motor_and_load_needs_both() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -206,11 +206,12 @@ def _frictions(
 
 
 def is_zero(expression: sp.Expr) -> bool:
-    """Return True for an expression that is zero at an arbitrary point, because simplification by sympy would take seconds."""
+    """Return True for an expression that is zero at an arbitrary point, because simplification by sympy would take seconds.
+
+    Numbers are put in first: `evalf` with `subs` refines each nested sum that cancels, and takes minutes.
+    """
     expression = _of_sympy(expression)
-    symbols = sorted(expression.free_symbols, key=str)
-    place = {symbol: sp.sqrt(sp.prime(5 + i)) / (3 + i % 7) for i, symbol in enumerate(symbols)}
-    value = expression.evalf(_DIGITS, subs=place)
+    value = _number(expression, _arbitrary_place(expression.free_symbols))
     return bool(abs(value) < _ROUNDED) if value.is_number else False
 
 
@@ -233,8 +234,7 @@ class Jumps:
         known = set().union(*(e.free_symbols for e in (*steps.values(), *still.values(), *still))) - set(
             steps
         )
-        ordered = enumerate(sorted(known, key=str))
-        self._place = {s: (sp.sqrt(sp.prime(5 + i)) / (3 + i % 7)).evalf(_DIGITS) for i, s in ordered}
+        self._place = _arbitrary_place(known)
         self._place |= {velocity: _number(value, self._place) for velocity, value in still.items()}
 
     def by(self, mode: sp.Symbol) -> list[sp.Expr]:
@@ -257,6 +257,11 @@ class Jumps:
         for symbol, part in line.parts.items():
             numbers[symbol] = _number(part, numbers)
         return [_number(result, numbers) for result in line.results]
+
+
+def _arbitrary_place(symbols: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
+    ordered = enumerate(sorted(symbols, key=str))
+    return {s: (sp.sqrt(sp.prime(5 + i)) / (3 + i % 7)).evalf(_DIGITS) for i, s in ordered}
 
 
 def _number(expression: sp.Expr, numbers: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
