@@ -26,11 +26,11 @@ from plants import Drawn, drawn  # noqa: E402
 
 from rigsight.campaign import Campaign  # noqa: E402
 from rigsight.diagnose import candidates_on, examination  # noqa: E402
-from rigsight.diagnose.fitting.fit_context import FittedModel  # noqa: E402
+from rigsight.diagnose.fit_context import FittedModel  # noqa: E402
 from rigsight.diagnose.noise.adequacy import Checks  # noqa: E402
 from rigsight.diagnose.policy import VERDICT  # noqa: E402
+from rigsight.diagnose.search.evidence_for_more import OtherForms  # noqa: E402
 from rigsight.diagnose.search.fitted_models import AllModels  # noqa: E402
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms  # noqa: E402
 from rigsight.effects import CATALOGUE  # noqa: E402
 from rigsight.rigs import RIGS, Rig  # noqa: E402
 

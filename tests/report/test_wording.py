@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from rigsight.diagnose.noise.adequacy import Remainder
 from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
-from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.effects import Family
 from rigsight.report.labels import percent
 from rigsight.report.quantities import Written, estimate_text, gap_percent, written

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES
 from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep, step

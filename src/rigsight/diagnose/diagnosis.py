@@ -10,15 +10,13 @@ import numpy as np
 
 from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.diagnose.advise import advise
+from rigsight.diagnose.bootstrap import with_own_errors
 from rigsight.diagnose.examination import Examination, examine
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, candidates_on
-from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, candidates_on
 from rigsight.diagnose.location.localize import localize
-from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
-from rigsight.diagnose.location.trace import traces_of
-from rigsight.diagnose.noise.detection import AT_REST
-from rigsight.diagnose.noise.disturbance import disturbance
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.location.trace import budget_intervals, effect_shares, traces_of
+from rigsight.diagnose.noise.adequacy import remainder_of
+from rigsight.diagnose.noise.detection import AT_REST, NoiseFloor, disturbance
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import (
     Candidate,
@@ -28,9 +26,7 @@ from rigsight.diagnose.result import (
     OutputGap,
     probability_not_tried,
 )
-from rigsight.diagnose.trust.record_numbers import record_numbers
-from rigsight.diagnose.trust.trust import trust
-from rigsight.diagnose.uncertainty.bootstrap import with_own_errors
+from rigsight.diagnose.trust.trust import record_numbers, trust
 from rigsight.diagnose.verdict.calibration import Situation, trained
 from rigsight.diagnose.verdict.families import (
     FamilyAtPlace,
@@ -40,9 +36,8 @@ from rigsight.diagnose.verdict.families import (
     shares_of_force,
     shares_of_gap,
 )
-from rigsight.diagnose.verdict.main_cause import traced_to
+from rigsight.diagnose.verdict.judgement import traced_to
 from rigsight.diagnose.verdict.ranking import Grounds, noise_vector
-from rigsight.diagnose.verdict.remainder import remainder_of
 from rigsight.diagnose.verdict.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError

@@ -11,23 +11,25 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model, with_offsets_told
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare, start_values_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, start_values_of
 from rigsight.diagnose.noise.adequacy import Adequacy
-from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.noise.detection import NoiseFloor, noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.search.evidence_for_more import beyond_disturbance, split_distinguishable, with_parts
 from rigsight.diagnose.search.fitted_models import AllModels, single_models, with_several_effects
 from rigsight.diagnose.search.horizon import preparing, restores, windowing_of
-from rigsight.diagnose.search.places import SuspectedPlace
-from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbance, with_parts
-from rigsight.diagnose.search.several.one_law import split_distinguishable
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
-from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
+from rigsight.diagnose.search.worth_fitting import SuspectedPlace
 from rigsight.diagnose.verdict.families import keys_of, probable_part
-from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
-from rigsight.diagnose.verdict.main_cause import main_cause
+from rigsight.diagnose.verdict.judgement import (
+    Judgement,
+    by_motion,
+    is_exact,
+    judge,
+    main_cause,
+    most_remainder,
+)
 from rigsight.diagnose.verdict.plausibility import (
     doubts,
     is_beyond_records,

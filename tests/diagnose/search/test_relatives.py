@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.diagnose.verdict.ranking import noise_vector, rank
 from rigsight.effects import effect_named

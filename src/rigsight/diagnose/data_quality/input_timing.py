@@ -14,7 +14,7 @@ from typing import get_args
 import numpy as np
 
 from rigsight.diagnose.data_quality.finding import Finding
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.identify import FitResult

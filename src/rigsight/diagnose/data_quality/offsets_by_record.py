@@ -13,7 +13,7 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import Finding
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets

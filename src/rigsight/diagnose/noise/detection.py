@@ -7,24 +7,108 @@ responds (white sensor noise only: a lower bound).
 The input of an element is itself measured, and its noise affects the force only while the element moves. So the noise of a force
 at rest is also taken as a lower bound. This assumption is based on dampers on a test bench, whose forces no effect explains down
 to that floor.
+
+The force that would cause what a model leaves above the noise: in addition to the drive a force w moves one mass by ``H w`` with
+``1 / H = k + w0^2 m - m W^2 + j W (d + sqrt(2) w0 m)``, w0 being the bandwidth of an observer and 0 in a free run. The residual
+above the noise, divided by H, is the spectrum of w.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import helmert
+from scipy.ndimage import uniform_filter1d
 
 from rigsight.diagnose.noise.block_means import blocks_of
-from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
 from rigsight.diagnose.policy import NOTES
 from rigsight.records.record import Record
 from rigsight.records.signals import differ_by_noise, repeated_period, roughness
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
+
+Floats = NDArray[np.float64]
+
+_SMOOTHED = 9
+"""Lines of a spectrum that are averaged."""
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A disturbance force in addition to the drive."""
+
+    std: float  # its standard deviation
+    unit: str  # of the force
+    below: float  # angular frequency up to which it stands above the sensor's noise [rad/s]
+
+
+def disturbance(
+    rig: Rig,
+    values: Mapping[str, float],
+    records: Sequence[Record],
+    remainder: Sequence[Floats],
+    noise: float,
+    bandwidth: float | None,
+) -> Disturbance | None:
+    """Return the force that would cause the residual of a model; None except for one driven mass, and where noise hides it."""
+    if not (rig.has_one_motion and rig.is_driven):
+        return None
+    motion, follows = rig.motion, bandwidth or 0.0
+    variances, highest = [], 0.0
+    for record, residual in zip(records, remainder, strict=True):
+        own = {**values, **record.constants}
+        inertia, damping, stiffness = (
+            evaluated(part, own) for part in (motion.inertia, motion.damping, motion.stiffness)
+        )
+        omega, power = _power(residual, record.dt)
+        covered = np.flatnonzero(power < NOTES.disturbance_above * noise**2)
+        stop = int(covered[0]) if covered.size else omega.size
+        omega, power = omega[:stop], power[:stop]
+        real = stiffness + follows**2 * inertia - inertia * omega**2
+        imaginary = omega * (damping + np.sqrt(2.0) * follows * inertia)
+        force = (real**2 + imaginary**2) * (power - noise**2)
+        variances.append((2.0 * float(np.sum(force)) / residual.size, residual.size))
+        highest = max(highest, float(omega[-1]) if stop else 0.0)
+    total = sum(size for _, size in variances)
+    variance = sum(single * size for single, size in variances) / total
+    return Disturbance(float(np.sqrt(variance)), rig.units["force"], highest) if variance > 0.0 else None
+
+
+def _power(residual: Floats, dt: float) -> tuple[Floats, Floats]:
+    """Return angular frequencies above zero and the smoothed power of each line; white noise has its variance at each."""
+    window = np.hanning(residual.size)
+    lines = np.abs(np.fft.rfft((residual - np.mean(residual)) * window)) ** 2 / np.sum(window**2)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(residual.size, dt)
+    return np.asarray(omega[1:]), uniform_filter1d(lines[1:], _SMOOTHED, mode="nearest")
+
+
+Stretches = tuple[tuple[NDArray[np.float64], float], ...]
+"""Pieces of noise alone, shape (n_samples,) each, with their sample time [s]."""
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Standard deviation of the error that no model can explain in an output, and how it was found.
+
+    ``lower_bound`` means that only part of the noise was seen: colored noise and disturbances may exceed it. ``interval`` are its
+    95 % limits; the upper one of a lower bound is the error of an adequate model, infinite without one. ``stretches`` are pieces
+    of noise alone with their sample time [s], where the records have any; their spectrum is that of the noise. ``disturbance`` is
+    the force that would cause the error of the diagnosed model above this noise, where the records show one.
+    """
+
+    output: str
+    unit: str
+    std: float
+    method: str
+    lower_bound: bool = False
+    interval: tuple[float, float] = (0.0, math.inf)
+    stretches: Stretches = field(default=(), compare=False, repr=False)
+    disturbance: Disturbance | None = None
+
 
 _FREE_MODES = 6
 _MAX_HANKEL_ROWS = 200

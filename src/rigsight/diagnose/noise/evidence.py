@@ -23,7 +23,7 @@ from scipy.optimize import minimize
 from scipy.signal.windows import tukey
 from scipy.special import entr
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.pushes.probes import PUSH_SIZE, push, with_probes
 from rigsight.diagnose.pushes.responses import orthonormal
 from rigsight.errors import SimulationError

@@ -20,7 +20,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect

@@ -9,25 +9,27 @@ from functools import partial
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, fit_context_of
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.horizon import fitted_in_windows, is_predictable, pairs_in_windows
 from rigsight.diagnose.search.nested_models import lowered_by_extensions, ordered_by_inclusion
-from rigsight.diagnose.search.places import Search, search_places
-from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
-from rigsight.diagnose.search.several.parts import part_of, with_causes
-from rigsight.diagnose.search.several.stepwise import (
+from rigsight.diagnose.search.one_more_effect import part_of, with_causes
+from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.diagnose.search.stepwise import (
     larger_part_closed,
     refit_singles,
     settled,
     several_effects,
 )
-from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
-from rigsight.diagnose.search.single_models import SingleModels
-from rigsight.diagnose.search.worth_fitting import WorthFitting, worth_fitting
+from rigsight.diagnose.search.worth_fitting import (
+    Search,
+    SingleModels,
+    WorthFitting,
+    search_places,
+    worth_fitting,
+)
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales

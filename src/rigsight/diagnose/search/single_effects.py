@@ -12,9 +12,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.first_look import (
     LOOK_ACCURACY,
     FirstLook,
@@ -23,8 +22,12 @@ from rigsight.diagnose.search.first_look import (
     mean_square,
     widened,
 )
-from rigsight.diagnose.search.nested_models import at_least_as_good, ordered_by_inclusion
-from rigsight.diagnose.search.same_equation import without_repeated_equations
+from rigsight.diagnose.search.nested_models import (
+    at_least_as_good,
+    in_lowest_basins,
+    ordered_by_inclusion,
+    without_repeated_equations,
+)
 from rigsight.diagnose.search.starts import restart_values
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, FitResult, off_bounds

@@ -23,16 +23,25 @@ from scipy.stats import chi2, norm
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.compare import OwnNumber, own_numbers
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import TRUST
+from rigsight.diagnose.trust.estimates import PORTION, RECORD, WINDOW_LENGTH, View, views
 from rigsight.diagnose.trust.patterns import Order, Pattern, Role, meaning, orders, roles
 from rigsight.diagnose.trust.pieces import pieces
-from rigsight.diagnose.trust.result import CorrelatedParameters, GroupValue, ParameterTrust, Trust
-from rigsight.diagnose.trust.statement import percent, statement
-from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, views
+from rigsight.diagnose.trust.statement import (
+    CorrelatedParameters,
+    GroupValue,
+    ParameterTrust,
+    Trust,
+    percent,
+    statement,
+)
 from rigsight.identify import FitResult
 from rigsight.identify.information import POORLY_KNOWN
+from rigsight.records import Hold
 from rigsight.records.record import Floats, Record
+from rigsight.simulate.model import Model
 
 _NOT_SIMULATED = "Whether the parameters hold in each record could not be tested: the model cannot be simulated in one of them."
 _NOTHING_FITTED = "No parameter was fitted, so none can differ from record to record."
@@ -331,3 +340,19 @@ def course(values: Floats, variances: Floats, along: Floats) -> Course:
         if np.ptp(best) > 0.0 and in_order and remainder < found.remainder:
             found = Course(direction, remainder)
     return found
+
+
+RecordNumbers = dict[str, tuple[OwnNumber, ...]]
+"""By the name of the record."""
+
+
+def record_numbers(context: FitContext, model: FittedModel, hold: Hold) -> RecordNumbers:
+    """Return the changes that the records ask for, one number at a time; nothing where an observer followed the motion."""
+    if any(record.observed for record in context.records):
+        return {}
+    whole = Model.of(model.fit.structure, model.fit.values, hold)
+    names = dict.fromkeys(record.origin for record in context.records)
+    return {
+        name: tuple(own_numbers(whole, [r for r in context.records if r.origin == name], context.noise))
+        for name in names
+    }

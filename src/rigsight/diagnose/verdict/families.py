@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import FAMILIES, SEARCH
 from rigsight.diagnose.verdict.plausibility import stands

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2, norm
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.policy import NOTES, VERDICT
-from rigsight.diagnose.search.basins import is_lower
+from rigsight.diagnose.search.nested_models import is_lower
 from rigsight.diagnose.search.starts import ENDLESS
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.effects import Effect, placed_dimension

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import Blocks, squared_errors
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.several.one_law import is_linear
+from rigsight.diagnose.search.evidence_for_more import is_linear
 from rigsight.effects.effect import Place
 
 
@@ -182,7 +182,7 @@ def _likened(model: FittedModel, others: Sequence[FittedModel]) -> bool:
 def _beside_a_new_force(model: FittedModel, others: Sequence[FittedModel]) -> bool:
     """Return True if a model needs an unknown constant force that another model explains.
 
-    Models whose mean force is not needed have been removed before, see `same_equation`.
+    Models whose mean force is not needed have been removed before, see `nested_models`.
     """
     return any(
         other.n_free == model.n_free

@@ -14,9 +14,9 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import DataQuality
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.predictability import growth_of_disturbances
+from rigsight.diagnose.search.horizon import growth_of_disturbances
 from rigsight.diagnose.verdict.judgement import Judgement
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.fit.windows import Windowing

@@ -10,16 +10,15 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.several import stepwise
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.parts import each_once
-from rigsight.diagnose.search.several.stepwise import Stepwise, refit_singles, several_effects
-from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search import stepwise
+from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.one_more_effect import each_once
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
-from rigsight.diagnose.search.single_models import SingleModels
-from rigsight.diagnose.search.worth_fitting import WorthFitting
+from rigsight.diagnose.search.stepwise import Stepwise, refit_singles, several_effects
+from rigsight.diagnose.search.together import Together
+from rigsight.diagnose.search.worth_fitting import SingleModels, WorthFitting
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
 from rigsight.identify import characteristic_scales

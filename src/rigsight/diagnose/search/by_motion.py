@@ -14,13 +14,11 @@ from functools import partial
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.several.one_more_effect import with_one_more
-from rigsight.diagnose.search.several.parts import each_once, part_of, reduced, with_causes
-from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search.one_more_effect import each_once, part_of, reduced, with_causes, with_one_more
 from rigsight.diagnose.search.single_effects import finished, refine
+from rigsight.diagnose.search.together import Together
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal, ProposedCause, ProposedForm
 

@@ -20,20 +20,17 @@ from functools import partial
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.basins import in_lowest_basins
+from rigsight.diagnose.search.by_motion import Ask, NamedByMotion
+from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.first_look import LOOK_ACCURACY, FirstLook
-from rigsight.diagnose.search.same_equation import without_repeated_equations
-from rigsight.diagnose.search.several.by_motion import Ask, NamedByMotion
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.one_more_effect import with_one_more
-from rigsight.diagnose.search.several.parts import each_once, part_of, reduced
-from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search.nested_models import in_lowest_basins, without_repeated_equations
+from rigsight.diagnose.search.one_more_effect import each_once, part_of, reduced, with_one_more
 from rigsight.diagnose.search.single_effects import finished, followed, refine
-from rigsight.diagnose.search.single_models import SingleModels
+from rigsight.diagnose.search.together import Together
+from rigsight.diagnose.search.worth_fitting import SingleModels
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over
 

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.signal.windows import tukey
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.pushes.probes import push
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats, Record
