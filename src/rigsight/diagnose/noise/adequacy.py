@@ -98,11 +98,9 @@ def adequacy(
     significance: float = VERDICT.significance,
     of_steady_size: bool = False,
 ) -> Adequacy:
-    """Test whether the residual of a model on all records is correlated with anything.
-
-    Fitted records are included, because their other amplitudes show a law with a slightly wrong form. Parameters that the fit
-    distorted to compensate are free in the test, so that they do not hide it.
-    """
+    """Test whether the residual of a model on all records is correlated with anything."""
+    # Fitted records are included, because their other amplitudes show a law with a slightly wrong form. Parameters that the fit
+    # distorted to compensate are free in the test, so that they do not hide it.
     records = context.records
     responses = Responses(context, records, context.on_all_records(model), model.effects, model.fit.free)
     if not responses.can_be_compared:
@@ -137,20 +135,10 @@ def adequacy(
 
 
 class Checks:
-    """Whether the residual of each model is noise and disturbance, tested once for each.
+    """Whether the residual of each model is noise and disturbance, tested once for each."""
 
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    rng
-        Source of the turned signs.
-    at_floor
-        Error, in units of the floor, that counts as the floor itself: if the equations without an effect leave more, the
-        dependence of the residual's size on the motion is tested.
-    allowed
-        Error that a model may leave before the floor is evidence against it, in the same units.
-    """
+    # If the equations without an effect leave more than `at_floor`, the dependence of the residual's size on the motion is
+    # tested. A model that leaves more than `allowed` has the floor as evidence against it. Both are in units of the floor.
 
     def __init__(
         self, context: FitContext, rng: np.random.Generator, at_floor: float, allowed: float
@@ -202,11 +190,9 @@ def _turned(
     signs: Floats,
     followed: Followed | None = None,
 ) -> _Turned | None:
-    """Return how much is explained by columns after projecting out the parameters; None if none remain.
-
-    The part of the residual absorbed by parameters and initial states is missing after signs are flipped, which would
-    underestimate chance: with `followed` each flip is normalized by its expected value.
-    """
+    """Return how much is explained by columns after projecting out the parameters; None if none remain."""
+    # The part of the residual absorbed by parameters and initial states is missing after signs are flipped, which would
+    # underestimate chance: with `followed` each flip is normalized by its expected value.
     basis = orthonormal(columns)
     if basis.shape[1] == 0:
         return None

@@ -71,10 +71,8 @@ def blocks_of(
 
 
 def squared_errors(models: Sequence[Sequence[NDArray[np.float64]]], noise: NDArray[np.float64]) -> Blocks:
-    """Return the squared residuals of models in units of the noise floor, a series per model.
-
-    The square root of a model's mean is its `error_over_noise`.
-    """
+    """Return the squared residuals of models in units of the noise floor, a series per model."""
+    # The square root of a model's mean is its `error_over_noise`.
     records = list(zip(*models, strict=True))
     counts = [np.sum(np.isfinite(of_models[0]), axis=1) for of_models in records]
     squares = [

@@ -120,11 +120,9 @@ _WHITE_ONLY = "top of the spectrum (white noise only)"
 def noise_floors(
     rig: Rig, records: Sequence[Record], drifts: bool = False, at_rest: bool = True
 ) -> tuple[NoiseFloor, ...]:
-    """Return the noise floor of every output that the records hold.
-
-    A lower bound must not decide which output counts: a filter may have taken the noise away from one of them. So lower bounds
-    have the same share of what their outputs read, the largest.
-    """
+    """Return the noise floor of every output that the records hold."""
+    # A lower bound must not decide which output counts: a filter may have taken the noise away from one of them. So lower bounds
+    # have the same share of what their outputs read, the largest.
     floors, sizes = list[NoiseFloor](), list[float]()
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]
@@ -306,10 +304,8 @@ def _quiet_stretches(
 
 
 def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int, int]:
-    """Return the first and the last sample of the part at one end, the longer, in which no input has moved by so much.
-
-    Slow motion also has small steps: a rest from which an input starts gently ends where it has moved.
-    """
+    """Return the first and the last sample of the part at one end, the longer, in which no input has moved by so much."""
+    # Slow motion also has small steps: a rest from which an input starts gently ends where it has moved.
 
     def length(ordered: NDArray[np.float64]) -> int:
         spanned = np.maximum.accumulate(ordered, axis=0) - np.minimum.accumulate(ordered, axis=0)
@@ -321,14 +317,9 @@ def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int
 
 
 def _is_free_motion(samples: NDArray[np.float64]) -> bool:
-    """Return True if a few exponentials (a ringing rig left alone) explain most of a stretch.
-
-    Ringing sustained by a disturbance changes phase and amplitude within about a period; no exponential follows it for long.
-
-    References
-    ----------
-    R. Roy and T. Kailath, IEEE Trans. ASSP 37 (1989) 984, for poles from the shift invariance of the signal subspace.
-    """
+    """Return True if a few exponentials (a ringing rig left alone) explain most of a stretch."""
+    # Ringing sustained by a disturbance changes phase and amplitude within about a period; no exponential follows it for long.
+    # R. Roy and T. Kailath, IEEE Trans. ASSP 37 (1989) 984, for poles from the shift invariance of the signal subspace.
     rows = min(samples.size // 3, _MAX_HANKEL_ROWS)
     hankel = np.lib.stride_tricks.sliding_window_view(samples - np.mean(samples), samples.size - rows + 1)
     subspace = np.linalg.eigh(hankel @ hankel.T)[1][:, -_FREE_MODES:]

@@ -50,18 +50,9 @@ def whitening_filter(parts: Sequence[Floats]) -> Floats:
 
 
 class Innovations:
-    """Responses and residuals after whitening filters for the residuals of fitted equations.
+    """Responses and residuals after whitening filters for the residuals of fitted equations."""
 
-    Parameters
-    ----------
-    answers
-        Of the equations.
-
-    Attributes
-    ----------
-    followed
-        Subspace of innovations that parameters and initial states could compensate.
-    """
+    # `followed` is the subspace of innovations that parameters and initial states could compensate.
 
     def __init__(self, responses: Responses) -> None:
         n_outputs = len(responses.context.rig.outputs)
@@ -72,10 +63,8 @@ class Innovations:
         self.followed = Followed.of(responses.spans, by_state, self.of(responses.by_parameter))
 
     def of(self, columns: Floats) -> Floats:
-        """Return the innovations of weighted and stacked readings, shape (n,) or (n, m).
-
-        Zero where a record has too few previous samples.
-        """
+        """Return the innovations of weighted and stacked readings, shape (n,) or (n, m)."""
+        # Zero where a record has too few previous samples.
         return np.concatenate([self._of_record(columns[span]) for span in self._spans])
 
     def without_free(self, columns: Floats) -> Floats:

@@ -36,15 +36,9 @@ _DETERMINED = 1e-6
 
 
 class Corrections:
-    """Difference of each joint's motion from a simulation, computed from the differences of the sensor readings.
+    """Difference of each joint's motion from a simulation, computed from the differences of the sensor readings."""
 
-    Only sensors that read a sum of coordinates are used, and only if together they determine all degrees of freedom.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    """
+    # Only sensors that read a sum of coordinates are used, and only if together they determine all degrees of freedom.
 
     def __init__(self, rig: Rig) -> None:
         mechanism = rig.mechanism
@@ -128,21 +122,11 @@ class Followed:
 
 
 class Responses:
-    """Fitted equations along records, with a push at every place.
+    """Fitted equations along records, with a push at every place."""
 
-    Parameters
-    ----------
-    context
-        Scales and noise; its memory is not used.
-    records
-        Records that were fitted or scored.
-    fit
-        The equations, fitted to these records or with only their initial states fitted.
-    effects
-        Those that the equations hold beside the modelled ones.
-    free
-        Parameters that are projected out of the response to a push.
-    """
+    # The context gives scales and noise, its memory is not used. The fit is one to these records, or one with only their initial
+    # states fitted; `effects` are those that the equations hold beside the modelled ones, `free` the parameters that are
+    # projected out of the response to a push.
 
     def __init__(
         self,
@@ -210,11 +194,9 @@ class Responses:
         return found
 
     def seen(self, place: str) -> list[Floats]:
-        """Return the signal that an effect at a place reads along each record: motion, drive signal or reading.
-
-        A joint's motion is the measured one where the sensors tell it. An observer follows that by itself, and its velocity is
-        that of the equations: between the steps of an encoder a measured one is not known.
-        """
+        """Return the signal that an effect at a place reads along each record: motion, drive signal or reading."""
+        # A joint's motion is the measured one where the sensors tell it. An observer follows that by itself, and its velocity is
+        # that of the equations: between the steps of an encoder a measured one is not known.
         if place in motion_columns(self.context.rig) and not self.structure.observed:
             return [motion[place] for motion in self.motions]
         return self.simulated(place)

@@ -134,11 +134,9 @@ class NamedByMotion:
         return list(self.context.threads.side_by_side(partial(part_of, self.context, model), kept))
 
     def _other_forms(self, model: FittedModel, replaced: Effect, part: FittedModel) -> list[FittedModel]:
-        """Return a model with other effects of the family of one at its place; the part is the model without it.
-
-        Those that the motion judges start from there; one that leaves far more of the missing force than the best form is no
-        candidate.
-        """
+        """Return a model with other effects of the family of one at its place; the part is the model without it."""
+        # Those that the motion judges start from there; one that leaves far more of the missing force than the best form is no
+        # candidate.
         key = self._key(replaced)
         if not part.residuals:
             return []

@@ -33,11 +33,9 @@ def split_distinguishable(
     allowed: float,
     is_adequate: Callable[[FittedModel], bool],
 ) -> tuple[list[FittedModel], list[FittedModel]]:
-    """Return the pairs that compete, and those that act as one law and are excluded because other laws fit equally well.
-
-    Such pairs compete only if no single effect comes near the floor and the best of them reaches it or leaves only noise and
-    disturbance: the residual of an imitation correlates with the motion.
-    """
+    """Return the pairs that compete, and those that act as one law and are excluded because other laws fit equally well."""
+    # Such pairs compete only if no single effect comes near the floor and the best of them reaches it or leaves only noise and
+    # disturbance: the residual of an imitation correlates with the motion.
     best = min((model.error_over_noise for model in singles), default=float("inf"))
     of_one_law = [pair for pair in pairs if _has_one_law(pair)]
     if not of_one_law:
@@ -130,15 +128,9 @@ def _read(effect: Effect) -> set[str]:
 
 
 class OtherForms:
-    """Part of the residual of single effects that other forms of them would explain, computed once for each.
+    """Part of the residual of single effects that other forms of them would explain, computed once for each."""
 
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    lower_bound
-        True if the noise floor is only a lower bound, so that no part of a residual can be attributed to noise beforehand.
-    """
+    # If the noise floor is only a lower bound, no part of a residual can be attributed to noise beforehand.
 
     def __init__(self, context: FitContext, lower_bound: bool) -> None:
         self._context = context
@@ -164,11 +156,9 @@ class OtherForms:
         return min(1.0, self.gain(model) / above_noise) if above_noise > 0.0 else 1.0
 
     def partners(self, single: FittedModel, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the effects that are worth trying beside a single one.
-
-        If another form of it would explain most of its residual, only effects that act as one law with it. Beside an effect with
-        memory, another law without memory is no other form: it is tried, and must explain the records.
-        """
+        """Return the effects that are worth trying beside a single one."""
+        # If another form of it would explain most of its residual, only effects that act as one law with it. Beside an effect
+        # with memory, another law without memory is no other form: it is tried, and must explain the records.
         if any(effect.states for effect in single.effects) or self.share(single) < VERDICT.larger_part:
             return list(effects)
         return [e for e in effects if are_one_law((*single.effects, e), self._context.rig)]
@@ -176,11 +166,9 @@ class OtherForms:
     def with_own_evidence(
         self, singles: Sequence[FittedModel], larger: Sequence[FittedModel]
     ) -> list[FittedModel]:
-        """Return the models without pairs whose second effect explains less than another form of the first would.
-
-        A pair that leaves only noise stands: nothing is left for another form. A third effect was compared with other forms of
-        the first two before it was tried.
-        """
+        """Return the models without pairs whose second effect explains less than another form of the first would."""
+        # A pair that leaves only noise stands: nothing is left for another form. A third effect was compared with other forms of
+        # the first two before it was tried.
         alone = {
             model.names[0]: model
             for model in singles
@@ -204,11 +192,9 @@ class OtherForms:
 def beyond_disturbance(
     evidence: Evidence, singles: Sequence[FittedModel], larger: Sequence[FittedModel]
 ) -> list[FittedModel]:
-    """Return the models that explain more than any single effect with a disturbance, and increase no part of the error.
-
-    A disturbance excites the resonances of a rig, and a second effect with its own motion can follow that in each record. If the
-    form of the first is slightly wrong, a second that excites the rig may compensate a slow error but cause a fast one.
-    """
+    """Return the models that explain more than any single effect with a disturbance, and increase no part of the error."""
+    # A disturbance excites the resonances of a rig, and a second effect with its own motion can follow that in each record. If
+    # the form of the first is slightly wrong, a second that excites the rig may compensate a slow error but cause a fast one.
     alone = [model for model in singles if model.residuals]
     if not larger or not alone:
         return list(larger)

@@ -64,11 +64,9 @@ def look_at(
     are_enough: bool = False,
     numbers: Mapping[str, float] = MappingProxyType({}),
 ) -> FirstLook:
-    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect.
-
-    `further` are more values of its own parameters, with `numbers` of the equations beside them; where they `are_enough`, its
-    declared starts are left out.
-    """
+    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect."""
+    # `further` are more values of its own parameters, with `numbers` of the equations beside them; where they `are_enough`, its
+    # declared starts are left out.
     structure = context.simplest(effects, base.structure)
     known = context.constant_forces_beside(structure.effects)
     moved = {*context.free_parameters(structure), *base.free} - {*hold, *known}

@@ -106,11 +106,9 @@ def single_models(
 def held_by_motion(
     context: FitContext, reidentified: FittedModel, proposal: Proposal
 ) -> tuple[FitContext, FittedModel]:
-    """Return the context whose fits must also hold along the measured motion, and the equations fitted so.
-
-    A simulation that tracks the sensors hardly leaves them where the mass is large, whatever force it lacks. Where the equations
-    follow the sensors to within noise nothing is missing.
-    """
+    """Return the context whose fits must also hold along the measured motion, and the equations fitted so."""
+    # A simulation that tracks the sensors hardly leaves them where the mass is large, whatever force it lacks. Where the
+    # equations follow the sensors to within noise nothing is missing.
     found, error = proposal.numbers_beside, reidentified.error_over_noise
     if found is None or error <= VERDICT.at_floor:
         return context, reidentified
@@ -121,10 +119,8 @@ def held_by_motion(
 
 
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:
-    """Return the context with scales from the motion and the forces between the sensors.
-
-    These are known once the equations fit, or from the given simulation.
-    """
+    """Return the context with scales from the motion and the forces between the sensors."""
+    # These are known once the equations fit, or from the given simulation.
     bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
     if not bent and campaign.rig.has_one_motion:
         return context

@@ -48,10 +48,9 @@ from rigsight.simulate import (
 
 
 def restores(campaign: Campaign) -> bool:
-    """Return True if records can be run free: else errors of forces or of initial states accumulate.
-
-    The spring of one mass must be stiffer than the slowest observer. No rig may be unstable near its rest, or leave its records.
-    """
+    """Return True if records can be run free: else errors of forces or of initial states accumulate."""
+    # The spring of one mass must be stiffer than the slowest observer. No rig may be unstable near its rest, or leave its
+    # records.
     if not (campaign.rig.has_one_motion and campaign.rig.is_driven):
         return longest_free_run(_poles(campaign), campaign.estimation) is None and not _is_lost(campaign)
     typical = 2.0 * np.pi / typical_period(campaign.rig, campaign.estimation)
@@ -103,12 +102,10 @@ def _poles(campaign: Campaign) -> NDArray[np.complex128]:
 def windowing_of(
     campaign: Campaign, noise: Mapping[str, float], n_jobs: int, start: Mapping[str, float]
 ) -> tuple[Windowing, dict[str, float]]:
-    """Return how records of a rig that drifts are compared with models: by an observer.
-
-    The bandwidth of the observer is as high as possible while the gap remains clear, so that errors do not accumulate longer than
-    necessary, but not so high that the tracked noise shows in the error of a true model. If no sensor reads the motion alone,
-    records are cut into windows.
-    """
+    """Return how records of a rig that drifts are compared with models: by an observer."""
+    # The bandwidth of the observer is as high as possible while the gap remains clear, so that errors do not accumulate longer
+    # than necessary, but not so high that the tracked noise shows in the error of a true model. If no sensor reads the motion
+    # alone, records are cut into windows.
     sensors, poles = followed_sensors(campaign.rig, campaign.records), _poles(campaign)
     limit = longest_free_run(poles, campaign.estimation)
     if not sensors or (limit is not None and not campaign.rig.has_one_motion):
@@ -138,10 +135,8 @@ def windowing_of(
 
 
 def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
-    """Return the error of a true model that tracks noisy sensors, by sensor, in units of the noise.
-
-    The true parameters are unknown: the larger of two values, with the given and with the fitted parameters.
-    """
+    """Return the error of a true model that tracks noisy sensors, by sensor, in units of the noise."""
+    # The true parameters are unknown: the larger of two values, with the given and with the fitted parameters.
     record, rng = context.estimation[0], np.random.default_rng(0)
     sensors = [signal.name for signal in context.rig.outputs]
     added = {
@@ -184,11 +179,9 @@ _ACCURACY = 1e-5
 def growth_of_disturbances(
     context: FitContext, reidentified: FittedModel, model: FittedModel, rng: np.random.Generator
 ) -> float:
-    """Return the effect on a model of disturbances that would change the motion of the linear equations by the noise floor.
-
-    With play and stops a small change can lead to a different motion; then even the true model has a large error on a whole
-    record, whatever its initial state.
-    """
+    """Return the effect on a model of disturbances that would change the motion of the linear equations by the noise floor."""
+    # With play and stops a small change can lead to a different motion; then even the true model has a large error on a whole
+    # record, whatever its initial state.
     rig = context.rig
     if not rig.is_driven or not rig.inputs:
         return 0.0

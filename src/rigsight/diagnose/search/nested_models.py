@@ -34,12 +34,10 @@ _SEED = 0
 
 
 def in_lowest_basins(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
-    """Return the models, the best of them in the lowest minimum that was found.
-
-    Each also starts from the parameters that it has in common with the best one, and the best one from those of the next, because
-    neither the mass of the rig nor an effect that both have depends on the others. If a model explains the records, nothing else
-    is tried.
-    """
+    """Return the models, the best of them in the lowest minimum that was found."""
+    # Each also starts from the parameters that it has in common with the best one, and the best one from those of the next,
+    # because neither the mass of the rig nor an effect that both have depends on the others. If a model explains the records,
+    # nothing else is tried.
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     ranked = sorted(usable, key=lambda model: model.error_over_noise)
     if not ranked:
@@ -58,11 +56,9 @@ def in_lowest_basins(context: FitContext, models: Sequence[FittedModel]) -> list
 
 
 def values_in(leader: FittedModel, model: FittedModel) -> dict[str, float]:
-    """Return the parameters of a model with the values that another one has for those of both.
-
-    An effect that is a special case of one of the other's has its parameters, too: a friction those of a friction that also
-    depends on the load.
-    """
+    """Return the parameters of a model with the values that another one has for those of both."""
+    # An effect that is a special case of one of the other's has its parameters, too: a friction those of a friction that also
+    # depends on the load.
     fit = model.fit
     common = carried_over(leader.fit.values, leader.fit.structure, fit.structure)
     for simple, general in itertools.product(model.effects, leader.effects):
@@ -151,10 +147,8 @@ def lowered_by_extensions(
 
 
 def at_least_as_good(context: FitContext, model: FittedModel, without: FittedModel) -> FittedModel:
-    """Return a model of one effect with a chi square that is not above that of the equations without it.
-
-    If no fit from the equations without the effect is better, the result equals them: the effect has its null value.
-    """
+    """Return a model of one effect with a chi square that is not above that of the equations without it."""
+    # If no fit from the equations without the effect is better, the result equals them: the effect has its null value.
     kept = set(without.fit.free) & set(model.fit.structure.names)
     if not _is_worse(model.fit, without.fit) or not kept <= set(model.fit.free):
         return model
@@ -263,11 +257,9 @@ def without_repeated_equations(context: FitContext, models: Sequence[FittedModel
 
 
 def _without_needless_means(context: FitContext, models: Sequence[FittedModel]) -> list[FittedModel]:
-    """Return the models without those whose mean force is not needed.
-
-    An effect with a mean force and a simpler one with a constant force obey the same equation. If the simpler one, with the same
-    other effects, leaves the constant forces at their known values, the mean force is not needed.
-    """
+    """Return the models without those whose mean force is not needed."""
+    # An effect with a mean force and a simpler one with a constant force obey the same equation. If the simpler one, with the
+    # same other effects, leaves the constant forces at their known values, the mean force is not needed.
     fits = {frozenset(model.names): model.fit for model in models}
 
     def is_needed(model: FittedModel) -> bool:
@@ -306,10 +298,8 @@ def _moves_of(fit: FitResult, known: Mapping[str, float]) -> dict[str, float]:
 
 
 def _without_late_shifts(models: Sequence[FittedModel]) -> list[FittedModel]:
-    """Return the models without late time shifts if the same model with a sensor delay instead is among them.
-
-    A late time base and a sensor delay obey the same equation; only an early reading is certainly a time shift.
-    """
+    """Return the models without late time shifts if the same model with a sensor delay instead is among them."""
+    # A late time base and a sensor delay obey the same equation; only an early reading is certainly a time shift.
     with_late_sensor = {
         _but(model, effect) for model in models for effect in model.effects if _is_late(effect)
     }

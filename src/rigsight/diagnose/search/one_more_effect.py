@@ -90,11 +90,9 @@ def with_one_more(
     enough: float = float("inf"),
     replaced: tuple[Effect, FitResult] | None = None,
 ) -> list[FittedModel]:
-    """Return a model with each effect added that lowers its cost clearly, fitted and scored.
-
-    `replaced` is an effect that was left out of the model, with the fit in which it was: its simpler and more general forms are
-    fitted whatever the screening says, the general ones from there.
-    """
+    """Return a model with each effect added that lowers its cost clearly, fitted and scored."""
+    # `replaced` is an effect that was left out of the model, with the fit in which it was: its simpler and more general forms are
+    # fitted whatever the screening says, the general ones from there.
     context = context.looking_at_residual(parent.fit)
     open_ones = [
         effect

@@ -47,10 +47,9 @@ class Stepwise:
     prepare: Prepare | None  # compiles structures that are about to be fitted side by side
 
     def found(self, at_floor: float, checks: Checks | None) -> list[FittedModel]:
-        """Return the models of several effects that compete, and their parts, best first.
-
-        `at_floor` is the error at which nothing remains to explain; a model near it is also asked whether its residual is noise.
-        """
+        """Return the models of several effects that compete, and their parts, best first."""
+        # `at_floor` is the error at which nothing remains to explain; a model near it is also asked whether its residual is
+        # noise.
         before, competing = self.singles[0].error_over_noise, list[FittedModel]()
         parts: list[FittedModel] = []
         for size in range(2, SEARCH.most_effects + 1):
@@ -104,11 +103,9 @@ class Stepwise:
         )
 
     def _parents(self) -> list[FittedModel]:
-        """Return the single effects to which a second one is added: the plainest of those near the best, and unlike ones.
-
-        Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as many,
-        the one that the catalogue has first is the plainer.
-        """
+        """Return the single effects to which a second one is added: the plainest of those near the best, and unlike ones."""
+        # Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as
+        # many, the one that the catalogue has first is the plainer.
         nearest = self.singles[0].error_over_noise
         close = [model for model in self.singles if model.error_over_noise <= SEARCH.beam * nearest]
         best = min(close, key=lambda model: (model.n_free, model.error_over_noise))
@@ -124,10 +121,8 @@ class Stepwise:
         return min(tied, key=lambda model: (model.n_free, order.get(model.names[0], len(order))))
 
     def exchanged(self, found: Sequence[FittedModel]) -> list[FittedModel]:
-        """Return the models with those in which another effect stands for one of the best.
-
-        One found beside an incomplete model may only be similar to the right one, or more general than needed.
-        """
+        """Return the models with those in which another effect stands for one of the best."""
+        # One found beside an incomplete model may only be similar to the right one, or more general than needed.
         known = list(found)
         replaced: FittedModel | None = None
         for _ in range(SEARCH.most_swaps):
@@ -194,12 +189,10 @@ def several_effects(
     lower_bound: bool,
     prepare: Prepare | None,
 ) -> list[FittedModel]:
-    """Return models of several effects if a single effect does not explain everything.
-
-    `ask` says what the motion shows of the force that a model leaves.
-    Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
-    bound. Where errors of laws are larger than noise, a residual of the size of the error of one law asks for no second one.
-    """
+    """Return models of several effects if a single effect does not explain everything."""
+    # `ask` says what the motion shows of the force that a model leaves. Above a lower bound of the floor the residual of a single
+    # effect may be noise: the checks decide, and a pair must reach that bound. Where errors of laws are larger than noise, a
+    # residual of the size of the error of one law asks for no second one.
     context, reidentified, worth = models.context, models.reidentified, models.worth
     usable = sorted(
         (model for model in models.singles if model.residuals and np.isfinite(model.error_over_noise)),
@@ -247,10 +240,8 @@ def settled(reidentified: FittedModel) -> float:
 
 
 def tied_at_the_floor(reidentified: FittedModel) -> float:
-    """Return the error of a single effect that ties in the ranking with any pair, in units of the noise floor.
-
-    What remains is too small a part of the gap to tell a second cause from a disturbance, and the single effect is plainer.
-    """
+    """Return the error of a single effect that ties in the ranking with any pair, in units of the noise floor."""
+    # What remains is too small a part of the gap to tell a second cause from a disturbance, and the single effect is plainer.
     return 1.0 + VERDICT.inexact * reidentified.error_over_noise
 
 
@@ -277,10 +268,8 @@ def larger_first(models: Sequence[FittedModel], singles: Sequence[FittedModel]) 
 def refit_singles(
     context: FitContext, singles: Sequence[FittedModel], larger: Sequence[FittedModel]
 ) -> list[FittedModel]:
-    """Return the singles, refitted where they are better from their values in a larger model than from their own starts.
-
-    A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
-    """
+    """Return the singles, refitted where they are better from their values in a larger model than from their own starts."""
+    # A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
     better = {model.names: model for model in singles}
     for model in sorted(larger, key=lambda model: model.error_over_noise)[: SEARCH.most_refitted]:
         for effect in model.effects:

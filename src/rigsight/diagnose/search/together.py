@@ -136,19 +136,9 @@ class _Columns:
 
 
 class Together:
-    """Sets of effects, screened against the equations without an effect.
+    """Sets of effects, screened against the equations without an effect."""
 
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    reidentified
-        The equations without an effect.
-    effects
-        Candidates. Those whose frequency or wave number the screening does not know are left out.
-    prepare
-        Called with the structures that are about to be looked at, to compile them side by side.
-    """
+    # Candidates whose frequency or wave number the screening does not know are left out.
 
     def __init__(
         self,
@@ -164,10 +154,8 @@ class Together:
         self._sets: dict[int, list[EffectSet]] = {}
 
     def fitted(self, size: int, least_share: float = 0.0) -> list[FittedModel]:
-        """Return models of so many effects that explain most together in the screening, fitted and scored.
-
-        None where they explain less than this share of what one effect less leaves above the noise.
-        """
+        """Return models of so many effects that explain most together in the screening, fitted and scored."""
+        # None where they explain less than this share of what one effect less leaves above the noise.
         context = self._context
         found: dict[frozenset[str], list[EffectSet]] = {}
         larger = self._best_sets(size)

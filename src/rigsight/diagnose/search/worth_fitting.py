@@ -119,11 +119,9 @@ class WorthFitting:
 
 
 def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]) -> WorthFitting:
-    """Return the effects of families that the proposal took or that explain nearly as much, and those that it does not judge.
-
-    These may be the main cause; a weaker one beside it is searched for among all. All of them where no family alone explains
-    enough to exclude others.
-    """
+    """Return the effects of families that the proposal took or that explain nearly as much, and those that it does not judge."""
+    # These may be the main cause; a weaker one beside it is searched for among all. All of them where no family alone explains
+    # enough to exclude others.
     if proposal is None or not proposal.alone:
         return WorthFitting(tuple(effects))
     everything = WorthFitting(tuple(effects), starts=proposal.starts)
@@ -149,10 +147,8 @@ def worth_fitting(rig: Rig, proposal: Proposal | None, effects: Sequence[Effect]
 
 
 def _needless_refinements(effects: Sequence[Effect], starts: Mapping[str, ProposedStart]) -> set[str]:
-    """Return the names of forms of forms, such as LuGre friction, that leave hardly less along the motion than simpler ones.
-
-    A form of another family is another cause: a loop is fitted beside the presliding friction that it contains.
-    """
+    """Return the names of forms of forms, such as LuGre friction, that leave hardly less along the motion than simpler ones."""
+    # A form of another family is another cause: a loop is fitted beside the presliding friction that it contains.
     families = {effect.name: effect.family for effect in effects}
     parents = {
         effect.name: [

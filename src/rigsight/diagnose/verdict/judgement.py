@@ -80,10 +80,8 @@ def _share_of_gap(gap: float, remainder: float) -> float:
 
 
 def traced_to(rig: Rig, forces: Sequence[MissingForce]) -> tuple[str, ...]:
-    """Return the only joint at which a missing force explains the larger part, with the drives that act along its motion.
-
-    Empty where no joint does, or several of them leave about as much.
-    """
+    """Return the only joint at which a missing force explains the larger part, with the drives that act along its motion."""
+    # Empty where no joint does, or several of them leave about as much.
     least = min((1.0 - force.share for force in forces), default=1.0)
     agreeing = [force for force in forces if 1.0 - force.share <= VERDICT.comparable**2 * least]
     if len(forces) < 2 or len(agreeing) != 1 or agreeing[0].share < VERDICT.larger_part:
@@ -212,10 +210,8 @@ def by_motion(
     noise: NDArray[np.float64],
     proposal: Proposal | None,
 ) -> Judgement:
-    """Return the judgement with the most probable family, where it is another one.
-
-    It is more probable than not, or explains the larger part of the missing force.
-    """
+    """Return the judgement with the most probable family, where it is another one."""
+    # It is more probable than not, or explains the larger part of the missing force.
     if proposal is None:
         return judgement
     shares = [grounds.share for grounds in ranking.grounds]

@@ -67,13 +67,11 @@ def doubts(model: FittedModel, reidentified: FittedModel) -> tuple[Doubt, ...]:
 
 
 def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
-    """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named.
-
-    It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
-    of that, tested together by Wald's chi square. Where these are determined only with others, the former decides alone; so it
-    does for an effect without a state of its own that removes the larger part of the squared error of records that it was not
-    fitted to (a hidden state could do so from a free start).
-    """
+    """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named."""
+    # It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
+    # of that, tested together by Wald's chi square. Where these are determined only with others, the former decides alone; so it
+    # does for an effect without a state of its own that removes the larger part of the squared error of records that it was not
+    # fitted to (a hidden state could do so from a free start).
     models = {frozenset(other.names): other for other in others}
 
     def is_zero(effect: Effect) -> bool:
@@ -97,11 +95,9 @@ def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[Fitte
 
 
 def is_beyond_records(model: FittedModel, scales: Mapping[str, float], duration: float) -> bool:
-    """Return True if an effect is slower, longer or coarser than the records can show: it is another spring.
-
-    Its wave is longer than the motion, a time constant or a period longer than every record [s], or the length over which it
-    yields beyond its search.
-    """
+    """Return True if an effect is slower, longer or coarser than the records can show: it is another spring."""
+    # Its wave is longer than the motion, a time constant or a period longer than every record [s], or the length over which it
+    # yields beyond its search.
     fit = model.fit
 
     def is_too_long(effect: Effect, parameter: Parameter) -> bool:

@@ -50,16 +50,11 @@ def rank(
     criterion: Callable[[FittedModel], float] | None = None,
     evidence_counts: bool = True,
 ) -> Ranking:
-    """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen.
-
-    Held-out errors are what an engineer sees, but they say little if noise or a disturbance force dominates the error of every
-    model. Then the spectrum of the residual says more.
-
-    References
-    ----------
-    H. R. Kuensch, Ann. Statist. 17 (1989) 1217, for the block bootstrap. B. Efron and R. Tibshirani, J. Am. Stat. Assoc. 92
-    (1997) 548, for errors on what was not drawn.
-    """
+    """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen."""
+    # Held-out errors are what an engineer sees, but they say little if noise or a disturbance force dominates the error of every
+    # model. Then the spectrum of the residual says more.
+    # H. R. Kuensch, Ann. Statist. 17 (1989) 1217, for the block bootstrap. B. Efron and R. Tibshirani, J. Am. Stat. Assoc. 92
+    # (1997) 548, for errors on what was not drawn.
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     failed = [m for m in models if m not in usable]
     if not usable:
@@ -180,10 +175,8 @@ def _likened(model: FittedModel, others: Sequence[FittedModel]) -> bool:
 
 
 def _beside_a_new_force(model: FittedModel, others: Sequence[FittedModel]) -> bool:
-    """Return True if a model needs an unknown constant force that another model explains.
-
-    Models whose mean force is not needed have been removed before, see `nested_models`.
-    """
+    """Return True if a model needs an unknown constant force that another model explains."""
+    # Models whose mean force is not needed have been removed before, see `nested_models`.
     return any(
         other.n_free == model.n_free
         and len(other.effects) == len(model.effects)
