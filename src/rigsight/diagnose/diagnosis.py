@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,7 +38,7 @@ from rigsight.diagnose.verdict.families import (
 )
 from rigsight.diagnose.verdict.judgement import traced_to
 from rigsight.diagnose.verdict.ranking import Grounds, noise_vector
-from rigsight.diagnose.verdict.verdict_notes import Basis, verdict_notes
+from rigsight.diagnose.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.identify import FitMemory
@@ -136,11 +136,10 @@ def _assembled(
         name: noise[name].std / spread if (spread := float(np.std(values))) > 0.0 else math.inf
         for name, values in measured.items()
     }
+    errors = [_errors(rig, model.residuals, measured) for model in (before, reidentified, after)]
     gap = {
         name: OutputGap(
-            before=nrmse(_column(rig, before, name), measured[name]),
-            reidentified=nrmse(_column(rig, reidentified, name), measured[name]),
-            after=nrmse(_column(rig, after, name), measured[name]),
+            *(of_stage[name] for of_stage in errors),
             noise_floor=at_floor[name],
             intervals=budget_intervals(scored, name, at_floor[name], rng),
         )
@@ -185,7 +184,9 @@ def _assembled(
         where = _evidence(found)
     remainder = None
     if found.adequacy is not None and found.adequacy.adequate:
-        floors = tuple(_up_to(floor, _column(rig, judgement.model, floor.output)) for floor in floors)
+        floors = tuple(
+            _up_to(floor, _column(rig, judgement.model.residuals, floor.output)) for floor in floors
+        )
     if found.adequacy is not None:
         lower_bound = any(floor.lower_bound for floor in floors)
         remainder = remainder_of(reidentified, judgement.model, found.adequacy, lower_bound, is_effect)
@@ -338,10 +339,18 @@ def _evidence(found: Examination) -> tuple[str, ...]:
     return tuple(dict.fromkeys(rig.where(effect) for effect in found.judgement.model.effects))
 
 
-def _column(rig: Rig, model: FittedModel, output: str) -> Floats:
+def _column(rig: Rig, residuals: Sequence[Floats], output: str) -> Floats:
     index = [signal.name for signal in rig.outputs].index(output)
-    column = np.concatenate([residual[:, index] for residual in model.residuals])
+    column = np.concatenate([residual[:, index] for residual in residuals])
     return np.asarray(column[np.isfinite(column)])
+
+
+def _errors(rig: Rig, residuals: Sequence[Floats], measured: Mapping[str, Floats]) -> dict[str, float]:
+    """Return the NRMSE of each output; infinite for a model that could not be simulated."""
+    return {
+        name: nrmse(_column(rig, residuals, name), values) if residuals else math.inf
+        for name, values in measured.items()
+    }
 
 
 def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, Floats]:
@@ -353,23 +362,13 @@ def _candidate(
     context: FitContext, model: FittedModel, probability: float, grounds: Grounds | None = None
 ) -> Candidate:
     units = {p.name: p.unit for p in model.fit.structure.parameters}
-    measured = _measured(context.rig, context.scoring)
-    fitted = _measured(context.rig, context.estimation)
-    estimation = FittedModel(model.effects, model.fit, model.fit, 0.0)
+    rig = context.rig
     return Candidate(
         effects=model.names,
-        where=tuple(context.rig.where(effect) for effect in model.effects),
+        where=tuple(rig.where(effect) for effect in model.effects),
         probability=probability,
-        validation_nrmse={
-            name: nrmse(_column(context.rig, model, name), values) if model.residuals else float("inf")
-            for name, values in measured.items()
-        },
-        estimation_nrmse={
-            name: nrmse(_column(context.rig, estimation, name), values)
-            if model.fit.residuals
-            else float("inf")
-            for name, values in fitted.items()
-        },
+        validation_nrmse=_errors(rig, model.residuals, _measured(rig, context.scoring)),
+        estimation_nrmse=_errors(rig, model.fit.residuals, _measured(rig, context.estimation)),
         error_over_noise=model.error_over_noise,
         parameters={
             name: Estimate(model.fit.values[name], model.fit.standard_errors[name], units[name])
