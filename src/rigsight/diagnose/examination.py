@@ -18,7 +18,7 @@ from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.evidence_for_more import beyond_disturbance, split_distinguishable, with_parts
 from rigsight.diagnose.search.fitted_models import AllModels, single_models, with_several_effects
-from rigsight.diagnose.search.horizon import preparing, restores, windowing_of
+from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.search.worth_fitting import SuspectedPlace
 from rigsight.diagnose.verdict.families import keys_of, probable_part
@@ -88,8 +88,7 @@ def examine(
     say("noise floor")
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
-    ready = preparing(prepare, windowing.cut(campaign.records))
-    alone = single_models(campaign, noise, effects, windowing, start, n_jobs, say, ready, memory)
+    alone = single_models(campaign, noise, effects, windowing, start, n_jobs, say, prepare, memory)
     quality = data_quality(alone.context, campaign.records, alone.reidentified)
     allowed = VERDICT.at_lower_bound if lower_bound else most_remainder(alone.reidentified.error_over_noise)
     asked = (
@@ -100,7 +99,7 @@ def examine(
         freed = with_offsets_free(campaign)
         again = examine(freed, effects, rng, n_jobs, say, prepare, memory, at_rest)
         return replace(again, quality=replace(again.quality, findings=(asked, *again.quality.findings)))
-    models = with_several_effects(campaign, noise, alone, lower_bound, allowed, rng, say, ready)
+    models = with_several_effects(campaign, noise, alone, lower_bound, allowed, rng, say)
     context, before, reidentified = models.alone.context, models.alone.before, models.alone.reidentified
     checks = models.checks
     vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)

@@ -39,6 +39,9 @@ from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, joint_of
 from rigsight.simulate import Structure, compose, special_values, structure_of_fit
 
+Prepare = Callable[[Sequence[Structure]], None]
+"""Called with the structures that are about to be simulated, to compile them side by side."""
+
 _ROUGH_ACCURACY = 1e-3
 _FINE_TOLERANCE = 1e-7
 
@@ -98,6 +101,7 @@ class FitContext:
     # Effects already in the given simulation; every candidate is added to them.
     modelled: tuple[Effect, ...] = ()
     memory: FitMemory | None = None  # where the outcomes of fits are kept
+    compiler: Prepare | None = None  # compiles side by side what is about to be fitted
     threads: IdleThreads = field(default_factory=IdleThreads)  # threads that help with the records of a fit
     # Where simulations track the sensors and the motion shows the forces: fits must hold along the motion, too.
     along_motion: NumbersBeside | None = None
@@ -108,11 +112,10 @@ class FitContext:
         """All records, each once."""
         return self.estimation if self.scoring == self.estimation else (*self.estimation, *self.scoring)
 
-    @cached_property
-    def driven(self) -> tuple[Record, ...]:
-        """The records to fit in which an input moves; in the others the rig moves freely."""
-        names = [signal.name for signal in self.rig.inputs]
-        return tuple(r for r in self.estimation if any(not is_constant(r[name]) for name in names))
+    def prepare(self, structures: Iterable[Structure]) -> None:
+        """Compile structures side by side that are about to be fitted."""
+        if self.compiler is not None:
+            self.compiler([structure_of_fit(s, (*self.estimation, *self.scoring)) for s in structures])
 
     @property
     def period(self) -> float:
@@ -323,10 +326,6 @@ def _places(rig: Rig, effect: Effect) -> tuple[str, ...]:
     return tuple({motions[place]: place for place in reversed(places)}.values())[::-1]
 
 
-Prepare = Callable[[Sequence[Structure]], None]
-"""Called with the structures that are about to be simulated, to compile them side by side."""
-
-
 def fit_context_of(
     campaign: Campaign,
     noise: Mapping[str, float],
@@ -334,11 +333,15 @@ def fit_context_of(
     memory: FitMemory | None,
     threads: IdleThreads,
     start: Mapping[str, float],
+    compiler: Prepare | None = None,
 ) -> FitContext:
     """Return the context in which candidates of a campaign are fitted and scored."""
     fitted = windowing.cut(campaign.estimation)
-    moving = until_rest(fitted, campaign.rig)
-    held = _held(campaign)
+    held = frozenset(_set_aside(campaign))
+    if campaign.rig.has_one_motion and not all(
+        any(symbol.name in record for record in campaign.estimation) for symbol in campaign.rig.downstream
+    ):
+        held |= campaign.rig.downstream_parameters  # these records do not determine them
     asked = [p.name for p in campaign.rig.parameters if p.name not in held]
     scales = characteristic_scales(campaign.rig, campaign.estimation, start)
     held |= frozenset(
@@ -347,7 +350,7 @@ def fit_context_of(
     return FitContext(
         rig=campaign.rig,
         estimation=fitted,
-        look=liveliest(moving, campaign.rig, HORIZON.examined),
+        look=liveliest(until_rest(fitted, campaign.rig), campaign.rig, HORIZON.examined),
         scoring=windowing.cut(campaign.validation or campaign.estimation),
         scales=scales,
         noise=noise,
@@ -356,6 +359,7 @@ def fit_context_of(
         given=campaign.given,
         modelled=campaign.modelled,
         memory=memory,
+        compiler=compiler,
         threads=threads,
     )
 
@@ -378,16 +382,6 @@ def start_values_of(campaign: Campaign) -> dict[str, float]:
     # Numbers fitted without the effects that the simulation has are farther off than those it came with.
     sure = campaign.given if campaign.modelled or rig.mechanism.bodies_are_nonlinear else {}
     return {**campaign.constants, **regressed, **sure}
-
-
-def _held(campaign: Campaign) -> frozenset[str]:
-    """Return rig parameters that these records do not determine, and the stiffness of an absent spring."""
-    held = frozenset(_set_aside(campaign))
-    if campaign.rig.has_one_motion and not all(
-        any(symbol.name in record for record in campaign.estimation) for symbol in campaign.rig.downstream
-    ):
-        return held | campaign.rig.downstream_parameters
-    return held
 
 
 def _set_aside(campaign: Campaign) -> dict[str, float]:

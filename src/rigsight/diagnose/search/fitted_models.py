@@ -63,7 +63,7 @@ def single_models(
     memory: FitMemory | None,
 ) -> SingleModels:
     """Fit and score the given simulation, its equations and every candidate."""
-    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs), start)
+    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs), start, prepare)
     reidentified = reidentify(context, context.start)
     if not reidentified.residuals:
         raise SimulationError(
@@ -88,7 +88,7 @@ def single_models(
     if worth.is_shown and proposal is not None and len(proposal.taken) > 1:
         together = with_causes(context, reidentified, proposal.taken, proposal)
         say("causes that the motion names")
-    search, singles = _singles(context, reidentified, worth, together, say, prepare)
+    search, singles = _singles(context, reidentified, worth, together, say)
     lowered = lowered_by_extensions(context, reidentified, singles)
     if lowered.fit.cost <= (1.0 - SEARCH.worth_restarting) * reidentified.fit.cost:
         # What was compared with a local minimum of the equations was compared with a gap that does not exist.
@@ -134,7 +134,6 @@ def _singles(
     worth: WorthFitting,
     together: FittedModel | None,
     say: Callable[[str], None],
-    prepare: Prepare | None,
 ) -> tuple[Search, list[FittedModel]]:
     """Return where was searched, and every effect by itself."""
     search = search_places(context, reidentified, context.offered(worth.alone))
@@ -144,8 +143,7 @@ def _singles(
     least = VERDICT.larger_part if leaves_nothing else VERDICT.larger_part * search.most
     first = [e for e in context.offered(worth.alone) if _comes_first(e, search, worth, least)]
     others = [effect for effect in (*search.effects, *search.others) if effect not in first]
-    if prepare is not None:
-        prepare([context.simplest((effect,)) for effect in first])
+    context.prepare(context.simplest((effect,)) for effect in first)
     reached = together if leaves_nothing else None
     singles = fit_candidates(context, reidentified, first, say, (), worth.starts, worth.is_shown, reached)
     best = min((model.error_over_noise for model in singles), default=np.inf)
@@ -155,8 +153,7 @@ def _singles(
         enough = np.inf if worth.explained >= VERDICT.larger_part else larger_part_closed(reidentified)
     if others and best > enough:
         # A right model must not be lost because places or effects were ranked wrongly.
-        if prepare is not None:
-            prepare([context.simplest((effect,)) for effect in others])
+        context.prepare(context.simplest((effect,)) for effect in others)
         singles = fit_candidates(context, reidentified, others, say, singles, worth.starts, worth.is_shown)
     return search, singles
 
@@ -177,7 +174,6 @@ def with_several_effects(
     allowed: float,
     rng: np.random.Generator,
     say: Callable[[str], None],
-    prepare: Prepare | None,
 ) -> AllModels:
     """Fit and score several effects together where one does not explain the records; in windows where only these can decide."""
     context, whole = models.context, models.windowing.whole
@@ -196,7 +192,7 @@ def with_several_effects(
         beside = replace(campaign, modelled=(*campaign.modelled, *model.effects))
         return propose(beside, {**campaign.constants, **model.fit.all_values}, models.effects, noise)
 
-    found = several_effects(models, ask, forms, checks, lower_bound, prepare)
+    found = several_effects(models, ask, forms, checks, lower_bound)
     for model in found[:1]:
         # The parts of a set compete with it, and tell the share of each.
         known = {single.names for single in models.singles}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, fit_context_of, start_values_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, fit_context_of, start_values_of
 from rigsight.diagnose.policy import HORIZON, SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import started_from
 from rigsight.diagnose.search.single_effects import reidentify
@@ -43,7 +43,6 @@ from rigsight.simulate import (
     record_input,
     record_values,
     simulate_outputs,
-    structure_of_fit,
 )
 
 
@@ -164,13 +163,6 @@ def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
 
     fitted, given = remainder(fit.values), remainder({**fit.values, **context.given})
     return {name: max(fitted[name], given[name]) for name in added}
-
-
-def preparing(prepare: Prepare | None, records: Sequence[Record]) -> Prepare | None:
-    """Return how structures are compiled that are fitted to records: with their free offsets and observers."""
-    if prepare is None:
-        return None
-    return lambda structures: prepare([structure_of_fit(structure, records) for structure in structures])
 
 
 _ACCURACY = 1e-5

@@ -13,7 +13,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from types import MappingProxyType
 
-from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
 from rigsight.diagnose.search.screening import structures_of_shortlist
@@ -85,7 +85,6 @@ def with_one_more(
     effects: Sequence[Effect],
     known: Sequence[FittedModel],
     singles: Sequence[FittedModel],
-    prepare: Prepare | None = None,
     least_share: float = 0.0,
     enough: float = float("inf"),
     replaced: tuple[Effect, FitResult] | None = None,
@@ -99,21 +98,20 @@ def with_one_more(
         for effect in context.offered(effects)
         if effect not in parent.effects and not is_among(known, {*parent.names, effect.name})
     ]
-    if prepare is not None:
-        prepare(structures_of_shortlist(context.rig, open_ones, (*context.modelled, *parent.effects)))
+    context.prepare(structures_of_shortlist(context.rig, open_ones, (*context.modelled, *parent.effects)))
     search = search_places(context, parent, open_ones)
     if search.most < least_share * _above_noise(parent.fit) / parent.fit.cost:
         # The screening says nothing about effects that no push represents, such as periodic ones.
         unscreened = [effect for effect in search.effects if effect.name not in search.shares]
-        return _fitted_beside(context, parent, unscreened, search.starts, singles, prepare)
+        return _fitted_beside(context, parent, unscreened, search.starts, singles)
     forms = [] if replaced is None else [e for e in search.others if _is_form_of(e, replaced[0])]
     parents = {} if replaced is None else {replaced[0].name: replaced[1]}
     chosen = [*search.effects, *forms]
-    found = _fitted_beside(context, parent, chosen, search.starts, singles, prepare, parents)
+    found = _fitted_beside(context, parent, chosen, search.starts, singles, parents)
     movable = [effect for effect in search.others if _has_a_shape(effect)]
     if movable and min((model.error_over_noise for model in found), default=float("inf")) > enough:
         # A push cannot move from its start: a resonance far from it explains little until it is fitted.
-        found += _fitted_beside(context, parent, movable, search.starts, singles, prepare)
+        found += _fitted_beside(context, parent, movable, search.starts, singles)
     return found
 
 
@@ -128,13 +126,10 @@ def _fitted_beside(
     effects: Sequence[Effect],
     starts: Mapping[str, Mapping[str, float]],
     singles: Sequence[FittedModel],
-    prepare: Prepare | None,
     parents: Mapping[str, FitResult] = MappingProxyType({}),
 ) -> list[FittedModel]:
     base = parent.fit
-    if prepare is not None:
-        prepare([context.simplest((*parent.effects, effect), base.structure) for effect in effects])
-
+    context.prepare(context.simplest((*parent.effects, effect), base.structure) for effect in effects)
     alone = {model.names[0]: model.fit for model in singles}
 
     def steps(effect: Effect) -> tuple[int, ...]:

@@ -20,7 +20,7 @@ from functools import partial
 
 import numpy as np
 
-from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.by_motion import Ask, NamedByMotion
@@ -44,7 +44,6 @@ class Stepwise:
     effects: Sequence[Effect]  # candidates for a further cause
     forms: OtherForms  # how much another form of an effect would explain
     together: Together  # sets of effects that explain the residual of the equations
-    prepare: Prepare | None  # compiles structures that are about to be fitted side by side
 
     def found(self, at_floor: float, checks: Checks | None) -> list[FittedModel]:
         """Return the models of several effects that compete, and their parts, best first."""
@@ -94,13 +93,11 @@ class Stepwise:
     ) -> list[FittedModel]:
         if len(parent.effects) > 1:
             least = max(VERDICT.larger_part, self.forms.share(parent))
-            return with_one_more(self.context, parent, self.effects, known, self.singles, self.prepare, least)
+            return with_one_more(self.context, parent, self.effects, known, self.singles, least)
         # Pairs fitted from where the screening puts them may have ended in another minimum: others start from a single effect.
         settled = [pair for pair in known if pair.error_over_noise <= VERDICT.exact]
         partners = self.forms.partners(parent, self.effects)
-        return with_one_more(
-            self.context, parent, partners, settled, self.singles, self.prepare, enough=enough
-        )
+        return with_one_more(self.context, parent, partners, settled, self.singles, enough=enough)
 
     def _parents(self) -> list[FittedModel]:
         """Return the single effects to which a second one is added: the plainest of those near the best, and unlike ones."""
@@ -138,7 +135,6 @@ class Stepwise:
                     self.effects,
                     known,
                     self.singles,
-                    self.prepare,
                     replaced=(effect, best.fit),
                 )
         return each_once(known)
@@ -187,7 +183,6 @@ def several_effects(
     forms: OtherForms,
     checks: Checks,
     lower_bound: bool,
-    prepare: Prepare | None,
 ) -> list[FittedModel]:
     """Return models of several effects if a single effect does not explain everything."""
     # `ask` says what the motion shows of the force that a model leaves. Above a lower bound of the floor the residual of a single
@@ -205,7 +200,7 @@ def several_effects(
     if worth.is_shown and best.error_over_noise <= enough:
         return []
     if worth.is_shown and models.proposal is not None:
-        sets = Together(context, reidentified, worth.alone, prepare)
+        sets = Together(context, reidentified, worth.alone)
         closed = larger_part_closed(reidentified)
         named = NamedByMotion(
             context,
@@ -213,7 +208,6 @@ def several_effects(
             models.proposal,
             models.together,
             models.effects,
-            prepare,
             sets,
             ask,
             closed,
@@ -228,8 +222,8 @@ def several_effects(
     # A floor is known to a few percent. Within these, the residual of the best effect is tested for being noise.
     is_near = not lower_bound and VERDICT.exact < best.error_over_noise <= VERDICT.at_floor
     at_floor = VERDICT.exact if is_near and not checks.is_adequate(best) else VERDICT.at_floor
-    together = Together(context, reidentified, models.effects, prepare)
-    search = Stepwise(context, usable, models.effects, forms, together, prepare)
+    together = Together(context, reidentified, models.effects)
+    search = Stepwise(context, usable, models.effects, forms, together)
     found = search.found(at_floor, None if lower_bound else checks)
     return [model for model in found if not is_excused or model.error_over_noise <= VERDICT.at_floor]
 

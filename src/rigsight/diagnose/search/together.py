@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, started_from, widened
 from rigsight.diagnose.search.screening import Response, Shortlist, scaled
@@ -145,12 +145,10 @@ class Together:
         context: FitContext,
         reidentified: FittedModel,
         effects: Sequence[Effect],
-        prepare: Prepare | None = None,
     ) -> None:
         self._context = context
         self._reidentified = reidentified
         self._effects = effects
-        self._prepare = prepare
         self._sets: dict[int, list[EffectSet]] = {}
 
     def fitted(self, size: int, least_share: float = 0.0) -> list[FittedModel]:
@@ -167,8 +165,7 @@ class Together:
             if len(found) < SEARCH.joint_sets or effect_set.names in found:
                 found.setdefault(effect_set.names, []).append(effect_set)
         starts = list(found.values())
-        if self._prepare is not None:
-            self._prepare([context.simplest(sets[0].effects) for sets in starts])
+        context.prepare(context.simplest(sets[0].effects) for sets in starts)
 
         def look_at(sets: list[EffectSet]) -> FirstLook:
             effects = sets[0].effects
