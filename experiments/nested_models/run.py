@@ -57,7 +57,7 @@ def campaign_of(plant: Drawn, rig: Rig, at_bounds: bool, rng: np.random.Generato
     return Campaign("nested", rig, constants, given, records)
 
 
-def single_effects_only(_campaign, _noise, models, _effects, lower_bound, _allowed, rng, _say):  # type: ignore[no-untyped-def]
+def single_effects_only(_campaign, models, lower_bound, _allowed, rng, _say):  # type: ignore[no-untyped-def]
     """Return the models of one effect alone: the order of these is studied, and pairs take ten times as long."""
     most_remainder = np.inf if lower_bound else VERDICT.most_remainder
     checks = Checks(models.context, rng, VERDICT.at_floor, most_remainder)

@@ -144,7 +144,7 @@ def _sources(
         remainder, [excited(i) for i in range(noise.size)], responses, [r.dt for r in records], corners
     )
     found = Sources(found.noise_std * noise, found.force_std, corners)
-    return found.with_forces_times(_set_right(found, whole, step, replicates, rng))
+    return replace(found, force_std=_set_right(found, whole, step, replicates, rng) * found.force_std)
 
 
 def _size_at(

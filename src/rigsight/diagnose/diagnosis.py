@@ -1,4 +1,21 @@
-"""The whole diagnosis: records and a given simulation -> verdict, ranking, gap budget, completed model."""
+"""The whole diagnosis: records and a given simulation -> verdict, ranking, gap budget, completed model.
+
+This is its order. The numbers are those of the sections in docs/verdict.md, which say what each step decides; thresholds are in
+`policy`. `examine` does steps 1 to 9, and is repeated if a model leaves less than a noise floor that was measured at rest.
+
+1. `noise_floors` finds the noise; `windowing_of` decides over which stretch a rig that drifts is compared.
+2. `reidentify` fits the equations without an effect; `held_by_motion` keeps them to the measured motion.
+3. `data_quality` checks the records; with `asked_offsets` all is repeated with offsets by record.
+4. `propose` asks the motion for the missing force and `worth_fitting` what it rules out; `search_places` screens by pushes.
+5. `fit_candidates` fits every effect alone, `lowered_by_extensions` the equations again from the best of them.
+6. `is_predictable` asks whether whole records can decide; else `fitted_in_windows`.
+7. `several_effects`: `NamedByMotion` where the motion names the causes, else `Stepwise`.
+8. `rank` compares all models that stand (`stands`, `is_beyond_records`, `beyond_disturbance`).
+9. `judge` names the verdict, `by_motion` the cause where simulations do not decide; `adequacy` tests what the model leaves.
+10. `trained` gives probabilities of models, `families_at_places` those of families.
+11. `localize`, `with_own_errors` and `advise`: where, how sure, what next. `verdict_notes` says what else is to be known.
+12. `trust` asks whether the parameters are the same everywhere.
+"""
 
 from __future__ import annotations
 
@@ -139,7 +156,9 @@ def _assembled(
     errors = [_errors(rig, model.residuals, measured) for model in (before, reidentified, after)]
     gap = {
         name: OutputGap(
-            *(of_stage[name] for of_stage in errors),
+            before=errors[0][name],
+            reidentified=errors[1][name],
+            after=errors[2][name],
             noise_floor=at_floor[name],
             intervals=budget_intervals(scored, name, at_floor[name], rng),
         )

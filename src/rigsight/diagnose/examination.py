@@ -11,7 +11,7 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model, with_offsets_told
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
-from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, start_values_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, fit_context_of, start_values_of
 from rigsight.diagnose.noise.adequacy import Adequacy
 from rigsight.diagnose.noise.detection import NoiseFloor, noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
@@ -38,7 +38,7 @@ from rigsight.diagnose.verdict.plausibility import (
 )
 from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
 from rigsight.effects import Effect
-from rigsight.identify import FitMemory
+from rigsight.identify import FitMemory, IdleThreads
 from rigsight.identify.fit.windows import Windowing
 from rigsight.inverse import Proposal
 from rigsight.records.record import Floats
@@ -88,7 +88,8 @@ def examine(
     say("noise floor")
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
-    alone = single_models(campaign, noise, effects, windowing, start, n_jobs, say, prepare, memory)
+    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs), start, prepare)
+    alone = single_models(campaign, context, windowing, effects, say)
     quality = data_quality(alone.context, campaign.records, alone.reidentified)
     allowed = VERDICT.at_lower_bound if lower_bound else most_remainder(alone.reidentified.error_over_noise)
     asked = (
@@ -99,7 +100,7 @@ def examine(
         freed = with_offsets_free(campaign)
         again = examine(freed, effects, rng, n_jobs, say, prepare, memory, at_rest)
         return replace(again, quality=replace(again.quality, findings=(asked, *again.quality.findings)))
-    models = with_several_effects(campaign, noise, alone, lower_bound, allowed, rng, say)
+    models = with_several_effects(campaign, alone, lower_bound, allowed, rng, say)
     context, before, reidentified = models.alone.context, models.alone.before, models.alone.reidentified
     checks = models.checks
     vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)

@@ -85,10 +85,6 @@ class Sources:
                 total += size[:, None] * colored(total.shape, corner * dt, rng)
         return total
 
-    def with_forces_times(self, factor: float) -> Sources:
-        """Return the same with other forces."""
-        return replace(self, force_std=factor * self.force_std)
-
 
 def colored(shape: tuple[int, ...], corner: float, rng: np.random.Generator) -> Floats:
     """Draw low-pass forces of variance 1 with a corner [rad per sample], white ones for an infinite corner; time is axis 0."""

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, fit_context_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, fit_context_of
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.evidence_for_more import OtherForms
@@ -32,7 +32,7 @@ from rigsight.diagnose.search.worth_fitting import (
 )
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
-from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
+from rigsight.identify import characteristic_scales
 from rigsight.identify.fit.windows import Windowing, leading_output
 from rigsight.inverse import Proposal, propose
 from rigsight.simulate import Structure
@@ -53,24 +53,19 @@ class AllModels:
 
 def single_models(
     campaign: Campaign,
-    noise: Mapping[str, float],
-    effects: Sequence[Effect],
+    context: FitContext,
     windowing: Windowing,
-    start: Mapping[str, float],
-    n_jobs: int,
+    effects: Sequence[Effect],
     say: Callable[[str], None],
-    prepare: Prepare | None,
-    memory: FitMemory | None,
 ) -> SingleModels:
     """Fit and score the given simulation, its equations and every candidate."""
-    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs), start, prepare)
     reidentified = reidentify(context, context.start)
     if not reidentified.residuals:
         raise SimulationError(
             f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
     say("re-identified")
-    proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, noise)
+    proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, context.noise)
     say("missing force")
     worth = worth_fitting(campaign.rig, proposal, effects)
     context = _with_known_motion(campaign, context, reidentified)
@@ -168,7 +163,6 @@ def _comes_first(effect: Effect, search: Search, worth: WorthFitting, least: flo
 
 def with_several_effects(
     campaign: Campaign,
-    noise: Mapping[str, float],
     models: SingleModels,
     lower_bound: bool,
     allowed: float,
@@ -182,7 +176,7 @@ def with_several_effects(
     forms = OtherForms(context, lower_bound)
     cut: SingleModels | None = None
     if whole and not is_predictable(context, models.reidentified, models.singles, at_floor, rng):
-        cut = _in_windows(campaign, noise, models)
+        cut = _in_windows(campaign, models)
         say("in windows")
         if _explained(cut, cut.singles, at_floor):
             return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms)
@@ -190,7 +184,7 @@ def with_several_effects(
 
     def ask(model: FittedModel) -> Proposal | None:
         beside = replace(campaign, modelled=(*campaign.modelled, *model.effects))
-        return propose(beside, {**campaign.constants, **model.fit.all_values}, models.effects, noise)
+        return propose(beside, {**campaign.constants, **model.fit.all_values}, models.effects, context.noise)
 
     found = several_effects(models, ask, forms, checks, lower_bound)
     for model in found[:1]:
@@ -202,7 +196,7 @@ def with_several_effects(
     if not models.worth.is_shown:
         models = replace(models, singles=refit_singles(context, models.singles, found))
     if whole and not is_predictable(context, models.reidentified, found, allowed, rng):
-        cut = cut or _in_windows(campaign, noise, models)
+        cut = cut or _in_windows(campaign, models)
         pairs = pairs_in_windows(context, cut.context, models.reidentified, found)
         say("pairs in windows")
         if _explained(cut, pairs, VERDICT.at_floor):
@@ -212,12 +206,12 @@ def with_several_effects(
     return AllModels(models, found, False, checks, forms)
 
 
-def _in_windows(campaign: Campaign, noise: Mapping[str, float], models: SingleModels) -> SingleModels:
+def _in_windows(campaign: Campaign, models: SingleModels) -> SingleModels:
     """Return the models in windows of a few cycles."""
-    leading = leading_output(campaign.rig, campaign.records)
-    windowing = Windowing(cycles=VERDICT.window_cycles, noise={leading: noise[leading], **noise})
-    known = models.context
-    context = fit_context_of(campaign, noise, windowing, known.memory, known.threads, known.start)
+    known, leading = models.context, leading_output(campaign.rig, campaign.records)
+    noise = {leading: known.noise[leading], **known.noise}
+    windowing = Windowing(cycles=VERDICT.window_cycles, noise=noise)
+    context = fit_context_of(campaign, known.noise, windowing, known.memory, known.threads, known.start)
     reidentified = reidentify(context, models.reidentified.fit.values)
     singles = fitted_in_windows(context, reidentified, models.singles)
     before = _before(campaign, context, reidentified) if reidentified.residuals else models.before

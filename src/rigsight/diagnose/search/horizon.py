@@ -301,11 +301,7 @@ def _fitted(context: FitContext, reidentified: FittedModel, model: FittedModel) 
     )
     problem = context.problem(structure, context.estimation)
     fits = [problem.fit_windows(glimpse.values, free) for glimpse in glimpses[: SEARCH.window_starts]]
-    usable = [fit for fit in fits if fit.residuals]
-    if not usable:
-        return model.not_simulated()
-    best = min(usable, key=lambda fit: fit.cost)
-    return scored_in_windows(context, replace(model, fit=best), best.values)
+    return _best_in_windows(context, model, fits)
 
 
 def _scored(context: FitContext, model: FittedModel) -> FittedModel:
@@ -318,12 +314,20 @@ def _scored(context: FitContext, model: FittedModel) -> FittedModel:
         cost=there.cost,
         substeps=there.substeps,
     )
-    return scored_in_windows(context, replace(model, fit=fit), fit.values)
+    return _scored_in_windows(context, replace(model, fit=fit))
 
 
-def scored_in_windows(context: FitContext, model: FittedModel, values: Mapping[str, float]) -> FittedModel:
-    """Return a model scored on the windows that judge, with these numbers and the initial states that suit them."""
-    result = context.problem(model.fit.structure, context.scoring).fit_windows(values, ())
+def _best_in_windows(context: FitContext, model: FittedModel, fits: Sequence[FitResult]) -> FittedModel:
+    """Return a model with the best of its fits, scored on the windows that judge."""
+    usable = [fit for fit in fits if fit.residuals]
+    if not usable:
+        return model.not_simulated()
+    return _scored_in_windows(context, replace(model, fit=min(usable, key=lambda fit: fit.cost)))
+
+
+def _scored_in_windows(context: FitContext, model: FittedModel) -> FittedModel:
+    """Return a model scored on the windows that judge, with its numbers and the initial states that suit them."""
+    result = context.problem(model.fit.structure, context.scoring).fit_windows(model.fit.values, ())
     error_over_noise = result.weighted_rms if result.residuals else float("inf")
     return replace(model, held_out=result, error_over_noise=error_over_noise)
 
@@ -355,8 +359,4 @@ def _pair_in_windows(
     look = started_from(context, pair.effects, structure, starts)
     problem = windows.problem(structure, windows.estimation)
     fits = [problem.fit_windows(fit.values, pair.fit.free) for fit in (pair.fit, *look.fits)]
-    usable = [fit for fit in fits if fit.residuals]
-    if not usable:
-        return pair.not_simulated()
-    best = min(usable, key=lambda fit: fit.cost)
-    return scored_in_windows(windows, replace(pair, fit=best), best.values)
+    return _best_in_windows(windows, pair, fits)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -93,10 +92,11 @@ def with_one_more(
     # `replaced` is an effect that was left out of the model, with the fit in which it was: its simpler and more general forms are
     # fitted whatever the screening says, the general ones from there.
     context = context.looking_at_residual(parent.fit)
+    known_sets = {frozenset(model.names) for model in known}
     open_ones = [
         effect
         for effect in context.offered(effects)
-        if effect not in parent.effects and not is_among(known, {*parent.names, effect.name})
+        if effect not in parent.effects and frozenset((*parent.names, effect.name)) not in known_sets
     ]
     context.prepare(structures_of_shortlist(context.rig, open_ones, (*context.modelled, *parent.effects)))
     search = search_places(context, parent, open_ones)
@@ -104,8 +104,11 @@ def with_one_more(
         # The screening says nothing about effects that no push represents, such as periodic ones.
         unscreened = [effect for effect in search.effects if effect.name not in search.shares]
         return _fitted_beside(context, parent, unscreened, search.starts, singles)
-    forms = [] if replaced is None else [e for e in search.others if _is_form_of(e, replaced[0])]
-    parents = {} if replaced is None else {replaced[0].name: replaced[1]}
+    forms, parents = list[Effect](), dict[str, FitResult]()
+    if replaced is not None:
+        other, fit = replaced
+        forms = [e for e in search.others if other.name in e.parents or e.name in other.parents]
+        parents = {other.name: fit}
     chosen = [*search.effects, *forms]
     found = _fitted_beside(context, parent, chosen, search.starts, singles, parents)
     movable = [effect for effect in search.others if _has_a_shape(effect)]
@@ -113,11 +116,6 @@ def with_one_more(
         # A push cannot move from its start: a resonance far from it explains little until it is fitted.
         found += _fitted_beside(context, parent, movable, search.starts, singles)
     return found
-
-
-def is_among(models: Sequence[FittedModel], names: AbstractSet[str]) -> bool:
-    """Return True if one of the models has just these effects."""
-    return any(set(model.names) == names for model in models)
 
 
 def _fitted_beside(
@@ -173,10 +171,6 @@ def _fitted_beside(
         return followed(context, found, promising=True, finish=False)
 
     return list(context.threads.side_by_side(follow, promising[: SEARCH.most_followed]))
-
-
-def _is_form_of(one: Effect, other: Effect) -> bool:
-    return other.name in one.parents or one.name in other.parents
 
 
 def _above_noise(fit: FitResult) -> float:

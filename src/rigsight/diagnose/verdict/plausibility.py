@@ -78,15 +78,12 @@ def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
         without = models.get(frozenset(model.names) - {effect.name})
         if without is not None and not is_lower(model.fit, without.fit):
             return True
-        is_shown = not effect.states and without is not None and _closes(model, without)
-        return not is_shown and _is_within_errors(model, effect)
+        if without is None or effect.states:
+            return _is_within_errors(model, effect)
+        smaller_part = (1.0 - VERDICT.larger_part) * without.error_over_noise**2
+        return model.error_over_noise**2 > smaller_part and _is_within_errors(model, effect)
 
     return any(map(is_zero, model.effects))
-
-
-def _closes(model: FittedModel, without: FittedModel) -> bool:
-    """Return True if a model leaves the smaller part of the squared error that another one leaves."""
-    return model.error_over_noise**2 <= (1.0 - VERDICT.larger_part) * without.error_over_noise**2
 
 
 def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[FittedModel]) -> bool:
