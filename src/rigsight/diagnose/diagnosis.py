@@ -106,7 +106,6 @@ def diagnose(
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
     campaign = with_weighed_spring(campaign)
     effects = candidates_on(campaign.rig, effects, campaign.modelled)
-    scored_on = "validation" if campaign.validation else "estimation"
     rng = np.random.default_rng(seed)
     found = examine(campaign, effects, rng, n_jobs, say, prepare, memory)
     below_rest = None
@@ -114,20 +113,16 @@ def diagnose(
         below_rest = _least_left(found)
         found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
     notes = verdict_notes(Basis(campaign, found, rng, below_rest))
-    diagnosis = _assembled(campaign, found, notes, scored_on, rng)
-    diagnosis = replace(diagnosis, data_quality=found.quality)
+    diagnosis = _assembled(campaign, found, notes, rng)
     named = found.judgement.model if diagnosis.effects else found.reidentified
     if found.judgement.verdict != "unknown":
         diagnosis = with_own_errors(diagnosis, found.context, named, seed)
         say("standard errors")
     own = next(candidate for candidate in diagnosis.candidates if candidate.effects == named.names)
     std = {name: estimate.std for name, estimate in own.parameters.items()}
-    diagnosis = replace(
-        diagnosis,
-        trust=trust(found.context, named, campaign.records, campaign.constants, std),
-    )
+    trusted = trust(found.context, named, campaign.records, campaign.constants, std)
     say("trust in the numbers")
-    return diagnosis
+    return replace(diagnosis, trust=trusted)
 
 
 def _least_left(found: Examination) -> float:
@@ -135,22 +130,18 @@ def _least_left(found: Examination) -> float:
 
 
 def _assembled(
-    campaign: Campaign,
-    found: Examination,
-    notes: Sequence[str],
-    scored_on: str,
-    rng: np.random.Generator,
+    campaign: Campaign, found: Examination, notes: tuple[str, ...], rng: np.random.Generator
 ) -> Diagnosis:
+    scored_on = "validation" if campaign.validation else "estimation"
     rig, context, before, reidentified = campaign.rig, found.context, found.before, found.reidentified
     ranking, judgement, floors = found.ranking, found.judgement, found.floors
     is_effect = judgement.verdict == "effect"
     after = judgement.model if is_effect else (before if judgement.verdict == "none" else reidentified)
-    noise = {floor.output: floor for floor in floors}
-    measured = _measured(rig, context.scoring)
+    noise, measured = context.noise, _measured(rig, context.scoring)
     traces = traces_of(context, before, reidentified, after)
     scored = [trace for trace in traces if trace.role == scored_on]
     at_floor = {
-        name: noise[name].std / spread if (spread := float(np.std(values))) > 0.0 else math.inf
+        name: noise[name] / spread if (spread := float(np.std(values))) > 0.0 else math.inf
         for name, values in measured.items()
     }
     errors = [_errors(rig, model.residuals, measured) for model in (before, reidentified, after)]
@@ -167,10 +158,8 @@ def _assembled(
     calibration, situation = trained(), _situation(found)
     without_effect = _candidate(context, reidentified, calibration.without_effect(situation))
     probabilities = calibration.probabilities(situation, ranking.probabilities)
-    with_effect = [
-        _candidate(context, model, probability, grounds)
-        for model, probability, grounds in zip(ranking.order, probabilities, ranking.grounds, strict=True)
-    ]
+    ranked = list(zip(ranking.order, probabilities, ranking.grounds, strict=True))
+    with_effect = [_candidate(context, *own) for own in ranked]
     candidates = tuple(
         sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.error_over_noise))
     )
@@ -178,14 +167,9 @@ def _assembled(
         rig,
         reidentified,
         judgement.model,
-        [
-            (model, probability, grounds.share)
-            for model, probability, grounds in zip(ranking.order, probabilities, ranking.grounds, strict=True)
-        ],
+        [(model, probability, grounds.share) for model, probability, grounds in ranked],
         probability_not_tried(candidates),
-        noise_vector(
-            [signal.name for signal in rig.outputs], {name: floor.std for name, floor in noise.items()}
-        ),
+        noise_vector([signal.name for signal in rig.outputs], noise),
         rng.spawn(1)[0],
         found.proposal,
         judgement.by_motion,
@@ -228,16 +212,14 @@ def _assembled(
         given=dict(campaign.given),
         record_numbers=record_numbers(context, after, campaign.estimation[0].hold),
         model=Model.of(after.fit.structure, after.fit.values, campaign.estimation[0].hold).to_json(),
-        notes=tuple(notes),
+        notes=notes,
         windows=found.windowing.length,
         window_cycles=found.windowing.cycles,
         bandwidth=found.windowing.bandwidth,
         scored_on=scored_on,
+        data_quality=found.quality,
         advice=advise(
-            context,
-            judgement.model,
-            [model for model in ranking.order if model.names in rivals],
-            {n: f.std for n, f in noise.items()},
+            context, judgement.model, [model for model in ranking.order if model.names in rivals], noise
         ),
         places=found.places,
         adequate=None if found.adequacy is None else found.adequacy.adequate,

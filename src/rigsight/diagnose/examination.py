@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -192,12 +193,13 @@ def _ranked(
     # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.
     counts = likeliest is not None and models.checks.is_adequate(likeliest)
     gap = reidentified.error_over_noise
-    ranking = rank(candidates, noise, rng, gap, evidence.criterion, counts)
+    ranked = partial(
+        rank, noise=noise, rng=rng, gap=gap, criterion=evidence.criterion, evidence_counts=counts
+    )
+    ranking = ranked(candidates)
     if ranking.order and ranking.order[0].residuals:
         if not models.are_in_windows:
-            ranking = _with_offset_rivals(
-                context, ranking, effects, noise, rng, gap, evidence.criterion, counts
-            )
+            ranking = _with_offset_rivals(context, ranking, effects, ranked)
         if ranking.order[0].error_over_noise > allowed:
             places = {e.name: context.rig.acts_at(e) for model in ranking.order for e in model.effects}
             ranking = plausible_first(ranking, reidentified, places)
@@ -208,11 +210,7 @@ def _with_offset_rivals(
     context: FitContext,
     ranking: Ranking,
     effects: Sequence[Effect],
-    noise: Floats,
-    rng: np.random.Generator,
-    gap: float,
-    criterion: Callable[[FittedModel], float],
-    evidence_counts: bool,
+    ranked: Callable[[Sequence[FittedModel]], Ranking],
 ) -> Ranking:
     """Let an even effect without a constant force compete where the best model needs a constant force."""
     # A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
@@ -234,4 +232,4 @@ def _with_offset_rivals(
         if is_even and is_new and context.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(context, (*best.effects, effect), base, hold=frozenset(needed)))
-    return rank([*ranking.order, *rivals], noise, rng, gap, criterion, evidence_counts)
+    return ranked([*ranking.order, *rivals])
