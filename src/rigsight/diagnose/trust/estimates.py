@@ -252,23 +252,20 @@ class View:
     apart: Estimates | None = None
     is_tested: bool = True  # false where the groups are those of another view
 
-    def known(self, index: int) -> NDArray[np.intp]:
-        """Return which groups determine a parameter alone."""
-        errors = np.sqrt([estimate.variances[index] for estimate in self.found])
+    def of(self, index: int) -> tuple[NDArray[np.intp], Floats, Floats, Floats]:
+        """Return which groups determine a parameter alone, and its shifts, variances and degrees of freedom in them."""
+        shifts, variances, freedom = (
+            np.array([getattr(estimate, name)[index] for estimate in self.found])
+            for name in ("shifts", "variances", "freedom")
+        )
+        errors = np.sqrt(variances)
         reported = np.isfinite(errors) & (errors > 0.0)
         if np.any(reported):
             reported &= (errors <= TRUST.unsure * np.min(errors[reported])) | (
                 errors < POORLY_KNOWN * self.sizes[index]
             )
-        return np.flatnonzero(reported)
-
-    def of(self, index: int) -> tuple[Floats, Floats, Floats]:
-        """Return shifts, variances and degrees of freedom of a number in all groups, shape (n_groups,) each."""
-        return (
-            np.array([estimate.shifts[index] for estimate in self.found]),
-            np.array([estimate.variances[index] for estimate in self.found]),
-            np.array([estimate.freedom[index] for estimate in self.found]),
-        )
+        known = np.flatnonzero(reported)
+        return known, shifts[known], variances[known], freedom[known]
 
     def widened(self, factors: Floats) -> View:
         """Return the view with standard errors of each number larger by a factor, shape (n_free,)."""

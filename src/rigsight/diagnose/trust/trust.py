@@ -48,14 +48,6 @@ _NOTHING_FITTED = "No parameter was fitted, so none can differ from record to re
 
 
 @dataclass(frozen=True)
-class _Asked:
-    """How one number differs in one view."""
-
-    view: View
-    reported: Spread
-
-
-@dataclass(frozen=True)
 class _Way:
     """How a number differs, in which direction, and with what it goes."""
 
@@ -88,10 +80,10 @@ def trust(
     asked = [
         []
         if name in open_numbers
-        else [_Asked(view, reported) for view in seen.values() if (reported := _reported(view, i))]
+        else [(kind, found_in) for kind, view in seen.items() if (found_in := _reported(view, i))]
         for i, name in enumerate(found.free)
     ]
-    p_values = iter(adjusted([one.reported.p_value for of_number in asked for one in of_number]))
+    p_values = iter(adjusted([one.p_value for of_number in asked for _, one in of_number]))
     allowed = [[next(p_values) for _ in of_number] for of_number in asked]
     own = roles(context.rig, _effect_parameters(model))
     numbers = tuple(
@@ -149,12 +141,11 @@ def _effect_parameters(model: FittedModel) -> set[str]:
 
 def _reported(view: View, index: int) -> Spread | None:
     """Return how a parameter differs in a view; None if nothing can be compared or another view has the same groups."""
-    known = view.known(index)
+    known, values, variances, freedom = view.of(index)
     if not view.is_tested or known.size < 2:
         return None
     if view.apart is None:
-        values, variances, freedom = view.of(index)
-        return spread(values[known], variances[known], freedom[known])
+        return spread(values, variances, freedom)
     error = math.sqrt(view.apart.variances[index])
     if not 0.0 < error < math.inf:
         return None
@@ -168,7 +159,7 @@ def _number(
     index: int,
     std: float,
     seen: Mapping[str, View],
-    asked: Sequence[_Asked],
+    asked: Sequence[tuple[str, Spread]],
     p_values: Sequence[float],
     along: Sequence[Order],
     role: Role,
@@ -178,13 +169,12 @@ def _number(
     value = model.fit.values[name]
     groups = {}
     for kind, view in seen.items():
-        known = view.known(index)
-        values, variances, _ = view.of(index)
+        known, shifts, variances, _ = view.of(index)
         groups[kind] = tuple(
-            GroupValue(view.labels[g], value + float(values[g]), math.sqrt(float(variances[g])))
-            for g in known
+            GroupValue(view.labels[g], value + float(shift), math.sqrt(float(variance)))
+            for g, shift, variance in zip(known, shifts, variances, strict=True)
         )
-    differing = {one.view.kind: p for one, p in zip(asked, p_values, strict=True) if p <= TRUST.level}
+    differing = {kind: p for (kind, _), p in zip(asked, p_values, strict=True) if p <= TRUST.level}
     found = _Way(Pattern.STABLE if asked else Pattern.UNKNOWN)
     if differing:
         found = _pattern(seen, index, differing, along)
@@ -196,7 +186,7 @@ def _number(
         of_effect=role is Role.EFFECT,
         groups=groups,
         p_value=min(p_values, default=1.0),
-        largest=max((one.reported.largest for one in asked), default=0.0),
+        largest=max((one.largest for _, one in asked), default=0.0),
         pattern=found.pattern,
         direction=found.direction,
         goes_with=found.goes_with,
@@ -211,10 +201,8 @@ def _pattern(
     if set(differing) - {PORTION, WINDOW_LENGTH}:
         return _between_records(seen, index, differing, along)
     if PORTION in differing:
-        view = seen[PORTION]
-        known = view.known(index)
-        values, variances, _ = view.of(index)
-        found = course(values[known], variances[known], known.astype(float))
+        known, values, variances, _ = seen[PORTION].of(index)
+        found = course(values, variances, known.astype(float))
         return _Way(Pattern.PORTION, found.direction, ("time",))
     apart = seen[WINDOW_LENGTH].apart
     assert apart is not None
@@ -225,12 +213,11 @@ def _between_records(
     seen: Mapping[str, View], index: int, differing: Mapping[str, float], along: Sequence[Order]
 ) -> _Way:
     view = seen[RECORD]
-    known = view.known(index)
-    values, variances, _ = view.of(index)
+    known, values, variances, _ = view.of(index)
     courses = []
     for order in along:
         levels = np.array([order.levels[view.labels[g]] for g in known])
-        found = course(values[known], variances[known], levels)
+        found = course(values, variances, levels)
         if found.direction:
             courses.append((order, found))
     if courses:
