@@ -27,7 +27,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from rigsight.diagnose.fit_context import FitContext, FittedModel
@@ -36,8 +35,7 @@ from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import BY_RECORD, alternatives, slopes
 from rigsight.diagnose.pushes.probes import motion_columns, signal_columns
 from rigsight.diagnose.pushes.responses import Followed, Responses, orthonormal
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _TURNS = 9999
 _PORTIONS = 10

@@ -21,17 +21,14 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import helmert
 from scipy.ndimage import uniform_filter1d
 
 from rigsight.diagnose.noise.block_means import blocks_of
 from rigsight.diagnose.policy import NOTES
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.records.signals import differ_by_noise, repeated_period, roughness
 from rigsight.rigs import Rig, evaluated
-
-Floats = NDArray[np.float64]
 
 _SMOOTHED = 9
 """Lines of a spectrum that are averaged."""
@@ -86,7 +83,7 @@ def _power(residual: Floats, dt: float) -> tuple[Floats, Floats]:
     return np.asarray(omega[1:]), uniform_filter1d(lines[1:], _SMOOTHED, mode="nearest")
 
 
-Stretches = tuple[tuple[NDArray[np.float64], float], ...]
+Stretches = tuple[tuple[Floats, float], ...]
 """Pieces of noise alone, shape (n_samples,) each, with their sample time [s]."""
 
 
@@ -151,9 +148,7 @@ def noise_floors(
     )
 
 
-def _interval(
-    std: float, independent: Sequence[NDArray[np.float64]], lower_bound: bool
-) -> tuple[float, float]:
+def _interval(std: float, independent: Sequence[Floats], lower_bound: bool) -> tuple[float, float]:
     """Return 95 % limits of a standard deviation: those of blocks of independent pieces of the noise."""
     if lower_bound or not independent:
         return std, np.inf
@@ -168,7 +163,7 @@ def _interval(
 
 def _noise_floor(
     rig: Rig, output: str, records: Sequence[Record], drifts: bool, at_rest: bool
-) -> tuple[float, str, Stretches, list[NDArray[np.float64]]]:
+) -> tuple[float, str, Stretches, list[Floats]]:
     """Return standard deviation, method, pieces of noise, and as many independent pieces as they hold."""
     sources = [signal.name for signal in rig.inputs]
     repeated = _repeated(sources, output, records)
@@ -199,11 +194,11 @@ class _Segment(NamedTuple):
     """A whole record, or one period of its input, with shapes (n_samples, n_inputs) and (n_samples,)."""
 
     record: Record
-    driven: NDArray[np.float64]
-    output: NDArray[np.float64]
+    driven: Floats
+    output: Floats
     settled: bool
 
-    def repeats(self, other: _Segment, size: NDArray[np.float64]) -> bool:
+    def repeats(self, other: _Segment, size: Floats) -> bool:
         """Return True if the rig was the same and was driven alike, up to noise of inputs of this size."""
         return (
             self.driven.shape == other.driven.shape
@@ -213,9 +208,7 @@ class _Segment(NamedTuple):
         )
 
 
-def _repeated(
-    sources: Sequence[str], output: str, records: Sequence[Record]
-) -> list[tuple[NDArray[np.float64], float]]:
+def _repeated(sources: Sequence[str], output: str, records: Sequence[Record]) -> list[tuple[Floats, float]]:
     """Return groups of answers to the same input, shape (n_repetitions, n_samples), within records and from one to the next."""
     segments: list[_Segment] = []
     for record in records:
@@ -231,7 +224,7 @@ def _repeated(
         for i in range(1 if count > 1 else 0, count):
             part = slice(i * period, (i + 1) * period)
             segments.append(_Segment(record, driven[part], record[output][part], settled=count > 1))
-    groups: list[tuple[NDArray[np.float64], float]] = []
+    groups: list[tuple[Floats, float]] = []
     used: set[int] = set()
     for i, first in enumerate(segments):
         if i in used:
@@ -248,19 +241,19 @@ def _repeated(
     return groups
 
 
-def inputs_of(record: Record, sources: Sequence[str]) -> NDArray[np.float64]:
+def inputs_of(record: Record, sources: Sequence[str]) -> Floats:
     """Return the inputs of a record side by side, shape (n_samples, n_inputs); one it lacks rests."""
     rest = np.zeros(record.n_samples)
     return np.column_stack([record.signals.get(name, rest) for name in sources] or [rest])
 
 
-def _common_period(driven: NDArray[np.float64]) -> int | None:
+def _common_period(driven: Floats) -> int | None:
     """Return after how many samples all inputs repeat themselves that do not rest; None if they do not."""
     periods = {repeated_period(column) for column in driven.T if np.ptp(column) > 0.0}
     return periods.pop() if len(periods) == 1 else None
 
 
-def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
+def _without_drift(group: Floats) -> Floats:
     """Return responses to one input without the parabolas by which they differ: a constant force moves a free mass along one."""
     t = np.linspace(-1.0, 1.0, group.shape[1])
     mean = np.mean(group, axis=0)
@@ -268,9 +261,7 @@ def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(group - np.polynomial.polynomial.polyval(t, drift))
 
 
-def _quiet_stretches(
-    record: Record, sources: Sequence[str], output: str
-) -> list[tuple[NDArray[np.float64], float]]:
+def _quiet_stretches(record: Record, sources: Sequence[str], output: str) -> list[tuple[Floats, float]]:
     """Return the settled part of the output in long stretches of constant input, about its mean, with the sample time."""
     samples = inputs_of(record, sources)
     span = np.ptp(samples, axis=0)
@@ -303,11 +294,11 @@ def _quiet_stretches(
     return found
 
 
-def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int, int]:
+def _held(samples: Floats, moved: Floats) -> tuple[int, int]:
     """Return the first and the last sample of the part at one end, the longer, in which no input has moved by so much."""
     # Slow motion also has small steps: a rest from which an input starts gently ends where it has moved.
 
-    def length(ordered: NDArray[np.float64]) -> int:
+    def length(ordered: Floats) -> int:
         spanned = np.maximum.accumulate(ordered, axis=0) - np.minimum.accumulate(ordered, axis=0)
         beyond = np.flatnonzero(np.any(spanned > moved, axis=1))
         return int(beyond[0]) if beyond.size else ordered.shape[0]
@@ -316,7 +307,7 @@ def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int
     return (0, ahead - 1) if ahead >= behind else (n - behind, n - 1)
 
 
-def _is_free_motion(samples: NDArray[np.float64]) -> bool:
+def _is_free_motion(samples: Floats) -> bool:
     """Return True if a few exponentials (a ringing rig left alone) explain most of a stretch."""
     # Ringing sustained by a disturbance changes phase and amplitude within about a period; no exponential follows it for long.
     # R. Roy and T. Kailath, IEEE Trans. ASSP 37 (1989) 984, for poles from the shift invariance of the signal subspace.
@@ -331,7 +322,7 @@ def _is_free_motion(samples: NDArray[np.float64]) -> bool:
     return float(np.std(centered - explained)) < 0.5 * float(np.std(centered))
 
 
-def _top_of_spectrum(samples: NDArray[np.float64]) -> float:
+def _top_of_spectrum(samples: Floats) -> float:
     """Return the standard deviation of white noise with the median power of the highest lines."""
     window = np.hanning(samples.size)
     power = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2

@@ -28,10 +28,9 @@ from rigsight.diagnose.pushes.probes import PUSH_SIZE, push, with_probes
 from rigsight.diagnose.pushes.responses import orthonormal
 from rigsight.errors import SimulationError
 from rigsight.identify import answers_to_states
+from rigsight.records.record import Floats
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization, linearize
-
-Floats = NDArray[np.float64]
 
 _SMOOTHED = 9
 """Lines over which a spectrum is averaged: 18 degrees of freedom, a scatter of a third."""

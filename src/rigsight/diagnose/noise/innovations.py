@@ -15,13 +15,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import correlate, lfilter
 
 from rigsight.diagnose.pushes.responses import Followed, Responses
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _ORDERS = (0, 1, 2, 4, 8, 16, 32)
 _WHITE = 1e-4

@@ -15,15 +15,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.pushes.probes import motion_columns, signal_columns
 from rigsight.diagnose.pushes.responses import Responses
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
+from rigsight.records.record import Floats
 from rigsight.units import characteristic_value
-
-Floats = NDArray[np.float64]
 
 BY_RECORD = "record: "
 """Before what differs from record to record."""

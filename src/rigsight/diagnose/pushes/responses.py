@@ -25,7 +25,7 @@ from rigsight.identify import FitResult
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.windows import observed_sensors
 from rigsight.identify.start.scales import scales_at_places
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose, parameter_vector, record_input, record_values, simulate_sets
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
@@ -51,9 +51,7 @@ class Corrections:
         self._names = [sensor.name for sensor in mechanism.sensors]
         self._n = len(coordinates)
 
-    def of_joint(
-        self, name: str, differences: NDArray[np.float64], measured: set[str]
-    ) -> NDArray[np.float64] | None:
+    def of_joint(self, name: str, differences: Floats, measured: set[str]) -> Floats | None:
         """Return the correction of a joint's motion, shape (n_samples,); None where the sensors do not tell."""
         slopes = self._joints[name]
         asked = [i for i, n in enumerate(self._names) if n in measured and self._sensors[n] is not None]
@@ -66,9 +64,7 @@ class Corrections:
         return np.asarray(differences[:, asked] @ np.linalg.pinv(shown).T @ slopes)
 
 
-def _slopes(
-    expression: sp.Expr, coordinates: list[sp.Symbol], numbers: set[sp.Symbol]
-) -> NDArray[np.float64] | None:
+def _slopes(expression: sp.Expr, coordinates: list[sp.Symbol], numbers: set[sp.Symbol]) -> Floats | None:
     """Return the derivatives by each coordinate of a sum of multiples of them and numbers; None for any other expression."""
     slopes = [derivative(expression, coordinate) for coordinate in coordinates]
     if any(not slope.is_number for slope in slopes) or not any(slopes):
@@ -76,8 +72,6 @@ def _slopes(
     rest = sp.expand(expression - sum(s * c for s, c in zip(slopes, coordinates, strict=True)))
     return np.array(slopes, dtype=np.float64) if rest.free_symbols <= numbers else None
 
-
-Floats = NDArray[np.float64]
 
 _STEP = 1e-3
 """Relative change of a parameter whose answer is taken by differences."""

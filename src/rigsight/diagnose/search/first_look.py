@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
+from rigsight.records.record import Floats
 from rigsight.simulate import Structure
 
 _LOOK_TOLERANCE = 1e-3
@@ -117,9 +117,7 @@ def _looked(
     if substeps is not None:
         of_pieces = [n for n, parts in zip(substeps, stretches, strict=True) for _ in parts]
 
-    def tried(
-        start: Mapping[str, float], states: Sequence[NDArray[np.float64]] | None, most: int
-    ) -> FitResult:
+    def tried(start: Mapping[str, float], states: Sequence[Floats] | None, most: int) -> FitResult:
         return in_pieces.fit(start, free, states, most, _LOOK_TOLERANCE, False, of_pieces)
 
     if len(starts) > SEARCH.most_starts:

@@ -34,7 +34,7 @@ from rigsight.identify.fit.windows import (
     window_length,
 )
 from rigsight.identify.linear_view import longest_free_run, near_rest
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import evaluated
 from rigsight.simulate import (
@@ -224,8 +224,8 @@ def _change(
     index: int,
     record: Record,
     source: str,
-    disturbance: NDArray[np.float64],
-    floors: NDArray[np.float64],
+    disturbance: Floats,
+    floors: Floats,
 ) -> float:
     """Return the largest RMS change, in noise floors of the outputs, that a disturbance beside an input makes."""
     structure = model.fit.structure

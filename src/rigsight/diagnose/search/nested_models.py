@@ -18,7 +18,6 @@ from dataclasses import replace
 from graphlib import TopologicalSorter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
@@ -26,6 +25,7 @@ from rigsight.diagnose.search.first_look import LOOK_ACCURACY
 from rigsight.diagnose.search.starts import sized, start_values
 from rigsight.effects import Effect
 from rigsight.identify import FitResult, GreyBoxFit
+from rigsight.records.record import Floats
 from rigsight.simulate import Structure, carried_over
 
 _TOLERANCE = 1e-4
@@ -200,7 +200,7 @@ def _lowest_from(
     problem: GreyBoxFit,
     starts: Iterable[Mapping[str, float]],
     free: Sequence[str],
-    states: Sequence[NDArray[np.float64]],
+    states: Sequence[Floats],
 ) -> FitResult:
     """Return the best fit from given and from guessed initial states: the first begin in the minimum of the simpler model."""
     return min(
@@ -239,11 +239,11 @@ def _at_null(model: FittedModel, without: FittedModel, values: Mapping[str, floa
     return replace(without, effects=model.effects, fit=at_null, held_out=held_out)
 
 
-def _states(structure: Structure, simpler: FitResult) -> tuple[NDArray[np.float64], ...]:
+def _states(structure: Structure, simpler: FitResult) -> tuple[Floats, ...]:
     """Return initial states and offsets of a simpler model for a structure that may have more states; those are zero."""
     names = [str(equation.symbol) for equation in simpler.structure.equations]
 
-    def of_record(own: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of_record(own: Floats) -> Floats:
         known = dict(zip(names, own[: len(names)].tolist(), strict=True))
         states = [known.get(str(equation.symbol), 0.0) for equation in structure.equations]
         return np.concatenate([states, own[len(names) :]])

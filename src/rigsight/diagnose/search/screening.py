@@ -18,7 +18,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
@@ -39,13 +38,11 @@ from rigsight.effects import Effect, Place, kind_of, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
 from rigsight.inverse.controller_output import ControllerSignals, changed_output, limits_of
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.units import characteristic_value
-
-Floats = NDArray[np.float64]
 
 _SMALL = 0.1
 """Size of a push whose answer is taken to be proportional to it, in units of what the effect itself would be."""

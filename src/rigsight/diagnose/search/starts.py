@@ -26,11 +26,11 @@ from rigsight.frequency.persistent_line import persistent_line
 from rigsight.identify import FitResult
 from rigsight.identify.fit.windows import leading_output
 from rigsight.identify.start.declared_starts import declared_values, in_structure, moved_starts
+from rigsight.records.record import Floats
 from rigsight.rigs import evaluated, joint_of
 from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value
 
-Floats = NDArray[np.float64]
 Law = Callable[[Floats, float], Sequence[Floats]]
 """Parts of a force (or an error) along a way at a wave number, shape (n_samples,) each, one for each coefficient."""
 Answer = Callable[[Floats], NDArray[np.complex128]]
@@ -199,7 +199,7 @@ def _response_at(context: FitContext, effect: Effect, base: FitResult) -> Answer
         natural = 1.0 / characteristic_value(placed_dimension(effect, "time"), context.scales)
         stiffness, damping = mass * natural**2, 2.0 * _DAMPING_RATIO * mass * natural
 
-    def response(omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def response(omega: Floats) -> NDArray[np.complex128]:
         return np.asarray(1.0 / (stiffness - mass * omega**2 + 1j * damping * omega), dtype=np.complex128)
 
     return response

@@ -28,8 +28,7 @@ from rigsight.diagnose.search.screening import Response, Shortlist, scaled
 from rigsight.diagnose.search.single_effects import followed
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _DEPENDENT = 1e-6
 """Squared part of a column outside the others, in units of the column, below which it depends on them."""

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
@@ -21,6 +20,7 @@ from rigsight.diagnose.policy import FAMILIES, SEARCH
 from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 
 Key = tuple[Family, str]
@@ -83,7 +83,7 @@ def families_at_places(
     diagnosed: FittedModel,
     candidates: Sequence[tuple[FittedModel, float, float]],
     outside: float,
-    noise: NDArray[np.float64],
+    noise: Floats,
     rng: np.random.Generator,
     proposal: Proposal | None = None,
     by_motion: bool = False,
@@ -160,7 +160,7 @@ def main_causes(
     rig: Rig,
     reidentified: FittedModel,
     candidates: Sequence[tuple[FittedModel, float]],
-    noise: NDArray[np.float64],
+    noise: Floats,
     proposal: Proposal | None,
 ) -> dict[Key, float]:
     """Return how probable each family is as the main cause where no law is exact, from models and their shares of the ranking."""
@@ -203,7 +203,7 @@ def _weighed(
     reidentified: FittedModel,
     models: Sequence[FittedModel],
     of_rank: Sequence[float],
-    explained: NDArray[np.float64],
+    explained: Floats,
     proposal: Proposal | None,
 ) -> dict[Key, float]:
     """Return how probable each family is as the main cause where no law is exact."""
@@ -246,7 +246,7 @@ def _evidence(explained: float, without: float, per_share: float) -> float:
     return per_share * math.log(without_it / with_it)
 
 
-def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: NDArray[np.float64]) -> float:
+def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: Floats) -> float:
     return max((float(explained[i]) for i, own in enumerate(models) if own is model), default=0.0)
 
 
@@ -258,7 +258,7 @@ def keys_of(rig: Rig, effects: Sequence[Effect]) -> tuple[Key, ...]:
 def _share(
     key: Key,
     of_model: Sequence[Key],
-    explained: NDArray[np.float64],
+    explained: Floats,
     of_sets: Mapping[frozenset[Key], Sequence[int]],
 ) -> float:
     """Return what a family adds to what the others explain, averaged over the orders of adding them: Shapley's value."""
@@ -269,9 +269,7 @@ def _share(
     return float(np.mean(steps))
 
 
-def _best(
-    keys: frozenset[Key], explained: NDArray[np.float64], of_sets: Mapping[frozenset[Key], Sequence[int]]
-) -> float:
+def _best(keys: frozenset[Key], explained: Floats, of_sets: Mapping[frozenset[Key], Sequence[int]]) -> float:
     """Return what a set of families explains: at least what the best part of it does that was fitted."""
     found = (float(explained[i]) for own, at in of_sets.items() if own <= keys for i in at)
     return max(0.0, max(found, default=0.0))

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
@@ -20,6 +19,7 @@ from rigsight.diagnose.verdict.families import keys_of, main_causes
 from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.inverse import MissingForce, Proposal
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 
 
@@ -45,7 +45,7 @@ def main_cause(
     reidentified: FittedModel,
     best: FittedModel,
     tied: Sequence[FittedModel],
-    noise: NDArray[np.float64],
+    noise: Floats,
     rng: np.random.Generator,
 ) -> MainCause:
     """Determine the share of the residual of the equations that a model explains."""
@@ -62,9 +62,7 @@ def main_cause(
     return MainCause(share, lowest, tuple(other), tuple(same))
 
 
-def _common_part(
-    reidentified: FittedModel, one: FittedModel, other: FittedModel, noise: NDArray[np.float64]
-) -> float:
+def _common_part(reidentified: FittedModel, one: FittedModel, other: FittedModel, noise: Floats) -> float:
     """Return the share of the squared gap explained by one model that another explains too."""
     explained = differing = 0.0
     for gap, remainder, others_left in zip(
@@ -207,7 +205,7 @@ def by_motion(
     rig: Rig,
     reidentified: FittedModel,
     ranking: Ranking,
-    noise: NDArray[np.float64],
+    noise: Floats,
     proposal: Proposal | None,
 ) -> Judgement:
     """Return the judgement with the most probable family, where it is another one."""

@@ -14,6 +14,7 @@ from rigsight.diagnose.noise.block_means import Blocks, squared_errors
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.evidence_for_more import is_linear
 from rigsight.effects.effect import Place
+from rigsight.records.record import Floats
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Ranking:
 
 def rank(
     models: Sequence[FittedModel],
-    noise: NDArray[np.float64],
+    noise: Floats,
     rng: np.random.Generator,
     gap: float = 1.0,
     criterion: Callable[[FittedModel], float] | None = None,
@@ -137,7 +138,7 @@ def _error_of_choice(squares: Blocks, draws: NDArray[np.int64], winners: NDArray
 
 def _evidence_of(
     models: Sequence[FittedModel],
-    errors: NDArray[np.float64],
+    errors: Floats,
     criterion: Callable[[FittedModel], float] | None,
 ) -> list[float | None]:
     """Return the log evidence of each model relative to the most probable one; None if not fitted to convergence."""
@@ -151,13 +152,13 @@ def _evidence_of(
     return [None if value is None else value - most for value in reported]
 
 
-def _tempered(evidence: Sequence[float | None]) -> NDArray[np.float64]:
+def _tempered(evidence: Sequence[float | None]) -> Floats:
     """Return the tempered evidence in units of the largest; models without one have the least of the others."""
     least = min((value for value in evidence if value is not None), default=0.0)
     return np.exp(VERDICT.temper * np.array([least if value is None else value for value in evidence]))
 
 
-def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[np.float64]:
+def _shared(winners: NDArray[np.bool_], prior: Floats) -> Floats:
     """Return the share of each model in each resample's win, shape (n_resamples, n_models)."""
     shares = np.where(winners, prior, 0.0)
     return np.asarray(shares / np.sum(shares, axis=1, keepdims=True))
@@ -193,6 +194,6 @@ def _unidentifiable_sensor_effect(model: FittedModel) -> bool:
     return one_output and any(effect.place is Place.SENSOR and is_linear(effect) for effect in model.effects)
 
 
-def noise_vector(outputs: Sequence[str], noise: Mapping[str, float]) -> NDArray[np.float64]:
+def noise_vector(outputs: Sequence[str], noise: Mapping[str, float]) -> Floats:
     """Return the noise floor of each output in order; infinite for one that was never measured, shape (n_outputs,)."""
     return np.array([noise.get(name, np.inf) for name in outputs])
