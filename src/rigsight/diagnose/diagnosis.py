@@ -54,7 +54,7 @@ from rigsight.diagnose.verdict.families import (
     shares_of_gap,
 )
 from rigsight.diagnose.verdict.judgement import traced_to
-from rigsight.diagnose.verdict.ranking import Grounds, noise_vector
+from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
@@ -169,7 +169,7 @@ def _assembled(
         judgement.model,
         [(model, probability, grounds.share) for model, probability, grounds in ranked],
         probability_not_tried(candidates),
-        noise_vector([signal.name for signal in rig.outputs], noise),
+        context.floors,
         rng.spawn(1)[0],
         found.proposal,
         judgement.by_motion,

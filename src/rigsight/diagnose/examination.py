@@ -37,12 +37,11 @@ from rigsight.diagnose.verdict.plausibility import (
     plausible_first,
     stands,
 )
-from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
+from rigsight.diagnose.verdict.ranking import Ranking, rank, with_last
 from rigsight.effects import Effect
 from rigsight.identify import FitMemory, IdleThreads
 from rigsight.identify.fit.windows import Windowing
 from rigsight.inverse import Proposal
-from rigsight.records.record import Floats
 
 
 @dataclass(frozen=True)
@@ -104,8 +103,7 @@ def examine(
     models = with_several_effects(campaign, alone, lower_bound, allowed, rng, say)
     context, before, reidentified = models.alone.context, models.alone.before, models.alone.reidentified
     checks = models.checks
-    vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)
-    ranking, imitations = _ranked(models, alone.effects, vector, allowed, rng)
+    ranking, imitations = _ranked(models, allowed, rng)
     is_usable = bool(ranking.order) and bool(ranking.order[0].residuals) and ranking.probabilities[0] > 0.0
     best, tied = (ranking.order[0], ranking.tied) if is_usable else (reidentified, ())
     is_reached = best.error_over_noise <= allowed and not lower_bound
@@ -116,11 +114,13 @@ def examine(
         reidentified,
         best,
         checks.is_adequate,
-        lambda: main_cause(campaign.rig, reidentified, best, tied, vector, rng),
+        lambda: main_cause(campaign.rig, reidentified, best, tied, context.floors, rng),
         lower_bound,
     )
     if not is_exact(judgement, best, allowed, checks.is_adequate):
-        judgement = by_motion(judgement, campaign.rig, reidentified, ranking, vector, models.alone.proposal)
+        judgement = by_motion(
+            judgement, campaign.rig, reidentified, ranking, context.floors, models.alone.proposal
+        )
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
     remainder = checks.of(judgement.model) if judgement.model.residuals else None
@@ -165,7 +165,7 @@ def _raised(floor: NoiseFloor, factor: float) -> NoiseFloor:
 
 
 def _ranked(
-    models: AllModels, effects: Sequence[Effect], noise: Floats, allowed: float, rng: np.random.Generator
+    models: AllModels, allowed: float, rng: np.random.Generator
 ) -> tuple[Ranking, tuple[FittedModel, ...]]:
     """Return the ranking of all models with effects, and those that do not compete because other laws fit equally well."""
     context, reidentified, singles = models.alone.context, models.alone.reidentified, models.alone.singles
@@ -194,12 +194,12 @@ def _ranked(
     counts = likeliest is not None and models.checks.is_adequate(likeliest)
     gap = reidentified.error_over_noise
     ranked = partial(
-        rank, noise=noise, rng=rng, gap=gap, criterion=evidence.criterion, evidence_counts=counts
+        rank, noise=context.floors, rng=rng, gap=gap, criterion=evidence.criterion, evidence_counts=counts
     )
     ranking = ranked(candidates)
     if ranking.order and ranking.order[0].residuals:
         if not models.are_in_windows:
-            ranking = _with_offset_rivals(context, ranking, effects, ranked)
+            ranking = _with_offset_rivals(context, ranking, models.alone.effects, ranked)
         if ranking.order[0].error_over_noise > allowed:
             places = {e.name: context.rig.acts_at(e) for model in ranking.order for e in model.effects}
             ranking = plausible_first(ranking, reidentified, places)

@@ -117,6 +117,11 @@ class FitContext:
         if self.compiler is not None:
             self.compiler([structure_of_fit(s, (*self.estimation, *self.scoring)) for s in structures])
 
+    @cached_property
+    def floors(self) -> Floats:
+        """Noise floor of each output of the rig in order; infinite for one that was never measured, shape (n_outputs,)."""
+        return np.array([self.noise.get(signal.name, np.inf) for signal in self.rig.outputs])
+
     @property
     def period(self) -> float:
         """Natural period of the rig, or the typical one of its motion [s]."""

@@ -124,8 +124,7 @@ def with_offsets_free(campaign: Campaign) -> Campaign:
 
 def _cost_without_means(context: FitContext, model: FittedModel) -> float:
     """Return the sum of squared weighted residuals about their mean in each record."""
-    noise = np.array([context.noise.get(signal.name, np.inf) for signal in context.rig.outputs])
-    parts = [residual / noise for residual in model.fit.residuals]
+    parts = [residual / context.floors for residual in model.fit.residuals]
     return float(sum(np.nansum((part - np.mean(part, axis=0)) ** 2) for part in parts))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -192,8 +192,3 @@ def _unidentifiable_sensor_effect(model: FittedModel) -> bool:
     """Return True for a linear effect of the sensor of a rig with one output: it is equivalent to one of the drive."""
     one_output = len(model.fit.structure.rig.outputs) == 1
     return one_output and any(effect.place is Place.SENSOR and is_linear(effect) for effect in model.effects)
-
-
-def noise_vector(outputs: Sequence[str], noise: Mapping[str, float]) -> Floats:
-    """Return the noise floor of each output in order; infinite for one that was never measured, shape (n_outputs,)."""
-    return np.array([noise.get(name, np.inf) for name in outputs])
