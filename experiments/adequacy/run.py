@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fit_context import fit_context_of, start_values_of
 from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import reidentify

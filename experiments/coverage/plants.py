@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.pushes.probes import push
-from rigsight.diagnose.uncertainty.replicates import with_forces
+from rigsight.diagnose.replicates import with_forces
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.identify import GreyBoxFit, characteristic_scales

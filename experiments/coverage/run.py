@@ -22,9 +22,9 @@ import numpy as np
 from plants import Drawn, drawn
 
 from rigsight.diagnose import candidates_on
-from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.search.basins import in_lowest_basins
-from rigsight.diagnose.uncertainty.bootstrap import uncertainty_of
+from rigsight.diagnose.bootstrap import uncertainty_of
+from rigsight.diagnose.fit_context import FittedModel
+from rigsight.diagnose.search.nested_models import in_lowest_basins
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import RigsightError
 from rigsight.identify import FitResult

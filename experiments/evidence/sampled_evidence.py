@@ -29,7 +29,7 @@ from scipy.stats import multivariate_t
 
 import rigsight.diagnose.diagnosis as diagnosis
 from rigsight.diagnose.examination import Examination, examine
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
 from rigsight.workflow.diagnose import run_diagnose
 

@@ -26,11 +26,11 @@ from plants import Drawn, drawn  # noqa: E402
 
 from rigsight.campaign import Campaign  # noqa: E402
 from rigsight.diagnose import candidates_on, examination  # noqa: E402
-from rigsight.diagnose.fitting.fit_context import FittedModel  # noqa: E402
+from rigsight.diagnose.fit_context import FittedModel  # noqa: E402
 from rigsight.diagnose.noise.adequacy import Checks  # noqa: E402
 from rigsight.diagnose.policy import VERDICT  # noqa: E402
+from rigsight.diagnose.search.evidence_for_more import OtherForms  # noqa: E402
 from rigsight.diagnose.search.fitted_models import AllModels  # noqa: E402
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms  # noqa: E402
 from rigsight.effects import CATALOGUE  # noqa: E402
 from rigsight.rigs import RIGS, Rig  # noqa: E402
 
@@ -57,7 +57,7 @@ def campaign_of(plant: Drawn, rig: Rig, at_bounds: bool, rng: np.random.Generato
     return Campaign("nested", rig, constants, given, records)
 
 
-def single_effects_only(_campaign, _noise, models, _effects, lower_bound, _allowed, rng, _say, _prepare):  # type: ignore[no-untyped-def]
+def single_effects_only(_campaign, models, lower_bound, _allowed, rng, _say):  # type: ignore[no-untyped-def]
     """Return the models of one effect alone: the order of these is studied, and pairs take ten times as long."""
     most_remainder = np.inf if lower_bound else VERDICT.most_remainder
     checks = Checks(models.context, rng, VERDICT.at_floor, most_remainder)

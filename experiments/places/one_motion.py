@@ -12,10 +12,10 @@ import time
 from pathlib import Path
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fit_context import fit_context_of, start_values_of
 from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.single_effects import reidentify
+from rigsight.diagnose.search.worth_fitting import search_places
 from rigsight.effects import CATALOGUE
 from rigsight.identify import IdleThreads
 from rigsight.identify.fit.windows import Windowing

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose import candidates_on
-from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.search.places import search_places
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.starts import start_values
+from rigsight.diagnose.search.worth_fitting import search_places
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import RigsightError
 from rigsight.identify import characteristic_scales

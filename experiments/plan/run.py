@@ -21,7 +21,7 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.advise import Advice, advise
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.effects import Effect, effect_named
 from rigsight.errors import RigsightError
 from rigsight.excitation import linear_sweep, multisine, multisine_lines, step

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import FitResult
 from rigsight.records.record import Record

@@ -25,9 +25,9 @@ from rigsight.rigs import AXIS
 def test_no_experiment_leaves_the_range_of_the_recorded_input(u: np.ndarray) -> None:
     record = Record("run", 0.01, {"u": u, "x": u}, {"u": "N"})
     menu = list(_menu(SimpleNamespace(rig=AXIS, estimation=(record,), scales={"time": 0.1})))  # type: ignore[arg-type]
-    assert "step" in {experiment.waveform for experiment in menu}
+    assert "step" in {waveform for (waveform, *_), _ in menu}
     tolerance = 1e-9 * np.ptp(u)
-    for experiment in menu:
-        assert np.min(experiment.inputs["u"]) >= np.min(u) - tolerance
-        assert np.max(experiment.inputs["u"]) <= np.max(u) + tolerance
-        assert np.ptp(experiment.inputs["u"]) > 0.0
+    for _, inputs in menu:
+        assert np.min(inputs["u"]) >= np.min(u) - tolerance
+        assert np.max(inputs["u"]) <= np.max(u) + tolerance
+        assert np.ptp(inputs["u"]) > 0.0

@@ -10,8 +10,7 @@ import pytest
 
 import rigsight.diagnose
 from rigsight.diagnose.policy import POLICY
-from rigsight.diagnose.policy.number import number, stated
-from rigsight.errors import InputError
+from rigsight.diagnose.policy.number import stated
 
 PACKAGE = Path(rigsight.diagnose.__file__).parent
 GROUPS = [getattr(POLICY, own.name) for own in dataclasses.fields(POLICY)]
@@ -83,11 +82,6 @@ def test_every_number_has_a_reason(group: object) -> None:
 
 def test_the_deciding_numbers_can_be_counted() -> None:
     assert len(stated(POLICY.verdict)) <= MOST_DECIDING
-
-
-def test_a_number_of_unknown_kind_is_refused() -> None:
-    with pytest.raises(InputError, match="kind of a number"):
-        number(1.0, "guess", "nobody knows")  # type: ignore[arg-type]
 
 
 def test_the_policy_cannot_be_changed() -> None:

@@ -22,7 +22,7 @@ from rigsight.diagnose.location.gap_parts import (
     TimePart,
 )
 from rigsight.diagnose.location.trace import Trace
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, OutputGap
 from rigsight.effects import Family, effect_named
 from rigsight.inverse import MissingForce, Proposal, ProposedCause

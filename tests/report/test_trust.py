@@ -9,8 +9,7 @@ import pytest
 from rigsight.api.diagnoser import DiagnosisResult
 from rigsight.diagnose.result import Diagnosis
 from rigsight.diagnose.trust.patterns import Pattern, Role, meaning
-from rigsight.diagnose.trust.result import GroupValue, ParameterTrust, Trust
-from rigsight.diagnose.trust.statement import statement
+from rigsight.diagnose.trust.statement import GroupValue, ParameterTrust, Trust, statement
 from rigsight.errors import InputError
 from rigsight.report import render_report
 from rigsight.report.sections import trust_line

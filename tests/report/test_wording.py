@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from rigsight.diagnose.noise.adequacy import Remainder
 from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
-from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.effects import Family
 from rigsight.report.labels import Written, estimate_text, gap_percent, percent, written
 from rigsight.report.wording import (

@@ -14,9 +14,8 @@ from rigsight.check.parameters import CheckedParameter, checked_parameters
 from rigsight.check.remarks import Remark, remarks
 from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
 from rigsight.diagnose.data_quality.finding import AmplitudeDependence
-from rigsight.diagnose.fitting.preparation import start_values_of
-from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.fit_context import start_values_of
+from rigsight.diagnose.noise.detection import NoiseFloor, noise_floors
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.windows import liveliest

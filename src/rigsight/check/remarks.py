@@ -11,7 +11,7 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.check.channels import CheckedRecord
 from rigsight.diagnose.data_quality.checks import sensor_faults
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.records import Record
 from rigsight.records.signals import is_constant, moves_beyond_noise

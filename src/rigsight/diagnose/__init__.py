@@ -1,8 +1,8 @@
 """Where the gap between simulation and rig lies, which effect causes it, how far it shrinks."""
 
 from rigsight.diagnose.diagnosis import diagnose as diagnose
-from rigsight.diagnose.fitting.fit_context import candidates_on as candidates_on
-from rigsight.diagnose.fitting.preparation import structures_to_fit as structures_to_fit
+from rigsight.diagnose.fit_context import candidates_on as candidates_on
+from rigsight.diagnose.fit_context import structures_to_fit as structures_to_fit
 from rigsight.diagnose.result import Candidate as Candidate
 from rigsight.diagnose.result import Diagnosis as Diagnosis
 from rigsight.diagnose.result import LikelyCauses as LikelyCauses

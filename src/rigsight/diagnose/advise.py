@@ -13,21 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES
 from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep, step
 from rigsight.records.record import Floats, Hold, Record
 from rigsight.simulate import simulate
 
-
-@dataclass(frozen=True)
-class _Experiment:
-    waveform: str
-    source: str
-    amplitude: float
-    band: tuple[float, float] | None
-    inputs: Mapping[str, Floats]
+_Band = tuple[float, float] | None
+_Experiment = tuple[str, str, float, _Band]
+"""Waveform, source, amplitude and band, as in `Advice`."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +34,7 @@ class Advice:
     waveform: str
     source: str
     amplitude: float
-    band: tuple[float, float] | None
+    band: _Band
     # Where the two differ most, and the RMS difference of their predictions there in standard deviations of
     # the noise.
     output: str
@@ -52,27 +47,15 @@ def advise(
     """Return, for each rival, the candidate experiment that would distinguish it best from the chosen model."""
     # The separation is the RMS difference of the two predictions, in standard deviations of the noise, at the output where it is
     # largest. Both models keep their fitted parameters, so that it is an upper bound: refitting may reduce it.
-    found = []
-    menu = list(_menu(context))
+    found, menu = [], list(_menu(context))
     for rival in rivals:
         scored = [
-            (separation, experiment)
-            for experiment in menu
-            for separation in _separations(context, chosen, rival, experiment, noise)
+            Advice(rival.names, *experiment, output, size)
+            for experiment, inputs in menu
+            for output, size in _separations(context, chosen, rival, inputs, noise)
         ]
         if scored:
-            (output, size), experiment = max(scored, key=lambda pair: pair[0][1])
-            found.append(
-                Advice(
-                    rival.names,
-                    experiment.waveform,
-                    experiment.source,
-                    experiment.amplitude,
-                    experiment.band,
-                    output,
-                    size,
-                )
-            )
+            found.append(max(scored, key=lambda advice: advice.separation))
     return tuple(found)
 
 
@@ -80,12 +63,12 @@ def _separations(
     context: FitContext,
     chosen: FittedModel,
     rival: FittedModel,
-    experiment: _Experiment,
+    inputs: Mapping[str, Floats],
     noise: Mapping[str, float],
 ) -> Iterator[tuple[str, float]]:
     hold: Hold = context.estimation[0].hold
     units = {source.name: source.unit for source in context.rig.inputs}
-    record = Record("advice", context.estimation[0].dt, experiment.inputs, units, hold=hold)
+    record = Record("advice", context.estimation[0].dt, inputs, units, hold=hold)
     try:
         one, other = (simulate(m.fit.structure, m.fit.values, record, accuracy=1e-5) for m in (chosen, rival))
     except SimulationError:
@@ -94,24 +77,17 @@ def _separations(
         yield output, float(np.sqrt(np.mean((one[output] - other[output]) ** 2)) / size)
 
 
-def _menu(context: FitContext) -> Iterator[_Experiment]:
+def _menu(context: FitContext) -> Iterator[tuple[_Experiment, dict[str, Floats]]]:
+    """Yield each experiment with its inputs."""
     dt = context.estimation[0].dt
     omega = 1.0 / context.scales["time"]
     n_samples = max(200, min(40_000, round(NOTES.advised_periods * 2.0 * math.pi / omega / dt)))
     t = dt * np.arange(n_samples, dtype=np.float64)
     slow, fast = (share * omega for share in NOTES.advised_band)
     fast = min(fast, 0.4 * math.pi / dt)
-    drives: tuple[tuple[str, tuple[float, float] | None, Callable[[float], Floats]], ...] = (
-        (
-            "sweep",
-            (slow, fast),
-            lambda a: linear_sweep(t, a, slow, fast),
-        ),
-        (
-            "slow sine",
-            (slow, slow),
-            lambda a: a * np.sin(slow * t),
-        ),
+    drives: tuple[tuple[str, _Band, Callable[[float], Floats]], ...] = (
+        ("sweep", (slow, fast), lambda a: linear_sweep(t, a, slow, fast)),
+        ("slow sine", (slow, slow), lambda a: a * np.sin(slow * t)),
         ("sine at resonance", (omega, omega), lambda a: a * np.sin(omega * t)),
     )
     if context.rig.is_driven:
@@ -130,4 +106,4 @@ def _menu(context: FitContext) -> Iterator[_Experiment]:
                 largest = (above if above >= below else -below) if waveform == "step" else min(above, below)
                 moved = {**rest, source: middles[source] + drive(share * largest)}
                 if largest != 0.0:
-                    yield _Experiment(waveform, source, share * largest, band, moved)
+                    yield (waveform, source, share * largest, band), moved

@@ -1,24 +1,39 @@
-"""The whole diagnosis: records and a given simulation -> verdict, ranking, gap budget, completed model."""
+"""The whole diagnosis: records and a given simulation -> verdict, ranking, gap budget, completed model.
+
+This is its order. The numbers are those of the sections in docs/verdict.md, which say what each step decides; thresholds are in
+`policy`. `examine` does steps 1 to 9, and is repeated if a model leaves less than a noise floor that was measured at rest.
+
+1. `noise_floors` finds the noise; `windowing_of` decides over which stretch a rig that drifts is compared.
+2. `reidentify` fits the equations without an effect; `held_by_motion` keeps them to the measured motion.
+3. `data_quality` checks the records; with `asked_offsets` all is repeated with offsets by record.
+4. `propose` asks the motion for the missing force and `worth_fitting` what it rules out; `search_places` screens by pushes.
+5. `fit_candidates` fits every effect alone, `lowered_by_extensions` the equations again from the best of them.
+6. `is_predictable` asks whether whole records can decide; else `fitted_in_windows`.
+7. `several_effects`: `NamedByMotion` where the motion names the causes, else `Stepwise`.
+8. `rank` compares all models that stand (`stands`, `is_beyond_records`, `beyond_disturbance`).
+9. `judge` names the verdict, `by_motion` the cause where simulations do not decide; `adequacy` tests what the model leaves.
+10. `trained` gives probabilities of models, `families_at_places` those of families.
+11. `localize`, `with_own_errors` and `advise`: where, how sure, what next. `verdict_notes` says what else is to be known.
+12. `trust` asks whether the parameters are the same everywhere.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from rigsight.campaign import Campaign, with_weighed_spring
 from rigsight.diagnose.advise import advise
+from rigsight.diagnose.bootstrap import with_own_errors
 from rigsight.diagnose.examination import Examination, examine
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel, candidates_on
-from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, candidates_on
 from rigsight.diagnose.location.localize import localize
-from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
-from rigsight.diagnose.location.trace import traces_of
-from rigsight.diagnose.noise.detection import AT_REST
-from rigsight.diagnose.noise.disturbance import disturbance
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.location.trace import budget_intervals, effect_shares, traces_of
+from rigsight.diagnose.noise.adequacy import remainder_of
+from rigsight.diagnose.noise.detection import AT_REST, NoiseFloor, disturbance
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import (
     Candidate,
@@ -28,9 +43,7 @@ from rigsight.diagnose.result import (
     OutputGap,
     probability_not_tried,
 )
-from rigsight.diagnose.trust.record_numbers import record_numbers
-from rigsight.diagnose.trust.trust import trust
-from rigsight.diagnose.uncertainty.bootstrap import with_own_errors
+from rigsight.diagnose.trust.trust import record_numbers, trust
 from rigsight.diagnose.verdict.calibration import Situation, trained
 from rigsight.diagnose.verdict.families import (
     FamilyAtPlace,
@@ -40,10 +53,9 @@ from rigsight.diagnose.verdict.families import (
     shares_of_force,
     shares_of_gap,
 )
-from rigsight.diagnose.verdict.main_cause import traced_to
-from rigsight.diagnose.verdict.ranking import Grounds, noise_vector
-from rigsight.diagnose.verdict.remainder import remainder_of
-from rigsight.diagnose.verdict.verdict_notes import Basis, verdict_notes
+from rigsight.diagnose.verdict.judgement import traced_to
+from rigsight.diagnose.verdict.ranking import Grounds
+from rigsight.diagnose.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.identify import FitMemory
@@ -94,7 +106,6 @@ def diagnose(
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
     campaign = with_weighed_spring(campaign)
     effects = candidates_on(campaign.rig, effects, campaign.modelled)
-    scored_on = "validation" if campaign.validation else "estimation"
     rng = np.random.default_rng(seed)
     found = examine(campaign, effects, rng, n_jobs, say, prepare, memory)
     below_rest = None
@@ -102,20 +113,16 @@ def diagnose(
         below_rest = _least_left(found)
         found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
     notes = verdict_notes(Basis(campaign, found, rng, below_rest))
-    diagnosis = _assembled(campaign, found, notes, scored_on, rng)
-    diagnosis = replace(diagnosis, data_quality=found.quality)
+    diagnosis = _assembled(campaign, found, notes, rng)
     named = found.judgement.model if diagnosis.effects else found.reidentified
     if found.judgement.verdict != "unknown":
         diagnosis = with_own_errors(diagnosis, found.context, named, seed)
         say("standard errors")
     own = next(candidate for candidate in diagnosis.candidates if candidate.effects == named.names)
     std = {name: estimate.std for name, estimate in own.parameters.items()}
-    diagnosis = replace(
-        diagnosis,
-        trust=trust(found.context, named, campaign.records, campaign.constants, std),
-    )
+    trusted = trust(found.context, named, campaign.records, campaign.constants, std)
     say("trust in the numbers")
-    return diagnosis
+    return replace(diagnosis, trust=trusted)
 
 
 def _least_left(found: Examination) -> float:
@@ -123,29 +130,26 @@ def _least_left(found: Examination) -> float:
 
 
 def _assembled(
-    campaign: Campaign,
-    found: Examination,
-    notes: Sequence[str],
-    scored_on: str,
-    rng: np.random.Generator,
+    campaign: Campaign, found: Examination, notes: tuple[str, ...], rng: np.random.Generator
 ) -> Diagnosis:
+    scored_on = "validation" if campaign.validation else "estimation"
     rig, context, before, reidentified = campaign.rig, found.context, found.before, found.reidentified
     ranking, judgement, floors = found.ranking, found.judgement, found.floors
     is_effect = judgement.verdict == "effect"
     after = judgement.model if is_effect else (before if judgement.verdict == "none" else reidentified)
-    noise = {floor.output: floor for floor in floors}
-    measured = _measured(rig, context.scoring)
+    noise, measured = context.noise, _measured(rig, context.scoring)
     traces = traces_of(context, before, reidentified, after)
     scored = [trace for trace in traces if trace.role == scored_on]
     at_floor = {
-        name: noise[name].std / spread if (spread := float(np.std(values))) > 0.0 else math.inf
+        name: noise[name] / spread if (spread := float(np.std(values))) > 0.0 else math.inf
         for name, values in measured.items()
     }
+    errors = [_errors(rig, model.residuals, measured) for model in (before, reidentified, after)]
     gap = {
         name: OutputGap(
-            before=nrmse(_column(rig, before, name), measured[name]),
-            reidentified=nrmse(_column(rig, reidentified, name), measured[name]),
-            after=nrmse(_column(rig, after, name), measured[name]),
+            before=errors[0][name],
+            reidentified=errors[1][name],
+            after=errors[2][name],
             noise_floor=at_floor[name],
             intervals=budget_intervals(scored, name, at_floor[name], rng),
         )
@@ -154,10 +158,8 @@ def _assembled(
     calibration, situation = trained(), _situation(found)
     without_effect = _candidate(context, reidentified, calibration.without_effect(situation))
     probabilities = calibration.probabilities(situation, ranking.probabilities)
-    with_effect = [
-        _candidate(context, model, probability, grounds)
-        for model, probability, grounds in zip(ranking.order, probabilities, ranking.grounds, strict=True)
-    ]
+    ranked = list(zip(ranking.order, probabilities, ranking.grounds, strict=True))
+    with_effect = [_candidate(context, *own) for own in ranked]
     candidates = tuple(
         sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.error_over_noise))
     )
@@ -165,14 +167,9 @@ def _assembled(
         rig,
         reidentified,
         judgement.model,
-        [
-            (model, probability, grounds.share)
-            for model, probability, grounds in zip(ranking.order, probabilities, ranking.grounds, strict=True)
-        ],
+        [(model, probability, grounds.share) for model, probability, grounds in ranked],
         probability_not_tried(candidates),
-        noise_vector(
-            [signal.name for signal in rig.outputs], {name: floor.std for name, floor in noise.items()}
-        ),
+        context.floors,
         rng.spawn(1)[0],
         found.proposal,
         judgement.by_motion,
@@ -190,7 +187,9 @@ def _assembled(
         where = _evidence(found)
     remainder = None
     if found.adequacy is not None and found.adequacy.adequate:
-        floors = tuple(_up_to(floor, _column(rig, judgement.model, floor.output)) for floor in floors)
+        floors = tuple(
+            _up_to(floor, _column(rig, judgement.model.residuals, floor.output)) for floor in floors
+        )
     if found.adequacy is not None:
         lower_bound = any(floor.lower_bound for floor in floors)
         remainder = remainder_of(reidentified, judgement.model, found.adequacy, lower_bound, is_effect)
@@ -213,16 +212,14 @@ def _assembled(
         given=dict(campaign.given),
         record_numbers=record_numbers(context, after, campaign.estimation[0].hold),
         model=Model.of(after.fit.structure, after.fit.values, campaign.estimation[0].hold).to_json(),
-        notes=tuple(notes),
+        notes=notes,
         windows=found.windowing.length,
         window_cycles=found.windowing.cycles,
         bandwidth=found.windowing.bandwidth,
         scored_on=scored_on,
+        data_quality=found.quality,
         advice=advise(
-            context,
-            judgement.model,
-            [model for model in ranking.order if model.names in rivals],
-            {n: f.std for n, f in noise.items()},
+            context, judgement.model, [model for model in ranking.order if model.names in rivals], noise
         ),
         places=found.places,
         adequate=None if found.adequacy is None else found.adequacy.adequate,
@@ -343,10 +340,18 @@ def _evidence(found: Examination) -> tuple[str, ...]:
     return tuple(dict.fromkeys(rig.where(effect) for effect in found.judgement.model.effects))
 
 
-def _column(rig: Rig, model: FittedModel, output: str) -> Floats:
+def _column(rig: Rig, residuals: Sequence[Floats], output: str) -> Floats:
     index = [signal.name for signal in rig.outputs].index(output)
-    column = np.concatenate([residual[:, index] for residual in model.residuals])
+    column = np.concatenate([residual[:, index] for residual in residuals])
     return np.asarray(column[np.isfinite(column)])
+
+
+def _errors(rig: Rig, residuals: Sequence[Floats], measured: Mapping[str, Floats]) -> dict[str, float]:
+    """Return the NRMSE of each output; infinite for a model that could not be simulated."""
+    return {
+        name: nrmse(_column(rig, residuals, name), values) if residuals else math.inf
+        for name, values in measured.items()
+    }
 
 
 def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, Floats]:
@@ -358,23 +363,13 @@ def _candidate(
     context: FitContext, model: FittedModel, probability: float, grounds: Grounds | None = None
 ) -> Candidate:
     units = {p.name: p.unit for p in model.fit.structure.parameters}
-    measured = _measured(context.rig, context.scoring)
-    fitted = _measured(context.rig, context.estimation)
-    estimation = FittedModel(model.effects, model.fit, model.fit, 0.0)
+    rig = context.rig
     return Candidate(
         effects=model.names,
-        where=tuple(context.rig.where(effect) for effect in model.effects),
+        where=tuple(rig.where(effect) for effect in model.effects),
         probability=probability,
-        validation_nrmse={
-            name: nrmse(_column(context.rig, model, name), values) if model.residuals else float("inf")
-            for name, values in measured.items()
-        },
-        estimation_nrmse={
-            name: nrmse(_column(context.rig, estimation, name), values)
-            if model.fit.residuals
-            else float("inf")
-            for name, values in fitted.items()
-        },
+        validation_nrmse=_errors(rig, model.residuals, _measured(rig, context.scoring)),
+        estimation_nrmse=_errors(rig, model.fit.residuals, _measured(rig, context.estimation)),
         error_over_noise=model.error_over_noise,
         parameters={
             name: Estimate(model.fit.values[name], model.fit.standard_errors[name], units[name])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -11,35 +12,36 @@ from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model, with_offsets_told
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare, start_values_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, Prepare, fit_context_of, start_values_of
 from rigsight.diagnose.noise.adequacy import Adequacy
-from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.noise.detection import NoiseFloor, noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.search.evidence_for_more import beyond_disturbance, split_distinguishable, with_parts
 from rigsight.diagnose.search.fitted_models import AllModels, single_models, with_several_effects
-from rigsight.diagnose.search.horizon import preparing, restores, windowing_of
-from rigsight.diagnose.search.places import SuspectedPlace
-from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbance, with_parts
-from rigsight.diagnose.search.several.one_law import split_distinguishable
+from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
-from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
+from rigsight.diagnose.search.worth_fitting import SuspectedPlace
 from rigsight.diagnose.verdict.families import keys_of, probable_part
-from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
-from rigsight.diagnose.verdict.main_cause import main_cause
+from rigsight.diagnose.verdict.judgement import (
+    Judgement,
+    by_motion,
+    is_exact,
+    judge,
+    main_cause,
+    most_remainder,
+)
 from rigsight.diagnose.verdict.plausibility import (
     doubts,
     is_beyond_records,
     plausible_first,
     stands,
 )
-from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank, with_last
+from rigsight.diagnose.verdict.ranking import Ranking, rank, with_last
 from rigsight.effects import Effect
-from rigsight.identify import FitMemory
+from rigsight.identify import FitMemory, IdleThreads
 from rigsight.identify.fit.windows import Windowing
 from rigsight.inverse import Proposal
-from rigsight.records.record import Floats
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,8 @@ def examine(
     say("noise floor")
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
-    ready = preparing(prepare, windowing.cut(campaign.records))
-    alone = single_models(campaign, noise, effects, windowing, start, n_jobs, say, ready, memory)
+    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs), start, prepare)
+    alone = single_models(campaign, context, windowing, effects, say)
     quality = data_quality(alone.context, campaign.records, alone.reidentified)
     allowed = VERDICT.at_lower_bound if lower_bound else most_remainder(alone.reidentified.error_over_noise)
     asked = (
@@ -98,11 +100,10 @@ def examine(
         freed = with_offsets_free(campaign)
         again = examine(freed, effects, rng, n_jobs, say, prepare, memory, at_rest)
         return replace(again, quality=replace(again.quality, findings=(asked, *again.quality.findings)))
-    models = with_several_effects(campaign, noise, alone, lower_bound, allowed, rng, say, ready)
+    models = with_several_effects(campaign, alone, lower_bound, allowed, rng, say)
     context, before, reidentified = models.alone.context, models.alone.before, models.alone.reidentified
     checks = models.checks
-    vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)
-    ranking, imitations = _ranked(models, alone.effects, vector, allowed, rng)
+    ranking, imitations = _ranked(models, allowed, rng)
     is_usable = bool(ranking.order) and bool(ranking.order[0].residuals) and ranking.probabilities[0] > 0.0
     best, tied = (ranking.order[0], ranking.tied) if is_usable else (reidentified, ())
     is_reached = best.error_over_noise <= allowed and not lower_bound
@@ -113,11 +114,13 @@ def examine(
         reidentified,
         best,
         checks.is_adequate,
-        lambda: main_cause(campaign.rig, reidentified, best, tied, vector, rng),
+        lambda: main_cause(campaign.rig, reidentified, best, tied, context.floors, rng),
         lower_bound,
     )
     if not is_exact(judgement, best, allowed, checks.is_adequate):
-        judgement = by_motion(judgement, campaign.rig, reidentified, ranking, vector, models.alone.proposal)
+        judgement = by_motion(
+            judgement, campaign.rig, reidentified, ranking, context.floors, models.alone.proposal
+        )
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
     remainder = checks.of(judgement.model) if judgement.model.residuals else None
@@ -162,7 +165,7 @@ def _raised(floor: NoiseFloor, factor: float) -> NoiseFloor:
 
 
 def _ranked(
-    models: AllModels, effects: Sequence[Effect], noise: Floats, allowed: float, rng: np.random.Generator
+    models: AllModels, allowed: float, rng: np.random.Generator
 ) -> tuple[Ranking, tuple[FittedModel, ...]]:
     """Return the ranking of all models with effects, and those that do not compete because other laws fit equally well."""
     context, reidentified, singles = models.alone.context, models.alone.reidentified, models.alone.singles
@@ -190,12 +193,13 @@ def _ranked(
     # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.
     counts = likeliest is not None and models.checks.is_adequate(likeliest)
     gap = reidentified.error_over_noise
-    ranking = rank(candidates, noise, rng, gap, evidence.criterion, counts)
+    ranked = partial(
+        rank, noise=context.floors, rng=rng, gap=gap, criterion=evidence.criterion, evidence_counts=counts
+    )
+    ranking = ranked(candidates)
     if ranking.order and ranking.order[0].residuals:
         if not models.are_in_windows:
-            ranking = _with_offset_rivals(
-                context, ranking, effects, noise, rng, gap, evidence.criterion, counts
-            )
+            ranking = _with_offset_rivals(context, ranking, models.alone.effects, ranked)
         if ranking.order[0].error_over_noise > allowed:
             places = {e.name: context.rig.acts_at(e) for model in ranking.order for e in model.effects}
             ranking = plausible_first(ranking, reidentified, places)
@@ -206,11 +210,7 @@ def _with_offset_rivals(
     context: FitContext,
     ranking: Ranking,
     effects: Sequence[Effect],
-    noise: Floats,
-    rng: np.random.Generator,
-    gap: float,
-    criterion: Callable[[FittedModel], float],
-    evidence_counts: bool,
+    ranked: Callable[[Sequence[FittedModel]], Ranking],
 ) -> Ranking:
     """Let an even effect without a constant force compete where the best model needs a constant force."""
     # A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
@@ -232,4 +232,4 @@ def _with_offset_rivals(
         if is_even and is_new and context.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(context, (*best.effects, effect), base, hold=frozenset(needed)))
-    return rank([*ranking.order, *rivals], noise, rng, gap, criterion, evidence_counts)
+    return ranked([*ranking.order, *rivals])

@@ -11,14 +11,14 @@ from rigsight.diagnose.advise import Advice
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.location.trace import Trace
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
-from rigsight.diagnose.search.places import SuspectedPlace
-from rigsight.diagnose.trust.record_numbers import RecordNumbers
-from rigsight.diagnose.trust.result import Trust
+from rigsight.diagnose.noise.adequacy import Remainder
+from rigsight.diagnose.noise.detection import NoiseFloor
+from rigsight.diagnose.search.worth_fitting import SuspectedPlace
+from rigsight.diagnose.trust.statement import Trust
+from rigsight.diagnose.trust.trust import RecordNumbers
 from rigsight.diagnose.verdict.families import FamilyAtPlace, Shares
 from rigsight.diagnose.verdict.judgement import Verdict
 from rigsight.diagnose.verdict.ranking import Grounds
-from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.effects import kind_of
 from rigsight.inverse import Proposal
 from rigsight.json_data import json_data
@@ -45,7 +45,7 @@ class OutputGap:
     reidentified: float  # the same equations with refitted parameters
     after: float  # with the effects of the verdict added
     noise_floor: float  # error of a perfect model
-    # 95 % limits by stage and of ``"closed"``, see `quantify.gap_intervals`.
+    # 95 % limits by stage and of ``"closed"``, see `trace.gap_intervals`.
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -79,7 +79,7 @@ class Candidate:
     grounds
         Basis of the probability; None for the equations without an effect.
     std_method
-        Where the standard errors come from: ``"bootstrap"`` for the diagnosed simulation (`uncertainty/bootstrap.py`), else
+        Where the standard errors come from: ``"bootstrap"`` for the diagnosed simulation (`bootstrap.py`), else
         ``"formula"``, that of the fit.
     """
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigsight.campaign import Campaign, with_weighed_spring
-from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fit_context import FitContext, fit_context_of, start_values_of
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.policy import FAMILIES
 from rigsight.diagnose.search.horizon import restores, windowing_of

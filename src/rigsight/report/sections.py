@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from rigsight import plot
 from rigsight.diagnose.location.trace import STAGES
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.diagnose.result import Diagnosis
+from rigsight.diagnose.trust.estimates import PORTION, RECORD, WINDOW_LENGTH
 from rigsight.diagnose.trust.patterns import Pattern
-from rigsight.diagnose.trust.result import ParameterTrust
-from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
+from rigsight.diagnose.trust.statement import ParameterTrust
 from rigsight.effects import Effect
 from rigsight.errors import InputError
 from rigsight.parameters import Parameter

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.preparation import start_values_of
+from rigsight.diagnose.fit_context import start_values_of
 from rigsight.effects import CATALOGUE, Effect, kind_of
 from rigsight.errors import InputError
 from rigsight.inverse import NAMED_IN, NamedSize, along_motion, named_sizes

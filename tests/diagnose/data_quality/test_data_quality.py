@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
 from rigsight.diagnose.data_quality.checks import data_quality, sensor_faults, with_best_model
 from rigsight.diagnose.data_quality.finding import DataQuality, Finding
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import effect_named

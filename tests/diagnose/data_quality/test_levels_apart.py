@@ -9,7 +9,7 @@ import numpy as np
 
 from rigsight.diagnose.data_quality.finding import Finding
 from rigsight.diagnose.data_quality.offsets_by_record import levels_apart
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 

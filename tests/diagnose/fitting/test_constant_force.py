@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, known_constant_forces
+from rigsight.diagnose.fit_context import FitContext, known_constant_forces
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import characteristic_scales

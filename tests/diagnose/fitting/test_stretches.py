@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales

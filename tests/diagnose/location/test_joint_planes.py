@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location import state_plane
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.state_plane import joint_parts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.location.paths import fit_lateral_leg
 from rigsight.metrics import rms
 from rigsight.records import Record

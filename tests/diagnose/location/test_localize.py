@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.trace import STAGES, Trace
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep

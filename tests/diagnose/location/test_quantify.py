@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.location.quantify import effect_shares, gap_intervals
+from rigsight.diagnose.location.trace import effect_shares, gap_intervals
 
 
 def test_the_interval_holds_the_gap_as_often_as_it_says() -> None:

@@ -11,11 +11,10 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.noise.adequacy import Adequacy, Agreement, adequacy
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms
+from rigsight.diagnose.fit_context import FitContext, FittedModel
+from rigsight.diagnose.noise.adequacy import Adequacy, Agreement, adequacy, remainder_of
+from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.single_effects import reidentify
-from rigsight.diagnose.verdict.remainder import remainder_of
 from rigsight.effects import Effect, effect_named, placed
 from rigsight.identify import characteristic_scales
 from rigsight.records.record import Record

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rigsight.diagnose.noise.disturbance import disturbance
+from rigsight.diagnose.noise.detection import disturbance
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.fit.windows import Observer
 from rigsight.records import Record

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.evidence import Evidence
-from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbance
+from rigsight.diagnose.search.evidence_for_more import beyond_disturbance
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.noise.detection import NoiseFloor, noise_floors
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, RUNNING_GEAR

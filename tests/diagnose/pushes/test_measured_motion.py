@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.pushes.measured_motion import Corrections
+from rigsight.diagnose.pushes.responses import Corrections
 from rigsight.rigs import RIGS
 
 DIFFERENCES = np.column_stack([np.linspace(0.0, 1.0, 5), np.linspace(2.0, 1.0, 5)])

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.search import basins
-from rigsight.diagnose.search.basins import in_lowest_basins
+from rigsight.diagnose.fit_context import FitContext, FittedModel
+from rigsight.diagnose.search import nested_models
+from rigsight.diagnose.search.nested_models import in_lowest_basins
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.records import Record
@@ -117,7 +117,7 @@ def test_the_best_one_starts_from_the_numbers_of_the_next_too(
         asked[own.names] = starts
         return own
 
-    monkeypatch.setattr(basins, "in_lowest_basin", noted)
+    monkeypatch.setattr(nested_models, "in_lowest_basin", noted)
     in_lowest_basins(bench, [next_one, best])
     (start,) = asked[best.names]
     assert start["k"] == next_one.fit.values["k"] != best.fit.values["k"]

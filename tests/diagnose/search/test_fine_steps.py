@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fit_context import fit_context_of, start_values_of
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.identify import IdleThreads

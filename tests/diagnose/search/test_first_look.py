@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.search.first_look import FirstLook, look_at, mean_square, widened
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep

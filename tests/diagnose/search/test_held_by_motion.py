@@ -7,8 +7,7 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import candidates_on
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, fit_context_of, start_values_of
 from rigsight.diagnose.search.fitted_models import held_by_motion
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import CATALOGUE, effect_named

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fit_context import fit_context_of, start_values_of
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import effect_named, placed
 from rigsight.identify import IdleThreads

@@ -10,9 +10,9 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import candidates_on, diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.search.places import Search, search_places
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.search.single_effects import reidentify
+from rigsight.diagnose.search.worth_fitting import Search, search_places
 from rigsight.effects import Effect, effect_named, placed
 from rigsight.identify import characteristic_scales
 from rigsight.rigs import RIGS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.search.position_line import Run, position_lines
+from rigsight.diagnose.search.starts import Run, position_lines
 
 DT = 0.01
 T = DT * np.arange(3000)

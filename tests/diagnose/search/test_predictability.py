@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.search.predictability import growth_of_disturbances
+from rigsight.diagnose.fit_context import FitContext, FittedModel
+from rigsight.diagnose.search.horizon import growth_of_disturbances
 from rigsight.effects import effect_named, placed
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales

@@ -9,10 +9,10 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import Diagnosis, diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.search.places import Search, search_places
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.search.screening import Shortlist
 from rigsight.diagnose.search.single_effects import reidentify
+from rigsight.diagnose.search.worth_fitting import Search, search_places
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
-from rigsight.diagnose.verdict.ranking import noise_vector, rank
+from rigsight.diagnose.verdict.ranking import rank
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.records.record import Record
@@ -101,7 +101,7 @@ def ranked(case: Case, names: tuple[str, ...]) -> tuple[FittedModel, ...]:
     models = fit_candidates(
         context, reidentify(context, context.start), [effect_named(name) for name in names]
     )
-    noise = noise_vector([s.name for s in context.rig.outputs], context.noise)
+    noise = context.floors
     return rank(models, noise, np.random.default_rng(0)).order
 
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.search.same_equation import without_repeated_equations
+from rigsight.diagnose.fit_context import FittedModel
+from rigsight.diagnose.search.nested_models import without_repeated_equations
 from rigsight.rigs import AXIS
 
 NOTHING_KNOWN = SimpleNamespace(constant_forces_beside=lambda _: {})

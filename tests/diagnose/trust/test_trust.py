@@ -12,10 +12,10 @@ from scipy.stats import kstest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.patterns import Pattern, Role, meaning
-from rigsight.diagnose.trust.result import ParameterTrust, Trust
+from rigsight.diagnose.trust.statement import ParameterTrust, Trust
 from rigsight.diagnose.trust.trust import adjusted, course, spread, trust
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import characteristic_scales

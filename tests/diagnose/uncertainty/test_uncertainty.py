@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import rigsight.diagnose.uncertainty.bootstrap as bootstrap
-from rigsight.diagnose.fitting.fit_context import FitContext
+import rigsight.diagnose.bootstrap as bootstrap
+from rigsight.diagnose.bootstrap import uncertainty_of
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.policy import BOOTSTRAP
-from rigsight.diagnose.uncertainty.bootstrap import uncertainty_of
-from rigsight.diagnose.uncertainty.replicates import Sources, colored, likeliest_sources
+from rigsight.diagnose.replicates import Sources, colored, likeliest_sources
 from rigsight.effects import Effect, effect_named
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, characteristic_scales

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.policy import FAMILIES
-from rigsight.diagnose.verdict.by_motion import by_motion, is_exact
 from rigsight.diagnose.verdict.families import families_at_places, main_causes, shares_of_force
-from rigsight.diagnose.verdict.judgement import Judgement
+from rigsight.diagnose.verdict.judgement import Judgement, by_motion, is_exact
 from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 from rigsight.effects import Family, effect_named
 from rigsight.inverse import Proposal, ProposedCause

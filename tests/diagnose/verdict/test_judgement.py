@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.verdict.judgement import Judgement, judge, most_remainder
-from rigsight.diagnose.verdict.main_cause import MainCause
+from rigsight.diagnose.verdict.judgement import Judgement, MainCause, judge, most_remainder
 
 ABOVE, BELOW = 1.001, 0.999
 

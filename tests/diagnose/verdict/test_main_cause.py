@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.verdict.main_cause import main_cause
+from rigsight.diagnose.verdict.judgement import main_cause
 from rigsight.rigs import AXIS
 
 N = 4000

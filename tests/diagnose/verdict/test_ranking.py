@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.verdict.ranking import Grounds, Ranking, noise_vector, rank
+from rigsight.diagnose.fit_context import FitContext, FittedModel
+from rigsight.diagnose.verdict.ranking import Grounds, Ranking, rank
+from rigsight.rigs import RIGS
 
 N = 4000
 
@@ -148,7 +149,11 @@ def test_of_a_large_gap_the_last_thousandth_decides_nothing(scored, white) -> No
 
 
 def test_an_output_that_was_not_measured_does_not_count() -> None:
-    np.testing.assert_array_equal(noise_vector(["psi", "y"], {"psi": 2.0}), [2.0, np.inf])
+    rig = RIGS["drive_train"]
+    first, *others = (signal.name for signal in rig.outputs)
+    assert others
+    context = FitContext(rig, (), (), (), {}, {first: 2.0}, frozenset())
+    np.testing.assert_array_equal(context.floors, [2.0, *(np.inf for _ in others)])
 
 
 def test_with_one_output_a_late_drive_is_named_before_a_late_sensor(scored, white) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.verdict.main_cause import traced_to
+from rigsight.diagnose.verdict.judgement import traced_to
 from rigsight.effects import effect_named, placed
 from rigsight.identify.fit.windows import liveliest
 from rigsight.inverse import MissingForce

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.campaign import with_weighed_spring
-from rigsight.diagnose.fitting.preparation import start_values_of
+from rigsight.diagnose.fit_context import start_values_of
 from rigsight.diagnose.search.horizon import restores, windowing_of
 from rigsight.identify.identification import Identification
 from rigsight.identify.record_identification import EstimationOptions, identify_record

@@ -12,7 +12,7 @@ from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependen
 from rigsight.diagnose.data_quality.finding import DataQuality, Finding
 from rigsight.diagnose.data_quality.input_timing import input_timing, without_short_delays
 from rigsight.diagnose.data_quality.offsets_by_record import levels_apart, means_of
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES
 from rigsight.identify import OFFSETS_MEND
 from rigsight.records.record import Record

@@ -14,11 +14,12 @@ from typing import get_args
 import numpy as np
 
 from rigsight.diagnose.data_quality.finding import Finding
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.identify import FitResult
 from rigsight.records.record import Hold, Record
+from rigsight.records.signals import is_constant
 from rigsight.simulate import carried_over
 
 _TOLERANCE = 1e-3
@@ -101,8 +102,9 @@ def input_timing(
     context: FitContext, effects: tuple[Effect, ...], base: FitResult, with_shift: bool = True
 ) -> InputTiming | None:
     """Fit a model to the most excited stretches with every hold, and with a time offset."""
-    given = {record.hold for record in context.look}
-    if not context.rig.is_driven or not context.driven or len(given) != 1:
+    given, names = {record.hold for record in context.look}, [signal.name for signal in context.rig.inputs]
+    moves = any(not is_constant(record[name]) for record in context.estimation for name in names)
+    if not context.rig.is_driven or not moves or len(given) != 1:
         return None
     (declared,) = given
     as_given = _error_over_noise(context, base, context.look)

@@ -13,9 +13,9 @@ import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import Finding
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
-from rigsight.effects import Effect, Place
+from rigsight.effects import Place
 from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -32,7 +32,7 @@ def asked_offsets(
     # The model must explain the records once offsets are free: an asymmetric effect, whose mean grows with the motion, also
     # shifts records but leaves more than offsets do.
     models = [reidentified, *(m for m in singles if m.fit.residuals and np.isfinite(m.error_over_noise))]
-    forgetful = [m for m in models if not _remembers(m.effects)]
+    forgetful = [m for m in models if not any(e.states and e.place is Place.DYNAMICS for e in m.effects)]
     # With the means gone they come nearest.
     nearest = [min(some, key=lambda m: _cost_without_means(context, m)) for some in (forgetful, models)]
     for model in nearest[:1] if nearest[0] is nearest[1] else nearest:
@@ -122,15 +122,9 @@ def with_offsets_free(campaign: Campaign) -> Campaign:
     return replace(campaign, records=_freed(campaign.rig, campaign.records))
 
 
-def _remembers(effects: Iterable[Effect]) -> bool:
-    """Return True for effects of the motion with states of their own."""
-    return any(effect.states and effect.place is Place.DYNAMICS for effect in effects)
-
-
 def _cost_without_means(context: FitContext, model: FittedModel) -> float:
     """Return the sum of squared weighted residuals about their mean in each record."""
-    noise = np.array([context.noise.get(signal.name, np.inf) for signal in context.rig.outputs])
-    parts = [residual / noise for residual in model.fit.residuals]
+    parts = [residual / context.floors for residual in model.fit.residuals]
     return float(sum(np.nansum((part - np.mean(part, axis=0)) ** 2) for part in parts))
 
 

@@ -30,7 +30,7 @@ class RecordPart(GapPart):
     """One record, relative to its own measured RMS about the mean.
 
     Fitted records (`scored` is False) are listed too; their shares are relative to the fitted records. `interval` holds 95 %
-    limits by stage, see `quantify`. `measured_rms` and `rms`, that of the residual of the diagnosed simulation, are in the unit
+    limits by stage, see `trace`. `measured_rms` and `rms`, that of the residual of the diagnosed simulation, are in the unit
     of the output; `freedom` is the number of degrees of freedom of the mean square of that residual.
     """
 

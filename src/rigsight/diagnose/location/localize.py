@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.bands import band_edges, band_powers, dominant_frequency
 from rigsight.diagnose.location.gap_parts import (
     AmplitudePart,
@@ -18,10 +18,9 @@ from rigsight.diagnose.location.gap_parts import (
     TimePart,
 )
 from rigsight.diagnose.location.paths import path_parts, path_sentence
-from rigsight.diagnose.location.quantify import budget_intervals
 from rigsight.diagnose.location.state_plane import joint_parts, state_parts
-from rigsight.diagnose.location.trace import STAGES, Trace
-from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
+from rigsight.diagnose.location.trace import STAGES, Trace, budget_intervals
+from rigsight.diagnose.noise.detection import NoiseFloor, Stretches
 from rigsight.diagnose.policy import MAPS
 from rigsight.identify import mean_square_freedom
 from rigsight.metrics import rms

@@ -18,7 +18,7 @@ import scipy.optimize
 import scipy.signal
 from scipy.interpolate import CubicSpline
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.gap_parts import PathPart
 from rigsight.diagnose.policy import MAPS, NOTES, VERDICT
 from rigsight.effects import Place

@@ -18,7 +18,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.location.bands import spectrum
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.trace import STAGES, Trace

@@ -24,19 +24,18 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.innovations import Innovations
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.pushes.alternatives import alternatives, slopes
+from rigsight.diagnose.pushes.alternatives import BY_RECORD, alternatives, slopes
 from rigsight.diagnose.pushes.probes import motion_columns, signal_columns
 from rigsight.diagnose.pushes.responses import Followed, Responses, orthonormal
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _TURNS = 9999
 _PORTIONS = 10
@@ -97,11 +96,9 @@ def adequacy(
     significance: float = VERDICT.significance,
     of_steady_size: bool = False,
 ) -> Adequacy:
-    """Test whether the residual of a model on all records is correlated with anything.
-
-    Fitted records are included, because their other amplitudes show a law with a slightly wrong form. Parameters that the fit
-    distorted to compensate are free in the test, so that they do not hide it.
-    """
+    """Test whether the residual of a model on all records is correlated with anything."""
+    # Fitted records are included, because their other amplitudes show a law with a slightly wrong form. Parameters that the fit
+    # distorted to compensate are free in the test, so that they do not hide it.
     records = context.records
     responses = Responses(context, records, context.on_all_records(model), model.effects, model.fit.free)
     if not responses.can_be_compared:
@@ -136,20 +133,10 @@ def adequacy(
 
 
 class Checks:
-    """Whether the residual of each model is noise and disturbance, tested once for each.
+    """Whether the residual of each model is noise and disturbance, tested once for each."""
 
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    rng
-        Source of the turned signs.
-    at_floor
-        Error, in units of the floor, that counts as the floor itself: if the equations without an effect leave more, the
-        dependence of the residual's size on the motion is tested.
-    allowed
-        Error that a model may leave before the floor is evidence against it, in the same units.
-    """
+    # If the equations without an effect leave more than `at_floor`, the dependence of the residual's size on the motion is
+    # tested. A model that leaves more than `allowed` has the floor as evidence against it. Both are in units of the floor.
 
     def __init__(
         self, context: FitContext, rng: np.random.Generator, at_floor: float, allowed: float
@@ -201,11 +188,9 @@ def _turned(
     signs: Floats,
     followed: Followed | None = None,
 ) -> _Turned | None:
-    """Return how much is explained by columns after projecting out the parameters; None if none remain.
-
-    The part of the residual absorbed by parameters and initial states is missing after signs are flipped, which would
-    underestimate chance: with `followed` each flip is normalized by its expected value.
-    """
+    """Return how much is explained by columns after projecting out the parameters; None if none remain."""
+    # The part of the residual absorbed by parameters and initial states is missing after signs are flipped, which would
+    # underestimate chance: with `followed` each flip is normalized by its expected value.
     basis = orthonormal(columns)
     if basis.shape[1] == 0:
         return None
@@ -286,3 +271,81 @@ def _stretches(responses: Responses, most: int) -> list[slice]:
         edges = np.linspace(part.start, part.stop, count + 1).astype(int)
         found += [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
     return found
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Error of the diagnosed model above noise and disturbance."""
+
+    # Of the squared gap of the re-identified equations; 0 where it correlates with nothing and so counts as
+    # noise and disturbance.
+    share: float
+    # Joint, drive or sensor at which it arises; empty where it correlates with nothing, or with no place.
+    where: tuple[str, ...]
+    # Signal, time or record with which it correlates, or that it is concentrated in a few stretches; empty
+    # where there is none.
+    goes_with: str
+    # Probability that noise and disturbance alone correlate this well with anything that was tested.
+    p_value: float
+    # True if the verdict names a cause: then the remaining error is in addition to it.
+    beside_a_cause: bool = True
+
+    @property
+    def text(self) -> str:
+        """The same in one sentence."""
+        if not self.goes_with:
+            return (
+                f"The remaining error correlates with no motion, drive, reading, time or record that was tested (p = "
+                f"{self.p_value:.2g}): it counts as noise and disturbance."
+            )
+        if self.share == 0.0:
+            return (
+                f"The remaining error is within the noise floor, but it still correlates with {_in_words(self.goes_with)} (p = "
+                f"{self.p_value:.2g}): parameters may be off by more than their standard errors."
+            )
+        percent = float(f"{100.0 * self.share:.2g}")
+        reported = f"The remaining error, {percent:g} % of the squared gap,"
+        remainder = (
+            f"{reported} is concentrated in {CONCENTRATED}, unlike noise"
+            if self.goes_with == CONCENTRATED
+            else f"{reported} still correlates with {_in_words(self.goes_with)} (p = {self.p_value:.2g})"
+        )
+        if self.share > VERDICT.larger_part:
+            return f"{remainder}: more than half of the gap is not explained."
+        if not self.beside_a_cause:
+            return f"{remainder}."
+        return f"{remainder}: a smaller effect is missing too, or the equation does not quite fit the rig."
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry ``remainder`` of ``diagnosis.json``."""
+        return {
+            "share": self.share,
+            "where": list(self.where),
+            "goes_with": self.goes_with or None,
+            "p_value": self.p_value,
+            "text": self.text,
+        }
+
+
+def _in_words(goes_with: str) -> str:
+    """Return the correlated signal as part of a sentence."""
+    kind, _, what = goes_with.partition(BY_RECORD)
+    return goes_with if kind else f"the record: {what} differs from record to record"
+
+
+def remainder_of(
+    reidentified: FittedModel, model: FittedModel, found: Adequacy, lower_bound: bool, beside_a_cause: bool
+) -> Remainder:
+    """Return the remaining error of a model."""
+    if found.adequate:
+        return Remainder(0.0, (), "", found.p_value, beside_a_cause)
+    # What is concentrated in a few stretches remains whole, whatever small part correlates with something by chance.
+    share = 1.0 if found.goes_with == CONCENTRATED or not found.agreements else found.agreements[0].share
+    above = share * model.error_over_noise**2 if lower_bound else max(model.error_over_noise**2 - 1.0, 0.0)
+    whole = (
+        reidentified.error_over_noise**2
+        if lower_bound
+        else max(reidentified.error_over_noise**2 - 1.0, 1e-300)
+    )
+    where = (found.place,) if found.place else ()
+    return Remainder(min(1.0, above / whole), where, found.goes_with, found.p_value, beside_a_cause)

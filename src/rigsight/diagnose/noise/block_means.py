@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.records.record import Floats
+
 _RESAMPLES = 1000
 _MIN_BLOCKS = 8
 
@@ -22,17 +24,17 @@ _MIN_BLOCKS = 8
 class Blocks:
     """Means over the blocks of series."""
 
-    means: NDArray[np.float64]  # shape (n_blocks, n_series)
+    means: Floats  # shape (n_blocks, n_series)
     # Number of values in each block, shape (n_blocks,); blocks of short records are smaller.
-    sizes: NDArray[np.float64]
+    sizes: Floats
 
     @property
-    def mean(self) -> NDArray[np.float64]:
+    def mean(self) -> Floats:
         """Mean over all values, shape (n_series,)."""
         return np.asarray(np.average(self.means, axis=0, weights=self.sizes))
 
     @property
-    def standard_error(self) -> NDArray[np.float64]:
+    def standard_error(self) -> Floats:
         """Standard error of `mean`, shape (n_series,); infinite for a single block."""
         if self.sizes.size == 1:
             return np.full(self.means.shape[1], np.inf)
@@ -43,16 +45,14 @@ class Blocks:
         """Return the numbers of the blocks in each resampling, shape (n_resamples, n_blocks)."""
         return rng.integers(0, self.sizes.size, size=(_RESAMPLES, self.sizes.size))
 
-    def resampled(self, draws: NDArray[np.int64]) -> NDArray[np.float64]:
+    def resampled(self, draws: NDArray[np.int64]) -> Floats:
         """Return the mean over the values of each resampling, shape (n_resamples, n_series)."""
         sizes = self.sizes[draws]
         total = np.einsum("ij,ijk->ik", sizes, self.means[draws])
         return np.asarray(total / np.sum(sizes, axis=1, keepdims=True))
 
 
-def blocks_of(
-    series: Sequence[NDArray[np.float64]], n_values: Sequence[NDArray[np.int64]] | None = None
-) -> Blocks:
+def blocks_of(series: Sequence[Floats], n_values: Sequence[NDArray[np.int64]] | None = None) -> Blocks:
     """Return the means over blocks of series."""
     counted = n_values or [np.ones(len(s), dtype=np.int64) for s in series]
     total = sum(len(s) for s in series)
@@ -70,11 +70,9 @@ def blocks_of(
     return Blocks(np.array(means), np.array(sizes))
 
 
-def squared_errors(models: Sequence[Sequence[NDArray[np.float64]]], noise: NDArray[np.float64]) -> Blocks:
-    """Return the squared residuals of models in units of the noise floor, a series per model.
-
-    The square root of a model's mean is its `error_over_noise`.
-    """
+def squared_errors(models: Sequence[Sequence[Floats]], noise: Floats) -> Blocks:
+    """Return the squared residuals of models in units of the noise floor, a series per model."""
+    # The square root of a model's mean is its `error_over_noise`.
     records = list(zip(*models, strict=True))
     counts = [np.sum(np.isfinite(of_models[0]), axis=1) for of_models in records]
     squares = [

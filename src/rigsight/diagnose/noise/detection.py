@@ -7,24 +7,105 @@ responds (white sensor noise only: a lower bound).
 The input of an element is itself measured, and its noise affects the force only while the element moves. So the noise of a force
 at rest is also taken as a lower bound. This assumption is based on dampers on a test bench, whose forces no effect explains down
 to that floor.
+
+The force that would cause what a model leaves above the noise: in addition to the drive a force w moves one mass by ``H w`` with
+``1 / H = k + w0^2 m - m W^2 + j W (d + sqrt(2) w0 m)``, w0 being the bandwidth of an observer and 0 in a free run. The residual
+above the noise, divided by H, is the spectrum of w.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import helmert
+from scipy.ndimage import uniform_filter1d
 
 from rigsight.diagnose.noise.block_means import blocks_of
-from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
 from rigsight.diagnose.policy import NOTES
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.records.signals import differ_by_noise, repeated_period, roughness
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
+
+_SMOOTHED = 9
+"""Lines of a spectrum that are averaged."""
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A disturbance force in addition to the drive."""
+
+    std: float  # its standard deviation
+    unit: str  # of the force
+    below: float  # angular frequency up to which it stands above the sensor's noise [rad/s]
+
+
+def disturbance(
+    rig: Rig,
+    values: Mapping[str, float],
+    records: Sequence[Record],
+    remainder: Sequence[Floats],
+    noise: float,
+    bandwidth: float | None,
+) -> Disturbance | None:
+    """Return the force that would cause the residual of a model; None except for one driven mass, and where noise hides it."""
+    if not (rig.has_one_motion and rig.is_driven):
+        return None
+    motion, follows = rig.motion, bandwidth or 0.0
+    variances, highest = [], 0.0
+    for record, residual in zip(records, remainder, strict=True):
+        own = {**values, **record.constants}
+        inertia, damping, stiffness = (
+            evaluated(part, own) for part in (motion.inertia, motion.damping, motion.stiffness)
+        )
+        omega, power = _power(residual, record.dt)
+        covered = np.flatnonzero(power < NOTES.disturbance_above * noise**2)
+        stop = int(covered[0]) if covered.size else omega.size
+        omega, power = omega[:stop], power[:stop]
+        real = stiffness + follows**2 * inertia - inertia * omega**2
+        imaginary = omega * (damping + np.sqrt(2.0) * follows * inertia)
+        force = (real**2 + imaginary**2) * (power - noise**2)
+        variances.append((2.0 * float(np.sum(force)) / residual.size, residual.size))
+        highest = max(highest, float(omega[-1]) if stop else 0.0)
+    total = sum(size for _, size in variances)
+    variance = sum(single * size for single, size in variances) / total
+    return Disturbance(float(np.sqrt(variance)), rig.units["force"], highest) if variance > 0.0 else None
+
+
+def _power(residual: Floats, dt: float) -> tuple[Floats, Floats]:
+    """Return angular frequencies above zero and the smoothed power of each line; white noise has its variance at each."""
+    window = np.hanning(residual.size)
+    lines = np.abs(np.fft.rfft((residual - np.mean(residual)) * window)) ** 2 / np.sum(window**2)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(residual.size, dt)
+    return np.asarray(omega[1:]), uniform_filter1d(lines[1:], _SMOOTHED, mode="nearest")
+
+
+Stretches = tuple[tuple[Floats, float], ...]
+"""Pieces of noise alone, shape (n_samples,) each, with their sample time [s]."""
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Standard deviation of the error that no model can explain in an output, and how it was found.
+
+    ``lower_bound`` means that only part of the noise was seen: colored noise and disturbances may exceed it. ``interval`` are its
+    95 % limits; the upper one of a lower bound is the error of an adequate model, infinite without one. ``stretches`` are pieces
+    of noise alone with their sample time [s], where the records have any; their spectrum is that of the noise. ``disturbance`` is
+    the force that would cause the error of the diagnosed model above this noise, where the records show one.
+    """
+
+    output: str
+    unit: str
+    std: float
+    method: str
+    lower_bound: bool = False
+    interval: tuple[float, float] = (0.0, math.inf)
+    stretches: Stretches = field(default=(), compare=False, repr=False)
+    disturbance: Disturbance | None = None
+
 
 _FREE_MODES = 6
 _MAX_HANKEL_ROWS = 200
@@ -36,11 +117,9 @@ _WHITE_ONLY = "top of the spectrum (white noise only)"
 def noise_floors(
     rig: Rig, records: Sequence[Record], drifts: bool = False, at_rest: bool = True
 ) -> tuple[NoiseFloor, ...]:
-    """Return the noise floor of every output that the records hold.
-
-    A lower bound must not decide which output counts: a filter may have taken the noise away from one of them. So lower bounds
-    have the same share of what their outputs read, the largest.
-    """
+    """Return the noise floor of every output that the records hold."""
+    # A lower bound must not decide which output counts: a filter may have taken the noise away from one of them. So lower bounds
+    # have the same share of what their outputs read, the largest.
     floors, sizes = list[NoiseFloor](), list[float]()
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]
@@ -69,9 +148,7 @@ def noise_floors(
     )
 
 
-def _interval(
-    std: float, independent: Sequence[NDArray[np.float64]], lower_bound: bool
-) -> tuple[float, float]:
+def _interval(std: float, independent: Sequence[Floats], lower_bound: bool) -> tuple[float, float]:
     """Return 95 % limits of a standard deviation: those of blocks of independent pieces of the noise."""
     if lower_bound or not independent:
         return std, np.inf
@@ -86,7 +163,7 @@ def _interval(
 
 def _noise_floor(
     rig: Rig, output: str, records: Sequence[Record], drifts: bool, at_rest: bool
-) -> tuple[float, str, Stretches, list[NDArray[np.float64]]]:
+) -> tuple[float, str, Stretches, list[Floats]]:
     """Return standard deviation, method, pieces of noise, and as many independent pieces as they hold."""
     sources = [signal.name for signal in rig.inputs]
     repeated = _repeated(sources, output, records)
@@ -117,11 +194,11 @@ class _Segment(NamedTuple):
     """A whole record, or one period of its input, with shapes (n_samples, n_inputs) and (n_samples,)."""
 
     record: Record
-    driven: NDArray[np.float64]
-    output: NDArray[np.float64]
+    driven: Floats
+    output: Floats
     settled: bool
 
-    def repeats(self, other: _Segment, size: NDArray[np.float64]) -> bool:
+    def repeats(self, other: _Segment, size: Floats) -> bool:
         """Return True if the rig was the same and was driven alike, up to noise of inputs of this size."""
         return (
             self.driven.shape == other.driven.shape
@@ -131,9 +208,7 @@ class _Segment(NamedTuple):
         )
 
 
-def _repeated(
-    sources: Sequence[str], output: str, records: Sequence[Record]
-) -> list[tuple[NDArray[np.float64], float]]:
+def _repeated(sources: Sequence[str], output: str, records: Sequence[Record]) -> list[tuple[Floats, float]]:
     """Return groups of answers to the same input, shape (n_repetitions, n_samples), within records and from one to the next."""
     segments: list[_Segment] = []
     for record in records:
@@ -149,7 +224,7 @@ def _repeated(
         for i in range(1 if count > 1 else 0, count):
             part = slice(i * period, (i + 1) * period)
             segments.append(_Segment(record, driven[part], record[output][part], settled=count > 1))
-    groups: list[tuple[NDArray[np.float64], float]] = []
+    groups: list[tuple[Floats, float]] = []
     used: set[int] = set()
     for i, first in enumerate(segments):
         if i in used:
@@ -166,19 +241,19 @@ def _repeated(
     return groups
 
 
-def inputs_of(record: Record, sources: Sequence[str]) -> NDArray[np.float64]:
+def inputs_of(record: Record, sources: Sequence[str]) -> Floats:
     """Return the inputs of a record side by side, shape (n_samples, n_inputs); one it lacks rests."""
     rest = np.zeros(record.n_samples)
     return np.column_stack([record.signals.get(name, rest) for name in sources] or [rest])
 
 
-def _common_period(driven: NDArray[np.float64]) -> int | None:
+def _common_period(driven: Floats) -> int | None:
     """Return after how many samples all inputs repeat themselves that do not rest; None if they do not."""
     periods = {repeated_period(column) for column in driven.T if np.ptp(column) > 0.0}
     return periods.pop() if len(periods) == 1 else None
 
 
-def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
+def _without_drift(group: Floats) -> Floats:
     """Return responses to one input without the parabolas by which they differ: a constant force moves a free mass along one."""
     t = np.linspace(-1.0, 1.0, group.shape[1])
     mean = np.mean(group, axis=0)
@@ -186,9 +261,7 @@ def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(group - np.polynomial.polynomial.polyval(t, drift))
 
 
-def _quiet_stretches(
-    record: Record, sources: Sequence[str], output: str
-) -> list[tuple[NDArray[np.float64], float]]:
+def _quiet_stretches(record: Record, sources: Sequence[str], output: str) -> list[tuple[Floats, float]]:
     """Return the settled part of the output in long stretches of constant input, about its mean, with the sample time."""
     samples = inputs_of(record, sources)
     span = np.ptp(samples, axis=0)
@@ -221,13 +294,11 @@ def _quiet_stretches(
     return found
 
 
-def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int, int]:
-    """Return the first and the last sample of the part at one end, the longer, in which no input has moved by so much.
+def _held(samples: Floats, moved: Floats) -> tuple[int, int]:
+    """Return the first and the last sample of the part at one end, the longer, in which no input has moved by so much."""
+    # Slow motion also has small steps: a rest from which an input starts gently ends where it has moved.
 
-    Slow motion also has small steps: a rest from which an input starts gently ends where it has moved.
-    """
-
-    def length(ordered: NDArray[np.float64]) -> int:
+    def length(ordered: Floats) -> int:
         spanned = np.maximum.accumulate(ordered, axis=0) - np.minimum.accumulate(ordered, axis=0)
         beyond = np.flatnonzero(np.any(spanned > moved, axis=1))
         return int(beyond[0]) if beyond.size else ordered.shape[0]
@@ -236,15 +307,10 @@ def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int
     return (0, ahead - 1) if ahead >= behind else (n - behind, n - 1)
 
 
-def _is_free_motion(samples: NDArray[np.float64]) -> bool:
-    """Return True if a few exponentials (a ringing rig left alone) explain most of a stretch.
-
-    Ringing sustained by a disturbance changes phase and amplitude within about a period; no exponential follows it for long.
-
-    References
-    ----------
-    R. Roy and T. Kailath, IEEE Trans. ASSP 37 (1989) 984, for poles from the shift invariance of the signal subspace.
-    """
+def _is_free_motion(samples: Floats) -> bool:
+    """Return True if a few exponentials (a ringing rig left alone) explain most of a stretch."""
+    # Ringing sustained by a disturbance changes phase and amplitude within about a period; no exponential follows it for long.
+    # R. Roy and T. Kailath, IEEE Trans. ASSP 37 (1989) 984, for poles from the shift invariance of the signal subspace.
     rows = min(samples.size // 3, _MAX_HANKEL_ROWS)
     hankel = np.lib.stride_tricks.sliding_window_view(samples - np.mean(samples), samples.size - rows + 1)
     subspace = np.linalg.eigh(hankel @ hankel.T)[1][:, -_FREE_MODES:]
@@ -256,7 +322,7 @@ def _is_free_motion(samples: NDArray[np.float64]) -> bool:
     return float(np.std(centered - explained)) < 0.5 * float(np.std(centered))
 
 
-def _top_of_spectrum(samples: NDArray[np.float64]) -> float:
+def _top_of_spectrum(samples: Floats) -> float:
     """Return the standard deviation of white noise with the median power of the highest lines."""
     window = np.hanning(samples.size)
     power = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2

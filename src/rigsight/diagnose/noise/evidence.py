@@ -23,15 +23,14 @@ from scipy.optimize import minimize
 from scipy.signal.windows import tukey
 from scipy.special import entr
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.pushes.probes import PUSH_SIZE, push, with_probes
 from rigsight.diagnose.pushes.responses import orthonormal
 from rigsight.errors import SimulationError
 from rigsight.identify import answers_to_states
+from rigsight.records.record import Floats
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization, linearize
-
-Floats = NDArray[np.float64]
 
 _SMOOTHED = 9
 """Lines over which a spectrum is averaged: 18 degrees of freedom, a scatter of a third."""
@@ -46,23 +45,11 @@ _FAINT, _STRONG = 1e-12, 1e3
 
 
 class Evidence:
-    """Bayesian information criterion (Schwarz) of models of the same records.
+    """Bayesian information criterion (Schwarz) of models of the same records."""
 
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    reidentified
-        The re-identified equations: their resonances are divided out.
-    reference
-        The model whose residual gives the size of disturbance forces and sensor noise.
-
-    Attributes
-    ----------
-    powers
-        Variance per sample of each sensor's own noise and of a white force at each joint, as each sensor tells it, in SI units,
-        shape (n_outputs, 1 + n_joints).
-    """
+    # The resonances of the re-identified equations are divided out; the residual of the reference gives `powers`: the variance
+    # per sample of each sensor's own noise and of a white force at each joint, as each sensor tells it, in SI units, shape
+    # (n_outputs, 1 + n_joints).
 
     def __init__(self, context: FitContext, reidentified: FittedModel, reference: FittedModel) -> None:
         self._context = context
@@ -97,11 +84,9 @@ class Evidence:
         return reported + n_free * float(np.log(max(n_samples, 1))) + self._price_of_states(model)
 
     def gain(self, model: FittedModel, simpler: FittedModel) -> float:
-        """Return the gain in log-likelihood of a model if the noise has the residual spectrum of a simpler one.
-
-        An effect missing in the simpler model raises that spectrum. A model with this effect stays below it everywhere; a model
-        that replaces a slow error by a fast one loses.
-        """
+        """Return the gain in log-likelihood of a model if the noise has the residual spectrum of a simpler one."""
+        # An effect missing in the simpler model raises that spectrum. A model with this effect stays below it everywhere; a model
+        # that replaces a slow error by a fast one loses.
         gained = 0.0
         for (remainder, dt), (least, _) in zip(
             self._remainders(simpler), self._remainders(model), strict=True
@@ -114,10 +99,8 @@ class Evidence:
         return gained
 
     def _price_of_states(self, model: FittedModel) -> float:
-        """Return the penalty of a model's initial states: for each, the logarithm of the number of samples that inform it.
-
-        This is the entropy of their leverages, the same for all states with the same effect on the readings.
-        """
+        """Return the penalty of a model's initial states: for each, the logarithm of the number of samples that inform it."""
+        # This is the entropy of their leverages, the same for all states with the same effect on the readings.
         found = self._context.on_all_records(model)
         responses = answers_to_states(self._context.problem(found.structure, self._context.records), found)
         leverages = [np.sum(orthonormal(own) ** 2, axis=1) for own in responses]

@@ -15,13 +15,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import correlate, lfilter
 
 from rigsight.diagnose.pushes.responses import Followed, Responses
-
-Floats = NDArray[np.float64]
+from rigsight.records.record import Floats
 
 _ORDERS = (0, 1, 2, 4, 8, 16, 32)
 _WHITE = 1e-4
@@ -50,18 +48,9 @@ def whitening_filter(parts: Sequence[Floats]) -> Floats:
 
 
 class Innovations:
-    """Responses and residuals after whitening filters for the residuals of fitted equations.
+    """Responses and residuals after whitening filters for the residuals of fitted equations."""
 
-    Parameters
-    ----------
-    answers
-        Of the equations.
-
-    Attributes
-    ----------
-    followed
-        Subspace of innovations that parameters and initial states could compensate.
-    """
+    # `followed` is the subspace of innovations that parameters and initial states could compensate.
 
     def __init__(self, responses: Responses) -> None:
         n_outputs = len(responses.context.rig.outputs)
@@ -72,10 +61,8 @@ class Innovations:
         self.followed = Followed.of(responses.spans, by_state, self.of(responses.by_parameter))
 
     def of(self, columns: Floats) -> Floats:
-        """Return the innovations of weighted and stacked readings, shape (n,) or (n, m).
-
-        Zero where a record has too few previous samples.
-        """
+        """Return the innovations of weighted and stacked readings, shape (n,) or (n, m)."""
+        # Zero where a record has too few previous samples.
         return np.concatenate([self._of_record(columns[span]) for span in self._spans])
 
     def without_free(self, columns: Floats) -> Floats:

@@ -7,14 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from rigsight.diagnose.policy.bootstrap_numbers import BootstrapNumbers
-from rigsight.diagnose.policy.family_numbers import FamilyNumbers
-from rigsight.diagnose.policy.horizon_numbers import HorizonNumbers
-from rigsight.diagnose.policy.map_numbers import MapNumbers
-from rigsight.diagnose.policy.note_numbers import NoteNumbers
-from rigsight.diagnose.policy.search_numbers import SearchNumbers
-from rigsight.diagnose.policy.trust_numbers import TrustNumbers
-from rigsight.diagnose.policy.verdict_numbers import VerdictNumbers
+from rigsight.diagnose.policy.report_numbers import BootstrapNumbers, MapNumbers, TrustNumbers
+from rigsight.diagnose.policy.search_numbers import HorizonNumbers, SearchNumbers
+from rigsight.diagnose.policy.verdict_numbers import FamilyNumbers, NoteNumbers, VerdictNumbers
 
 __all__ = [
     "BOOTSTRAP",

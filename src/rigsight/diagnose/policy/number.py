@@ -1,14 +1,9 @@
-"""One threshold or budget with its reason."""
+"""One threshold or budget with its reason: each kind of number is made by a function of that name."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
-
-from rigsight.errors import check_option
-
-Kind = Literal["convention", "assumption", "measured", "budget"]
-"""A line that somebody has to draw; what a few rigs suggested; what a study measured; how long is searched."""
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -18,17 +13,35 @@ class Stated:
     # The field and its value.
     name: str
     value: float | tuple[float, ...]
-    kind: Kind  # see `Kind`
+    kind: str  # the function that made it
     reason: str  # what it decides, and why it is what it is
     set_by: str  # the data that set it; empty where none did
 
 
-def number(value: Any, kind: Kind, reason: str, set_by: str = "") -> Any:
-    """Return a dataclass field that carries why its value is what it is."""
-    check_option("The kind of a number", kind, get_args(Kind))
+def convention(value: Any, reason: str, set_by: str = "") -> Any:
+    """Return the field of a line that somebody has to draw."""
+    return _number(value, "convention", reason, set_by)
+
+
+def assumption(value: Any, reason: str, set_by: str = "") -> Any:
+    """Return the field of what a few rigs suggested."""
+    return _number(value, "assumption", reason, set_by)
+
+
+def measured(value: Any, reason: str, set_by: str) -> Any:
+    """Return the field of what a study measured."""
+    return _number(value, "measured", reason, set_by)
+
+
+def budget(value: Any, reason: str, set_by: str = "") -> Any:
+    """Return the field of how long is searched."""
+    return _number(value, "budget", reason, set_by)
+
+
+def _number(value: Any, kind: str, reason: str, set_by: str) -> Any:
     return field(default=value, metadata={"kind": kind, "reason": reason, "set_by": set_by})
 
 
 def stated(group: Any) -> tuple[Stated, ...]:
-    """Return every number of a frozen dataclass whose fields `number` made, in their order."""
+    """Return every number of a frozen dataclass whose fields these functions made, in their order."""
     return tuple(Stated(own.name, getattr(group, own.name), **own.metadata) for own in fields(group))

@@ -1,362 +1,246 @@
-"""Budgets and order of the search. If they are too small, a right model may be missed, but a wrong one gains nothing."""
+"""Over which stretch is a model compared with records, and how far is searched?
+
+If budgets are too small, a right model may be missed, but a wrong one gains nothing.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rigsight.diagnose.policy.number import number
+from rigsight.diagnose.policy.number import assumption, budget, convention, measured
 from rigsight.inverse import LAW_ERROR
 
 
 @dataclass(frozen=True)
-class SearchNumbers:
-    """How far is searched? Each field carries its reason."""
+class HorizonNumbers:
+    """Over which stretch is a model compared with records?"""
 
-    predictability_draws: int = number(
-        4,
-        "budget",
-        "Number of small disturbances that are simulated.",
+    observer_close: float = assumption(
+        6.0,
+        "Bandwidth of the fastest observer, in units of the typical frequency of the velocity: low enough that the harmonics of "
+        "friction remain visible.",
     )
-    wider_starts: tuple[float, ...] = number(
+    observer_loose: float = assumption(
+        0.1, "The same for the slowest observer: errors accumulate over ten periods."
+    )
+    observer_holds: float = assumption(
+        2.0,
+        "Bandwidth of the slowest observer of an unstable mass, in units of its fastest pole: from the pole itself on it is "
+        "stable, and from 1.4 times the pole on also with negative damping.",
+    )
+    observer_step: float = budget(2.0, "Ratio of the bandwidths of successive observers.")
+    observer_sampling: float = convention(
+        0.2,
+        "Largest product of bandwidth and sample time: a faster observer follows the noise of single samples.",
+    )
+    clear_gap: float = convention(
+        10.0, "Gap, in units of the noise floor, that is large enough to show its cause."
+    )
+    piece: float = assumption(
+        4.0,
+        "Length of a piece with its own initial state, in periods of the rig: an inaccurate model stays in phase with the "
+        "motion for about this long.",
+        "simulated random rigs with play of several widths: pieces of half to two periods were worse",
+    )
+    examined: int = budget(
+        8000,
+        "Number of samples, of all records together, to which candidates are first fitted: fits to whole records of 40 s take "
+        "four times as long.",
+    )
+    most_pieces: int = budget(
+        40,
+        "Largest number of pieces of all records per degree of freedom: every piece adds its own initial state.",
+    )
+    rough_evaluations_of_rig: int = budget(
+        8, "Evaluations of the rig's equations from each other set of start values."
+    )
+    lost: float = assumption(
+        3.0,
+        "RMS error of the given simulation, in standard deviations of a reading, from which on several bodies are not run free. "
+        "Two motions of one size in opposite phase differ by two.",
+        "an arm whose free run ends ten deviations off",
+    )
+
+
+@dataclass(frozen=True)
+class SearchNumbers:
+    """How far is searched?"""
+
+    predictability_draws: int = budget(4, "Number of small disturbances that are simulated.")
+    wider_starts: tuple[float, ...] = budget(
         (1.0 / 3.0, 1.0, 3.0),
-        "budget",
-        (
-            "Factors on the inner parameters of an effect, in addition to its declared starts: a fit could move away from its "
-            "start, the screening by a fixed force cannot."
-        ),
+        "Factors on the inner parameters of an effect, in addition to its declared starts: a fit could move away from its "
+        "start, the screening by a fixed force cannot.",
     )
-    few_starts: int = number(
+    few_starts: int = budget(
         4,
-        "budget",
         "Largest number of declared starts for which the additional factors are tried: more starts cover the range by "
         "themselves.",
     )
-    fitted_pushes: int = number(
+    fitted_pushes: int = budget(
+        2, "Number of trial forces or signals of each effect, over all its starts, that are fitted."
+    )
+    push_evaluations: int = budget(6, "Evaluations of such a fit.")
+    push_substeps: int = budget(4, "Integration steps per sample in the screening.")
+    look_evaluations: int = budget(25, "Evaluations of a first fit.")
+    glimpse_evaluations: int = budget(
+        8, "Evaluations of a very short fit, from which the best go on to a first fit."
+    )
+    most_starts: int = budget(4, "Number of starts up to which all are fitted at length.")
+    lengthy_starts: int = budget(
         2,
-        "budget",
-        "Number of trial forces or signals of each effect, over all its starts, that are fitted.",
-    )
-    push_evaluations: int = number(
-        6,
-        "budget",
-        "Evaluations of such a fit.",
-    )
-    push_substeps: int = number(
-        4,
-        "budget",
-        "Integration steps per sample in the screening.",
-    )
-    look_evaluations: int = number(
-        25,
-        "budget",
-        "Evaluations of a first fit.",
-    )
-    glimpse_evaluations: int = number(
-        8,
-        "budget",
-        "Evaluations of a very short fit, from which the best go on to a first fit.",
-    )
-    most_starts: int = number(
-        4,
-        "budget",
-        "Number of starts up to which all are fitted at length.",
-    )
-    lengthy_starts: int = number(
-        2,
-        "budget",
         "If there are more starts, number of those fitted at length in pieces, the best after the very short fit first.",
-        set_by="hysteresis by sliders, five draws of noise: two to five of nine very short fits led to the best result",
+        "hysteresis by sliders, five draws of noise: two to five of nine very short fits led to the best result",
     )
-    wide_evaluations: int = number(
-        12,
-        "budget",
-        "Evaluations of a first fit to whole records.",
-    )
-    near: float = number(
+    wide_evaluations: int = budget(12, "Evaluations of a first fit to whole records.")
+    near: float = budget(
         25.0,
-        "budget",
-        (
-            "A candidate whose cost in the most excited stretches is below this factor of the best (five times its RMS) is "
-            "fitted to whole records."
-        ),
+        "A candidate whose cost in the most excited stretches is below this factor of the best (five times its RMS) is fitted "
+        "to whole records.",
     )
-    alike_starts: float = number(
-        1.05,
-        "budget",
-        "All starts whose first fits end within this factor of the best cost are continued.",
+    alike_starts: float = budget(
+        1.05, "All starts whose first fits end within this factor of the best cost are continued."
     )
-    most_restarts: int = number(
-        4,
-        "budget",
-        "Number of times that a fit which stopped too early is restarted.",
+    most_restarts: int = budget(4, "Number of times that a fit which stopped too early is restarted.")
+    worth_restarting: float = budget(
+        1e-3, "Share of the cost that a fit from another start must remove to be continued."
     )
-    worth_restarting: float = number(
-        1e-3,
-        "budget",
-        "Share of the cost that a fit from another start must remove to be continued.",
+    long_piece: float = budget(
+        20.0, "Length in periods of the pieces from which a stuck fit is started again."
     )
-    long_piece: float = number(
-        20.0,
-        "budget",
-        "Length in periods of the pieces from which a stuck fit is started again.",
-    )
-    stuck: float = number(
+    stuck: float = budget(
         2.0,
-        "budget",
-        (
-            "Mean squared error of whole records, in units of that of their most excited stretches, above which a fit counts as "
-            "stopped too early."
-        ),
+        "Mean squared error of whole records, in units of that of their most excited stretches, above which a fit counts as "
+        "stopped too early.",
     )
-    rough_evaluations: int = number(
-        40,
-        "budget",
-        "Evaluations of a rough fit to whole records.",
+    rough_evaluations: int = budget(40, "Evaluations of a rough fit to whole records.")
+    hopeless_evaluations: int = budget(
+        8, "Evaluations after which a candidate far behind the best is dropped."
     )
-    hopeless_evaluations: int = number(
-        8,
-        "budget",
-        "Evaluations after which a candidate far behind the best is dropped.",
-    )
-    refine_evaluations: int = number(
+    refine_evaluations: int = budget(
         150,
-        "budget",
-        (
-            "Evaluations of a careful fit with one integration step per sample; a model that takes more steps "
-            "gets fewer."
-        ),
+        "Evaluations of a careful fit with one integration step per sample; a model that takes more steps gets fewer.",
     )
-    fewest_refine_evaluations: int = number(
-        15,
-        "budget",
-        "The minimum that it gets.",
-    )
-    promising: float = number(
+    fewest_refine_evaluations: int = budget(15, "The minimum that it gets.")
+    promising: float = budget(
         9.0,
-        "budget",
-        (
-            "A candidate whose cost on whole records is below this factor of the best (three times its RMS) is fitted to "
-            "convergence."
-        ),
+        "A candidate whose cost on whole records is below this factor of the best (three times its RMS) is fitted to "
+        "convergence.",
     )
-    worth_following: float = number(
+    worth_following: float = budget(
         0.85,
-        "budget",
         "Factor by which an effect must lower the cost above that of noise at a first fit to be fitted together with another.",
     )
-    most_followed: int = number(
+    most_followed: int = budget(6, "Number of effects that are fitted together with another.")
+    near_the_best: float = budget(
+        2.0, "Models whose cost is at most this factor of the best at a first fit are fitted carefully."
+    )
+    both_ways: int = budget(
+        6, "Number of the most promising pairs that are also tried from the fit of the second effect."
+    )
+    joint_beam: int = budget(
+        200, "Number of pairs, in the screening of several effects together, that are extended to triples."
+    )
+    joint_sets: int = budget(
         6,
-        "budget",
-        "Number of effects that are fitted together with another.",
-    )
-    near_the_best: float = number(
-        2.0,
-        "budget",
-        "Models whose cost is at most this factor of the best at a first fit are fitted carefully.",
-    )
-    both_ways: int = number(
-        6,
-        "budget",
-        "Number of the most promising pairs that are also tried from the fit of the second effect.",
-    )
-    joint_beam: int = number(
-        200,
-        "budget",
-        "Number of pairs, in the screening of several effects together, that are extended to triples.",
-    )
-    joint_sets: int = number(
-        6,
-        "budget",
         "Number of pairs, and of triples, that are fitted because they explain most together in the screening.",
     )
-    joint_starts: int = number(
-        18,
-        "budget",
-        "Number of starts of a pair if neither effect starts from its own fit, drawn at random if there are more.",
-    )
-    most_added_steps: int = number(
+    most_added_steps: int = budget(
         4,
-        "budget",
         "Additional integration steps of a first fit relative to its parent: enough for a lag of a fifth of a sample.",
     )
-    beam: float = number(
+    beam: float = budget(
         1.3,
-        "budget",
-        (
-            "A second effect is added to singles whose held-out error is within this factor of the best: to the simplest, and to "
-            "the best that differs from it."
-        ),
+        "A second effect is added to singles whose held-out error is within this factor of the best: to the simplest, and to "
+        "the best that differs from it.",
     )
-    alike_pairs: float = number(
-        1.01,
-        "budget",
-        "Pairs within this factor of the best are also fitted to convergence.",
-    )
-    most_finished: int = number(
+    alike_pairs: float = budget(1.01, "Pairs within this factor of the best are also fitted to convergence.")
+    most_finished: int = budget(2, "Number of pairs, and of triples, that are fitted to convergence.")
+    most_refitted: int = budget(2, "Number of pairs whose effects are fitted alone again.")
+    most_swaps: int = budget(
         2,
-        "budget",
-        "Number of pairs, and of triples, that are fitted to convergence.",
-    )
-    most_refitted: int = number(
-        2,
-        "budget",
-        "Number of pairs whose effects are fitted alone again.",
-    )
-    most_swaps: int = number(
-        2,
-        "budget",
         "Number of times that an effect of the best pair is replaced by a more general or similar one: once for each of the two.",
     )
-    most_effects: int = number(
+    most_effects: int = convention(
         3,
-        "convention",
         "Number of effects up to which the search adds one at a time; sets that are selected along the motion may be larger.",
     )
-    finest_steps: int = number(
+    finest_steps: int = budget(
         4,
-        "budget",
-        (
-            "Integration steps per sample up to which a second effect is added to a model other than the simplest: pairs with a "
-            "much stiffer model would need equally small steps."
-        ),
+        "Integration steps per sample up to which a second effect is added to a model other than the simplest: pairs with a "
+        "much stiffer model would need equally small steps.",
     )
-    most_windowed_pairs: int = number(
-        3,
-        "budget",
-        "Number of pairs that are fitted in windows: those with the lowest error on the whole records.",
+    most_windowed_pairs: int = budget(
+        3, "Number of pairs that are fitted in windows: those with the lowest error on the whole records."
     )
-    most_asked: int = number(
+    most_asked: int = budget(
         4,
-        "budget",
         "Number of models that are tested for sensitivity of the motion and fitted in windows.",
-        set_by="two simulated random rigs with play",
+        "two simulated random rigs with play",
     )
-    smaller_starts: tuple[float, ...] = number(
+    smaller_starts: tuple[float, ...] = budget(
         (1.0, 0.3),
-        "budget",
-        (
-            "Factors on the declared starts of an effect in windows: a play that is too large stays stuck where a small one "
-            "would not."
-        ),
+        "Factors on the declared starts of an effect in windows: a play that is too large stays stuck where a small one would "
+        "not.",
     )
-    glimpsed_windows: int = number(
-        3,
-        "budget",
-        "Only every n-th window is used in a very short fit.",
-    )
-    window_evaluations: int = number(
-        10,
-        "budget",
-        "Evaluations of such a fit.",
-    )
-    window_starts: int = number(
-        2,
-        "budget",
-        "Number of starts that are continued from there.",
-    )
-    waves_per_line: float = number(
+    glimpsed_windows: int = budget(3, "Only every n-th window is used in a very short fit.")
+    window_evaluations: int = budget(10, "Evaluations of such a fit.")
+    window_starts: int = budget(2, "Number of starts that are continued from there.")
+    waves_per_line: float = budget(
         4.0,
-        "budget",
         "Number of wave numbers tried per additional wave over the travel; a fit converges from half a wave away.",
     )
-    most_waves: float = number(
+    most_waves: float = budget(
         120.0,
-        "budget",
         "Largest number of waves over the travel up to which lines are searched: more would take as long as the fits.",
     )
-    most_wave_samples: int = number(
-        16000,
-        "budget",
-        "Samples of all records together, for the same reason.",
-    )
-    wave_smoothing: int = number(
+    most_wave_samples: int = budget(16000, "Samples of all records together, for the same reason.")
+    wave_smoothing: int = budget(
         15,
-        "budget",
-        (
-            "Number of lines over which the reference spectrum for whitening is averaged: fewer would flatten the line that is "
-            "searched."
-        ),
+        "Number of lines over which the reference spectrum for whitening is averaged: fewer would flatten the line that is "
+        "searched.",
     )
-    lowest_line: int = number(
+    lowest_line: int = convention(
         2,
-        "convention",
         "First line of a spectrum over time that is used: lower lines are drift, which initial states absorb.",
     )
-    offset_evaluations: int = number(
-        40,
-        "budget",
-        "Evaluations of a fit with an offset in each record.",
-    )
-    timing_evaluations: int = number(
-        10,
-        "budget",
-        "Evaluations of a fit with another hold or shift.",
-    )
-    basin_models: int = number(
+    offset_evaluations: int = budget(40, "Evaluations of a fit with an offset in each record.")
+    timing_evaluations: int = budget(10, "Evaluations of a fit with another hold or shift.")
+    basin_models: int = budget(
         3,
-        "budget",
-        (
-            "Number of best models that are also fitted from other starts; a model further behind is named only if these drop "
-            "out."
-        ),
+        "Number of best models that are also fitted from other starts; a model further behind is named only if these drop out.",
     )
-    basin_starts: int = number(
-        6,
-        "budget",
-        "Number of starts of each, drawn around its fit.",
-    )
-    basin_spread: float = number(
+    basin_starts: int = budget(6, "Number of starts of each, drawn around its fit.")
+    basin_spread: float = measured(
         0.3,
-        "measured",
         "Standard deviation of the logarithms of the parameters of an effect at these starts.",
-        set_by="two rigs of the coverage study, seed 1: half of such starts led to the right minimum",
+        "two rigs of the coverage study, seed 1: half of such starts led to the right minimum",
     )
-    basin_evaluations: int = number(
-        15,
-        "budget",
-        "Evaluations from such a start.",
-    )
-    basin_finish_evaluations: int = number(
-        60,
-        "budget",
-        "Evaluations of the fit in a lower minimum.",
-    )
-    decisive_force: float = number(
+    basin_evaluations: int = budget(15, "Evaluations from such a start.")
+    basin_finish_evaluations: int = budget(60, "Evaluations of the fit in a lower minimum.")
+    decisive_force: float = assumption(
         0.25,
-        "assumption",
-        (
-            "Share of the squared missing force along the measured motion that a family must explain alone for others to be left "
-            "out of the fits."
-        ),
-        set_by="thirteen measured rigs: with 0.5 two rigs with friction (0.26, 0.37) were searched for all families",
+        "Share of the squared missing force along the measured motion that a family must explain alone for others to be left "
+        "out of the fits.",
+        "thirteen measured rigs: with 0.5 two rigs with friction (0.26, 0.37) were searched for all families",
     )
-    near_force: float = number(
+    near_force: float = assumption(
         0.5,
-        "assumption",
-        (
-            "Share of that from which on another family, or another form beside other causes, may be the cause: terms of first "
-            "order understate some."
-        ),
+        "Share of that from which on another family, or another form beside other causes, may be the cause: terms of first "
+        "order understate some.",
     )
-    noise_of_force: float = number(
+    noise_of_force: float = convention(
         0.1,
-        "convention",
-        (
-            "Share of the squared missing force along the motion that noise of the sensors may cause for the motion to rule out "
-            "causes: one of a larger share shows."
-        ),
+        "Share of the squared missing force along the motion that noise of the sensors may cause for the motion to rule out "
+        "causes: one of a larger share shows.",
     )
-    law_error: float = number(
+    law_error: float = assumption(
         LAW_ERROR,
-        "assumption",
-        (
-            "Error of a law relative to its own force. Where the motion shows that laws err more than sensors, a residual of "
-            "this part of the gap is that of the law that explains the rest."
-        ),
-        set_by="an assumption between two to ten percent of the reviews; the cubic spring leaves 4.1 % on silverbox",
+        "Error of a law relative to its own force. Where the motion shows that laws err more than sensors, a residual of this "
+        "part of the gap is that of the law that explains the rest.",
+        "an assumption between two to ten percent of the reviews; the cubic spring leaves 4.1 % on silverbox",
     )
-    most_unnamed: int = number(
+    most_unnamed: int = budget(
         2,
-        "budget",
         "Number of causes that the motion does not name, such as delays, that are added to those that it names.",
     )

@@ -15,15 +15,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.pushes.probes import motion_columns, signal_columns
 from rigsight.diagnose.pushes.responses import Responses
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
+from rigsight.records.record import Floats
 from rigsight.units import characteristic_value
-
-Floats = NDArray[np.float64]
 
 BY_RECORD = "record: "
 """Before what differs from record to record."""
@@ -41,56 +39,42 @@ def law_columns(responses: Responses, effect: Effect) -> Floats:
         # A static nonlinearity is not another form of a delay or lag, nor vice versa.
         delays = (effect.delay, effect.reading_delay, effect.command_delay)
         is_late = bool(effect.states) or any(delay is not None for delay in delays)
-        if effect.place is Place.SENSOR:
-            return (_changes_of if is_late else _readings_of)(responses, place)
-        return (_signal_changes_of if is_late else _signals_of)(responses, place)
+        return _laws_of(responses, place, slopes(responses, place) if is_late else responses.simulated(place))
     laws = [law for law in (effect.torque, effect.spring, effect.deflection) if law is not None]
     read = {symbol for law in laws for symbol in law.free_symbols}
     found = []
     if canonical.v in read or effect.states:
-        found.append(_velocities_of(responses, place))
+        found.append(_laws_of(responses, place, slopes(responses, place)))
     if canonical.v not in read or effect.states:
-        found.append(_positions_of(responses, place))
+        found.append(_laws_of(responses, place, responses.simulated(place)))
     return np.column_stack(found)
 
 
 def alternatives(responses: Responses) -> Iterator[tuple[str, str, Floats]]:
     """Yield each possible cause of a residual in words, with its place and the responses of all readings, (n, n_columns)."""
-    rig = responses.context.rig
+    rig, course = responses.context.rig, _course(responses)
     for joint in motion_columns(rig):
-        yield f"velocity of {joint}", joint, _velocities_of(responses, joint)
-        yield f"position of {joint}", joint, _positions_of(responses, joint)
-        yield (
-            f"time, at {joint}",
-            joint,
-            _pushes(responses, joint, _course(responses), _force(responses, joint)),
-        )
+        yield f"velocity of {joint}", joint, _laws_of(responses, joint, slopes(responses, joint))
+        yield f"position of {joint}", joint, _laws_of(responses, joint, responses.simulated(joint))
+        yield f"time, at {joint}", joint, _answers(responses, joint, course)
     for drive in signal_columns(rig):
-        yield f"signal of {drive}", drive, _signals_of(responses, drive)
-        yield f"change of {drive}", drive, _signal_changes_of(responses, drive)
-        yield f"time, at {drive}", drive, _fading_of(responses, drive)
-    for sensor in (s.name for s in rig.outputs):
-        yield f"reading of {sensor}", sensor, _readings_of(responses, sensor)
-        yield f"change of {sensor}", sensor, _changes_of(responses, sensor)
-        yield f"drift of {sensor}", sensor, _shown(responses, sensor, _course(responses))
+        signals, size = responses.simulated(drive), _size(responses, drive)
+        # A drive whose strength changes slowly over each record.
+        fading = [[c * s / size for c, s in zip(own, signals, strict=True)] for own in course]
+        yield f"signal of {drive}", drive, _laws_of(responses, drive, signals)
+        yield f"change of {drive}", drive, _laws_of(responses, drive, slopes(responses, drive))
+        yield f"time, at {drive}", drive, _answers(responses, drive, fading)
+    sensors = [signal.name for signal in rig.outputs]
+    for sensor in sensors:
+        yield f"reading of {sensor}", sensor, _laws_of(responses, sensor, responses.simulated(sensor))
+        yield f"change of {sensor}", sensor, _laws_of(responses, sensor, slopes(responses, sensor))
+        yield f"drift of {sensor}", sensor, _answers(responses, sensor, course)
     if len(responses.records) > 1:
         for name in responses.free:
             yield f"{BY_RECORD}{name}", "", _by_record(responses, responses.to_parameter(name))
-        for sensor in (s.name for s in rig.outputs):
-            ones = [np.ones(r.n_samples) for r in responses.records]
-            yield (
-                f"{BY_RECORD}offset of {sensor}",
-                sensor,
-                _by_record(responses, _reading(responses, sensor, ones)),
-            )
-
-
-def _force(responses: Responses, joint: str) -> float:
-    return _PUSH * characteristic_value(f"force@{joint}", responses.scales)
-
-
-def _signal(responses: Responses, drive: str) -> float:
-    return _PUSH * characteristic_value(f"input@{drive}", responses.scales)
+        for sensor in sensors:
+            offset = _reading(responses, sensor, [np.ones(r.n_samples) for r in responses.records])
+            yield f"{BY_RECORD}offset of {sensor}", sensor, _by_record(responses, offset)
 
 
 def slopes(responses: Responses, place: str) -> list[Floats]:
@@ -98,46 +82,14 @@ def slopes(responses: Responses, place: str) -> list[Floats]:
     return [np.gradient(s, r.dt) for s, r in zip(responses.simulated(place), responses.records, strict=True)]
 
 
-def _velocities_of(responses: Responses, joint: str) -> Floats:
-    return _pushes(responses, joint, _corners(slopes(responses, joint)), _force(responses, joint))
-
-
-def _positions_of(responses: Responses, joint: str) -> Floats:
-    return _pushes(responses, joint, _corners(responses.simulated(joint)), _force(responses, joint))
-
-
-def _signals_of(responses: Responses, drive: str) -> Floats:
-    return _pushes(responses, drive, _corners(responses.simulated(drive)), _signal(responses, drive))
-
-
-def _signal_changes_of(responses: Responses, drive: str) -> Floats:
-    return _pushes(responses, drive, _corners(slopes(responses, drive)), _signal(responses, drive))
-
-
-def _fading_of(responses: Responses, drive: str) -> Floats:
-    """Return what a drive whose strength changes slowly over each record would change."""
-    size = characteristic_value(f"input@{drive}", responses.scales)
-    faded = [
-        [c * s / size for c, s in zip(course, responses.simulated(drive), strict=True)]
-        for course in _course(responses)
-    ]
-    return _pushes(responses, drive, faded, _signal(responses, drive))
-
-
-def _readings_of(responses: Responses, sensor: str) -> Floats:
-    return _shown(responses, sensor, _corners(responses.simulated(sensor)))
-
-
-def _changes_of(responses: Responses, sensor: str) -> Floats:
-    return _shown(responses, sensor, _corners(slopes(responses, sensor)))
-
-
-def _corners(signals: Sequence[Floats]) -> list[list[Floats]]:
-    """Return the ramps of a piecewise linear function of a signal, for each record."""
+def _laws_of(responses: Responses, place: str, signals: Sequence[Floats]) -> Floats:
+    """Return the responses to a piecewise linear law of a signal at a place: a ramp from each of its corners on."""
     everything = np.concatenate(signals)
     knots = np.unique(np.quantile(everything, _KNOTS))
     scale = float(np.std(everything)) or 1.0
-    return [[np.maximum(s - knot, 0.0) / scale for s in signals] for knot in knots]
+    return _answers(
+        responses, place, [[np.maximum(s - knot, 0.0) / scale for s in signals] for knot in knots]
+    )
 
 
 def _course(responses: Responses) -> list[list[Floats]]:
@@ -146,12 +98,18 @@ def _course(responses: Responses) -> list[list[Floats]]:
     return [[np.cos(n * t) for t in times] for n in range(1, _TIMES + 1)]
 
 
-def _pushes(responses: Responses, place: str, signals: Sequence[list[Floats]], size: float) -> Floats:
+def _size(responses: Responses, place: str) -> float:
+    """Return the typical force at a joint, or signal at a drive."""
+    kind = "force" if place in motion_columns(responses.context.rig) else "input"
+    return characteristic_value(f"{kind}@{place}", responses.scales)
+
+
+def _answers(responses: Responses, place: str, signals: Sequence[list[Floats]]) -> Floats:
+    """Return the responses to forces at a joint, to signals at a drive, or to errors of a sensor's reading."""
+    if place in {signal.name for signal in responses.context.rig.outputs}:
+        return np.column_stack([responses.stacked(_reading(responses, place, signal)) for signal in signals])
+    size = _PUSH * _size(responses, place)
     return np.column_stack([responses.to_push(place, signal, size) for signal in signals])
-
-
-def _shown(responses: Responses, sensor: str, signals: Sequence[list[Floats]]) -> Floats:
-    return np.column_stack([responses.stacked(_reading(responses, sensor, signal)) for signal in signals])
 
 
 def _reading(responses: Responses, sensor: str, signals: Sequence[Floats]) -> list[Floats]:

@@ -91,13 +91,11 @@ def _composed(effect: Effect) -> tuple[Structure, int]:
 
 
 def with_probes(rig: Rig) -> Rig:
-    """Return a rig with a push at every joint, drive and sensor.
-
-    Each push is an input (see `push`), and all of them are in units of the parameter `PUSH_SIZE`. Behind the rig's own outputs
-    stand the motion of each joint and what others load it with (see `motion_columns`, `load_columns`), the signal of each drive
-    and the way along which it pushes (see `signal_columns`, `way_columns`), and output, error and command of each controller (see
-    `controller_columns`).
-    """
+    """Return a rig with a push at every joint, drive and sensor."""
+    # Each push is an input (see `push`), and all of them are in units of the parameter `PUSH_SIZE`. Behind the rig's own outputs
+    # stand the motion of each joint and what others load it with (see `motion_columns`, `load_columns`), the signal of each drive
+    # and the way along which it pushes (see `signal_columns`, `way_columns`), and output, error and command of each controller
+    # (see `controller_columns`).
     mechanism, size = rig.mechanism, _real(PUSH_SIZE)
     pushed = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
     pushed += [sensor.name for sensor in mechanism.sensors]

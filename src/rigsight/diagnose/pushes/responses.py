@@ -14,22 +14,64 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.pushes.measured_motion import Corrections
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.pushes.probes import PUSH_SIZE, motion_columns, push, signal_columns, with_probes
 from rigsight.effects import Effect
+from rigsight.effects.symbols import derivative
 from rigsight.identify import FitResult
 from rigsight.identify.fit.covariance import symmetric_eigen
 from rigsight.identify.fit.windows import observed_sensors
 from rigsight.identify.start.scales import scales_at_places
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
+from rigsight.rigs import Rig
 from rigsight.simulate import compose, parameter_vector, record_input, record_values, simulate_sets
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
 from rigsight.units import characteristic_value
 
-Floats = NDArray[np.float64]
+_DETERMINED = 1e-6
+"""Smallest singular value, relative to the largest, from which the coordinates count as shown by the sensors."""
+
+
+class Corrections:
+    """Difference of each joint's motion from a simulation, computed from the differences of the sensor readings."""
+
+    # Only sensors that read a sum of coordinates are used, and only if together they determine all degrees of freedom.
+
+    def __init__(self, rig: Rig) -> None:
+        mechanism = rig.mechanism
+        coordinates = [coordinate.symbol for coordinate in mechanism.free]
+        numbers = {sp.Symbol(p.name, real=True) for p in (*rig.constants, *rig.parameters)}
+        self._joints = {joint.name: _slopes(joint.motion, coordinates, numbers) for joint in mechanism.joints}
+        self._sensors = {
+            sensor.name: _slopes(sensor.reads, coordinates, numbers) for sensor in mechanism.sensors
+        }
+        self._names = [sensor.name for sensor in mechanism.sensors]
+        self._n = len(coordinates)
+
+    def of_joint(self, name: str, differences: Floats, measured: set[str]) -> Floats | None:
+        """Return the correction of a joint's motion, shape (n_samples,); None where the sensors do not tell."""
+        slopes = self._joints[name]
+        asked = [i for i, n in enumerate(self._names) if n in measured and self._sensors[n] is not None]
+        if slopes is None or not asked:
+            return None
+        shown = np.array([self._sensors[self._names[i]] for i in asked])
+        singular = np.linalg.svd(shown, compute_uv=False)
+        if singular.size < self._n or singular[-1] <= _DETERMINED * singular[0]:
+            return None
+        return np.asarray(differences[:, asked] @ np.linalg.pinv(shown).T @ slopes)
+
+
+def _slopes(expression: sp.Expr, coordinates: list[sp.Symbol], numbers: set[sp.Symbol]) -> Floats | None:
+    """Return the derivatives by each coordinate of a sum of multiples of them and numbers; None for any other expression."""
+    slopes = [derivative(expression, coordinate) for coordinate in coordinates]
+    if any(not slope.is_number for slope in slopes) or not any(slopes):
+        return None
+    rest = sp.expand(expression - sum(s * c for s, c in zip(slopes, coordinates, strict=True)))
+    return np.array(slopes, dtype=np.float64) if rest.free_symbols <= numbers else None
+
 
 _STEP = 1e-3
 """Relative change of a parameter whose answer is taken by differences."""
@@ -74,21 +116,11 @@ class Followed:
 
 
 class Responses:
-    """Fitted equations along records, with a push at every place.
+    """Fitted equations along records, with a push at every place."""
 
-    Parameters
-    ----------
-    context
-        Scales and noise; its memory is not used.
-    records
-        Records that were fitted or scored.
-    fit
-        The equations, fitted to these records or with only their initial states fitted.
-    effects
-        Those that the equations hold beside the modelled ones.
-    free
-        Parameters that are projected out of the response to a push.
-    """
+    # The context gives scales and noise, its memory is not used. The fit is one to these records, or one with only their initial
+    # states fitted; `effects` are those that the equations hold beside the modelled ones, `free` the parameters that are
+    # projected out of the response to a push.
 
     def __init__(
         self,
@@ -156,11 +188,9 @@ class Responses:
         return found
 
     def seen(self, place: str) -> list[Floats]:
-        """Return the signal that an effect at a place reads along each record: motion, drive signal or reading.
-
-        A joint's motion is the measured one where the sensors tell it. An observer follows that by itself, and its velocity is
-        that of the equations: between the steps of an encoder a measured one is not known.
-        """
+        """Return the signal that an effect at a place reads along each record: motion, drive signal or reading."""
+        # A joint's motion is the measured one where the sensors tell it. An observer follows that by itself, and its velocity is
+        # that of the equations: between the steps of an encoder a measured one is not known.
         if place in motion_columns(self.context.rig) and not self.structure.observed:
             return [motion[place] for motion in self.motions]
         return self.simulated(place)

@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
+from rigsight.records.record import Floats
 from rigsight.simulate import Structure
 
 _LOOK_TOLERANCE = 1e-3
@@ -64,11 +64,9 @@ def look_at(
     are_enough: bool = False,
     numbers: Mapping[str, float] = MappingProxyType({}),
 ) -> FirstLook:
-    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect.
-
-    `further` are more values of its own parameters, with `numbers` of the equations beside them; where they `are_enough`, its
-    declared starts are left out.
-    """
+    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect."""
+    # `further` are more values of its own parameters, with `numbers` of the equations beside them; where they `are_enough`, its
+    # declared starts are left out.
     structure = context.simplest(effects, base.structure)
     known = context.constant_forces_beside(structure.effects)
     moved = {*context.free_parameters(structure), *base.free} - {*hold, *known}
@@ -119,9 +117,7 @@ def _looked(
     if substeps is not None:
         of_pieces = [n for n, parts in zip(substeps, stretches, strict=True) for _ in parts]
 
-    def tried(
-        start: Mapping[str, float], states: Sequence[NDArray[np.float64]] | None, most: int
-    ) -> FitResult:
+    def tried(start: Mapping[str, float], states: Sequence[Floats] | None, most: int) -> FitResult:
         return in_pieces.fit(start, free, states, most, _LOOK_TOLERANCE, False, of_pieces)
 
     if len(starts) > SEARCH.most_starts:

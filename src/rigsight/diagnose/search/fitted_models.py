@@ -9,28 +9,30 @@ from functools import partial
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of
+from rigsight.diagnose.fit_context import FitContext, FittedModel, fit_context_of
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.horizon import fitted_in_windows, is_predictable, pairs_in_windows
 from rigsight.diagnose.search.nested_models import lowered_by_extensions, ordered_by_inclusion
-from rigsight.diagnose.search.places import Search, search_places
-from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
-from rigsight.diagnose.search.several.parts import part_of, with_causes
-from rigsight.diagnose.search.several.stepwise import (
+from rigsight.diagnose.search.one_more_effect import part_of, with_causes
+from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.diagnose.search.stepwise import (
     larger_part_closed,
     refit_singles,
     settled,
     several_effects,
 )
-from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
-from rigsight.diagnose.search.single_models import SingleModels
-from rigsight.diagnose.search.worth_fitting import WorthFitting, worth_fitting
+from rigsight.diagnose.search.worth_fitting import (
+    Search,
+    SingleModels,
+    WorthFitting,
+    search_places,
+    worth_fitting,
+)
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
-from rigsight.identify import FitMemory, IdleThreads, characteristic_scales
+from rigsight.identify import characteristic_scales
 from rigsight.identify.fit.windows import Windowing, leading_output
 from rigsight.inverse import Proposal, propose
 from rigsight.simulate import Structure
@@ -51,24 +53,19 @@ class AllModels:
 
 def single_models(
     campaign: Campaign,
-    noise: Mapping[str, float],
-    effects: Sequence[Effect],
+    context: FitContext,
     windowing: Windowing,
-    start: Mapping[str, float],
-    n_jobs: int,
+    effects: Sequence[Effect],
     say: Callable[[str], None],
-    prepare: Prepare | None,
-    memory: FitMemory | None,
 ) -> SingleModels:
     """Fit and score the given simulation, its equations and every candidate."""
-    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs), start)
     reidentified = reidentify(context, context.start)
     if not reidentified.residuals:
         raise SimulationError(
             f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
     say("re-identified")
-    proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, noise)
+    proposal = propose(campaign, {**campaign.constants, **reidentified.fit.values}, effects, context.noise)
     say("missing force")
     worth = worth_fitting(campaign.rig, proposal, effects)
     context = _with_known_motion(campaign, context, reidentified)
@@ -86,7 +83,7 @@ def single_models(
     if worth.is_shown and proposal is not None and len(proposal.taken) > 1:
         together = with_causes(context, reidentified, proposal.taken, proposal)
         say("causes that the motion names")
-    search, singles = _singles(context, reidentified, worth, together, say, prepare)
+    search, singles = _singles(context, reidentified, worth, together, say)
     lowered = lowered_by_extensions(context, reidentified, singles)
     if lowered.fit.cost <= (1.0 - SEARCH.worth_restarting) * reidentified.fit.cost:
         # What was compared with a local minimum of the equations was compared with a gap that does not exist.
@@ -104,11 +101,9 @@ def single_models(
 def held_by_motion(
     context: FitContext, reidentified: FittedModel, proposal: Proposal
 ) -> tuple[FitContext, FittedModel]:
-    """Return the context whose fits must also hold along the measured motion, and the equations fitted so.
-
-    A simulation that tracks the sensors hardly leaves them where the mass is large, whatever force it lacks. Where the equations
-    follow the sensors to within noise nothing is missing.
-    """
+    """Return the context whose fits must also hold along the measured motion, and the equations fitted so."""
+    # A simulation that tracks the sensors hardly leaves them where the mass is large, whatever force it lacks. Where the
+    # equations follow the sensors to within noise nothing is missing.
     found, error = proposal.numbers_beside, reidentified.error_over_noise
     if found is None or error <= VERDICT.at_floor:
         return context, reidentified
@@ -119,10 +114,8 @@ def held_by_motion(
 
 
 def _with_known_motion(campaign: Campaign, context: FitContext, reidentified: FittedModel) -> FitContext:
-    """Return the context with scales from the motion and the forces between the sensors.
-
-    These are known once the equations fit, or from the given simulation.
-    """
+    """Return the context with scales from the motion and the forces between the sensors."""
+    # These are known once the equations fit, or from the given simulation.
     bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
     if not bent and campaign.rig.has_one_motion:
         return context
@@ -136,7 +129,6 @@ def _singles(
     worth: WorthFitting,
     together: FittedModel | None,
     say: Callable[[str], None],
-    prepare: Prepare | None,
 ) -> tuple[Search, list[FittedModel]]:
     """Return where was searched, and every effect by itself."""
     search = search_places(context, reidentified, context.offered(worth.alone))
@@ -146,8 +138,7 @@ def _singles(
     least = VERDICT.larger_part if leaves_nothing else VERDICT.larger_part * search.most
     first = [e for e in context.offered(worth.alone) if _comes_first(e, search, worth, least)]
     others = [effect for effect in (*search.effects, *search.others) if effect not in first]
-    if prepare is not None:
-        prepare([context.simplest((effect,)) for effect in first])
+    context.prepare(context.simplest((effect,)) for effect in first)
     reached = together if leaves_nothing else None
     singles = fit_candidates(context, reidentified, first, say, (), worth.starts, worth.is_shown, reached)
     best = min((model.error_over_noise for model in singles), default=np.inf)
@@ -157,8 +148,7 @@ def _singles(
         enough = np.inf if worth.explained >= VERDICT.larger_part else larger_part_closed(reidentified)
     if others and best > enough:
         # A right model must not be lost because places or effects were ranked wrongly.
-        if prepare is not None:
-            prepare([context.simplest((effect,)) for effect in others])
+        context.prepare(context.simplest((effect,)) for effect in others)
         singles = fit_candidates(context, reidentified, others, say, singles, worth.starts, worth.is_shown)
     return search, singles
 
@@ -173,13 +163,11 @@ def _comes_first(effect: Effect, search: Search, worth: WorthFitting, least: flo
 
 def with_several_effects(
     campaign: Campaign,
-    noise: Mapping[str, float],
     models: SingleModels,
     lower_bound: bool,
     allowed: float,
     rng: np.random.Generator,
     say: Callable[[str], None],
-    prepare: Prepare | None,
 ) -> AllModels:
     """Fit and score several effects together where one does not explain the records; in windows where only these can decide."""
     context, whole = models.context, models.windowing.whole
@@ -188,7 +176,7 @@ def with_several_effects(
     forms = OtherForms(context, lower_bound)
     cut: SingleModels | None = None
     if whole and not is_predictable(context, models.reidentified, models.singles, at_floor, rng):
-        cut = _in_windows(campaign, noise, models)
+        cut = _in_windows(campaign, models)
         say("in windows")
         if _explained(cut, cut.singles, at_floor):
             return AllModels(cut, [], True, Checks(cut.context, rng, VERDICT.at_floor, most_remainder), forms)
@@ -196,9 +184,9 @@ def with_several_effects(
 
     def ask(model: FittedModel) -> Proposal | None:
         beside = replace(campaign, modelled=(*campaign.modelled, *model.effects))
-        return propose(beside, {**campaign.constants, **model.fit.all_values}, models.effects, noise)
+        return propose(beside, {**campaign.constants, **model.fit.all_values}, models.effects, context.noise)
 
-    found = several_effects(models, ask, forms, checks, lower_bound, prepare)
+    found = several_effects(models, ask, forms, checks, lower_bound)
     for model in found[:1]:
         # The parts of a set compete with it, and tell the share of each.
         known = {single.names for single in models.singles}
@@ -208,7 +196,7 @@ def with_several_effects(
     if not models.worth.is_shown:
         models = replace(models, singles=refit_singles(context, models.singles, found))
     if whole and not is_predictable(context, models.reidentified, found, allowed, rng):
-        cut = cut or _in_windows(campaign, noise, models)
+        cut = cut or _in_windows(campaign, models)
         pairs = pairs_in_windows(context, cut.context, models.reidentified, found)
         say("pairs in windows")
         if _explained(cut, pairs, VERDICT.at_floor):
@@ -218,12 +206,12 @@ def with_several_effects(
     return AllModels(models, found, False, checks, forms)
 
 
-def _in_windows(campaign: Campaign, noise: Mapping[str, float], models: SingleModels) -> SingleModels:
+def _in_windows(campaign: Campaign, models: SingleModels) -> SingleModels:
     """Return the models in windows of a few cycles."""
-    leading = leading_output(campaign.rig, campaign.records)
-    windowing = Windowing(cycles=VERDICT.window_cycles, noise={leading: noise[leading], **noise})
-    known = models.context
-    context = fit_context_of(campaign, noise, windowing, known.memory, known.threads, known.start)
+    known, leading = models.context, leading_output(campaign.rig, campaign.records)
+    noise = {leading: known.noise[leading], **known.noise}
+    windowing = Windowing(cycles=VERDICT.window_cycles, noise=noise)
+    context = fit_context_of(campaign, known.noise, windowing, known.memory, known.threads, known.start)
     reidentified = reidentify(context, models.reidentified.fit.values)
     singles = fitted_in_windows(context, reidentified, models.singles)
     before = _before(campaign, context, reidentified) if reidentified.residuals else models.before

@@ -18,9 +18,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.pushes.probes import (
     PUSH_SIZE,
@@ -39,13 +38,11 @@ from rigsight.effects import Effect, Place, kind_of, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
 from rigsight.inverse.controller_output import ControllerSignals, changed_output, limits_of
-from rigsight.records.record import Record
+from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.units import characteristic_value
-
-Floats = NDArray[np.float64]
 
 _SMALL = 0.1
 """Size of a push whose answer is taken to be proportional to it, in units of what the effect itself would be."""
@@ -88,17 +85,7 @@ class _Push:
 
 
 class Shortlist:
-    """The re-identified equations along the records, and their responses to pushes at every place.
-
-    Parameters
-    ----------
-    context
-        Records, scales and noise.
-    model
-        The fitted equations whose residual is to be explained.
-    liveliest
-        Use only the most excited stretches of the records.
-    """
+    """The re-identified equations along the records, or along their liveliest stretches, and their responses to pushes."""
 
     def __init__(self, context: FitContext, model: FittedModel, liveliest: bool = False) -> None:
         records, fit = context.estimation, model.fit
@@ -118,10 +105,8 @@ class Shortlist:
         _ = self._responses.remainder, self._responses.motions
 
     def suspects(self, effects: Sequence[Effect]) -> list[Suspect]:
-        """Return the share that each effect explains, in their order.
-
-        To first order; for those near the best, pushes are fitted.
-        """
+        """Return the share that each effect explains, in their order."""
+        # To first order; for those near the best, pushes are fitted.
         pushes = list(self._context.threads.side_by_side(self._pushes, list(effects)))
         whole = max(float(self._responses.remainder @ self._responses.remainder), np.finfo(np.float64).tiny)
         shares = [max((push.explained for push in own), default=0.0) / whole for own in pushes]
@@ -196,10 +181,8 @@ class Shortlist:
         return Suspect(effect, share, replace(push, factor=factor).values_of(effect))
 
     def _fitted_share(self, place: str, signals: Sequence[Floats], push_size: float) -> tuple[float, float]:
-        """Return the reduction of the cost when a push of this form, the parameters and the initial states are fitted.
-
-        With it the size of the push.
-        """
+        """Return the reduction of the cost when a push of this form, the parameters and the initial states are fitted."""
+        # With it the size of the push.
         records = [
             record.with_signals(**{push(place): signal})
             for record, signal in zip(self._responses.records, signals, strict=True)
@@ -315,11 +298,9 @@ class Shortlist:
 
 
 def scaled(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str, float]:
-    """Return own values of an effect with a push scaled by a factor; empty if the effect cannot have that size.
-
-    Where an effect is absent at a value of a parameter, its force grows with the distance from there. A push the other way is the
-    same effect only where its parameters may have that sign: a spring may soften, a friction cannot drive.
-    """
+    """Return own values of an effect with a push scaled by a factor; empty if the effect cannot have that size."""
+    # Where an effect is absent at a value of a parameter, its force grows with the distance from there. A push the other way is
+    # the same effect only where its parameters may have that sign: a spring may soften, a friction cannot drive.
     if factor == 0.0:
         return {}
     values = _fitted_values(effect, own)

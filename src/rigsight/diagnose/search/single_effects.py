@@ -12,9 +12,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.first_look import (
     LOOK_ACCURACY,
     FirstLook,
@@ -23,8 +22,12 @@ from rigsight.diagnose.search.first_look import (
     mean_square,
     widened,
 )
-from rigsight.diagnose.search.nested_models import at_least_as_good, ordered_by_inclusion
-from rigsight.diagnose.search.same_equation import without_repeated_equations
+from rigsight.diagnose.search.nested_models import (
+    at_least_as_good,
+    in_lowest_basins,
+    ordered_by_inclusion,
+    without_repeated_equations,
+)
 from rigsight.diagnose.search.starts import restart_values
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, FitResult, off_bounds
@@ -36,12 +39,10 @@ _HOPELESS_TOLERANCE = 1e-2
 
 
 def reidentify(context: FitContext, start: Mapping[str, float]) -> FittedModel:
-    """Re-identify the equations without an effect.
-
-    Starts from the parameters of a regression, or from those of the given simulation if the rig cannot be simulated with the
-    former: the regression does not determine all parameters if no sensor reads a coordinate. Where parameters start at a bound,
-    such as a friction given as zero, also from inside of it.
-    """
+    """Re-identify the equations without an effect."""
+    # Starts from the parameters of a regression, or from those of the given simulation if the rig cannot be simulated with the
+    # former: the regression does not determine all parameters if no sensor reads a coordinate. Where parameters start at a bound,
+    # such as a friction given as zero, also from inside of it.
     structure = context.composed()
     problem, free = context.problem(structure, context.estimation), context.free_parameters(structure)
     fit = problem.fit(start, free)
@@ -63,12 +64,10 @@ def fit_candidates(
     is_shown: bool = False,
     reached: FittedModel | None = None,
 ) -> list[FittedModel]:
-    """Return every effect alone, fitted and scored, with those that were before.
-
-    `along_motion` are values at which effects explain the missing force along the motion: one more start, or the only one where
-    the motion `is_shown`; then the equations start from their numbers there, too. `reached` is a model of several effects that
-    leaves nothing: beside it one effect alone only tells its share, so that rough fits are enough.
-    """
+    """Return every effect alone, fitted and scored, with those that were before."""
+    # `along_motion` are values at which effects explain the missing force along the motion: one more start, or the only one where
+    # the motion `is_shown`; then the equations start from their numbers there, too. `reached` is a model of several effects that
+    # leaves nothing: beside it one effect alone only tells its share, so that rough fits are enough.
     before = {model.effects[0].name: model.fit for model in known if np.isfinite(model.fit.cost)}
     looks = _looks(context, reidentified, context.offered(effects), along_motion, is_shown, before)
     wide = {look.newest: look for look in widened(context, looks)}
@@ -178,10 +177,8 @@ def _refined(context: FitContext, model: FittedModel, max_evaluations: int) -> F
 
 
 def followed(context: FitContext, look: FirstLook, promising: bool, finish: bool = True) -> FittedModel:
-    """Fit a candidate to all records after its first look: carefully if it is promising, else only to rank it.
-
-    `finish` is False where many are followed of which only the best are worth fits from elsewhere and more free numbers.
-    """
+    """Fit a candidate to all records after its first look: carefully if it is promising, else only to rank it."""
+    # `finish` is False where many are followed of which only the best are worth fits from elsewhere and more free numbers.
     scored = _fitted(context, look.effects, look.structure, look.free, look.fits, promising, look.nearest)
     return finished(context, scored) if promising and finish else scored
 

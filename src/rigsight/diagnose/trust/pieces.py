@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import TRUST
 from rigsight.identify import Coordinates, FitResult, RecordDerivatives, derivatives, own_derivatives
 from rigsight.records.record import Floats, Record

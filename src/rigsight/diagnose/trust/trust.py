@@ -23,27 +23,28 @@ from scipy.stats import chi2, norm
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.compare import OwnNumber, own_numbers
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import TRUST
+from rigsight.diagnose.trust.estimates import PORTION, RECORD, WINDOW_LENGTH, View, views
 from rigsight.diagnose.trust.patterns import Order, Pattern, Role, meaning, orders, roles
 from rigsight.diagnose.trust.pieces import pieces
-from rigsight.diagnose.trust.result import CorrelatedParameters, GroupValue, ParameterTrust, Trust
-from rigsight.diagnose.trust.statement import percent, statement
-from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, views
+from rigsight.diagnose.trust.statement import (
+    CorrelatedParameters,
+    GroupValue,
+    ParameterTrust,
+    Trust,
+    percent,
+    statement,
+)
 from rigsight.identify import FitResult
 from rigsight.identify.information import POORLY_KNOWN
+from rigsight.records import Hold
 from rigsight.records.record import Floats, Record
+from rigsight.simulate.model import Model
 
 _NOT_SIMULATED = "Whether the parameters hold in each record could not be tested: the model cannot be simulated in one of them."
 _NOTHING_FITTED = "No parameter was fitted, so none can differ from record to record."
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """How one number differs in one view."""
-
-    view: View
-    reported: Spread
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,10 @@ def trust(
     asked = [
         []
         if name in open_numbers
-        else [_Asked(view, reported) for view in seen.values() if (reported := _reported(view, i))]
+        else [(kind, found_in) for kind, view in seen.items() if (found_in := _reported(view, i))]
         for i, name in enumerate(found.free)
     ]
-    p_values = iter(adjusted([one.reported.p_value for of_number in asked for one in of_number]))
+    p_values = iter(adjusted([one.p_value for of_number in asked for _, one in of_number]))
     allowed = [[next(p_values) for _ in of_number] for of_number in asked]
     own = roles(context.rig, _effect_parameters(model))
     numbers = tuple(
@@ -140,12 +141,11 @@ def _effect_parameters(model: FittedModel) -> set[str]:
 
 def _reported(view: View, index: int) -> Spread | None:
     """Return how a parameter differs in a view; None if nothing can be compared or another view has the same groups."""
-    known = view.known(index)
+    known, values, variances, freedom = view.of(index)
     if not view.is_tested or known.size < 2:
         return None
     if view.apart is None:
-        values, variances, freedom = view.of(index)
-        return spread(values[known], variances[known], freedom[known])
+        return spread(values, variances, freedom)
     error = math.sqrt(view.apart.variances[index])
     if not 0.0 < error < math.inf:
         return None
@@ -159,7 +159,7 @@ def _number(
     index: int,
     std: float,
     seen: Mapping[str, View],
-    asked: Sequence[_Asked],
+    asked: Sequence[tuple[str, Spread]],
     p_values: Sequence[float],
     along: Sequence[Order],
     role: Role,
@@ -169,13 +169,12 @@ def _number(
     value = model.fit.values[name]
     groups = {}
     for kind, view in seen.items():
-        known = view.known(index)
-        values, variances, _ = view.of(index)
+        known, shifts, variances, _ = view.of(index)
         groups[kind] = tuple(
-            GroupValue(view.labels[g], value + float(values[g]), math.sqrt(float(variances[g])))
-            for g in known
+            GroupValue(view.labels[g], value + float(shift), math.sqrt(float(variance)))
+            for g, shift, variance in zip(known, shifts, variances, strict=True)
         )
-    differing = {one.view.kind: p for one, p in zip(asked, p_values, strict=True) if p <= TRUST.level}
+    differing = {kind: p for (kind, _), p in zip(asked, p_values, strict=True) if p <= TRUST.level}
     found = _Way(Pattern.STABLE if asked else Pattern.UNKNOWN)
     if differing:
         found = _pattern(seen, index, differing, along)
@@ -187,7 +186,7 @@ def _number(
         of_effect=role is Role.EFFECT,
         groups=groups,
         p_value=min(p_values, default=1.0),
-        largest=max((one.reported.largest for one in asked), default=0.0),
+        largest=max((one.largest for _, one in asked), default=0.0),
         pattern=found.pattern,
         direction=found.direction,
         goes_with=found.goes_with,
@@ -202,10 +201,8 @@ def _pattern(
     if set(differing) - {PORTION, WINDOW_LENGTH}:
         return _between_records(seen, index, differing, along)
     if PORTION in differing:
-        view = seen[PORTION]
-        known = view.known(index)
-        values, variances, _ = view.of(index)
-        found = course(values[known], variances[known], known.astype(float))
+        known, values, variances, _ = seen[PORTION].of(index)
+        found = course(values, variances, known.astype(float))
         return _Way(Pattern.PORTION, found.direction, ("time",))
     apart = seen[WINDOW_LENGTH].apart
     assert apart is not None
@@ -216,12 +213,11 @@ def _between_records(
     seen: Mapping[str, View], index: int, differing: Mapping[str, float], along: Sequence[Order]
 ) -> _Way:
     view = seen[RECORD]
-    known = view.known(index)
-    values, variances, _ = view.of(index)
+    known, values, variances, _ = view.of(index)
     courses = []
     for order in along:
         levels = np.array([order.levels[view.labels[g]] for g in known])
-        found = course(values[known], variances[known], levels)
+        found = course(values, variances, levels)
         if found.direction:
             courses.append((order, found))
     if courses:
@@ -331,3 +327,19 @@ def course(values: Floats, variances: Floats, along: Floats) -> Course:
         if np.ptp(best) > 0.0 and in_order and remainder < found.remainder:
             found = Course(direction, remainder)
     return found
+
+
+RecordNumbers = dict[str, tuple[OwnNumber, ...]]
+"""By the name of the record."""
+
+
+def record_numbers(context: FitContext, model: FittedModel, hold: Hold) -> RecordNumbers:
+    """Return the changes that the records ask for, one number at a time; nothing where an observer followed the motion."""
+    if any(record.observed for record in context.records):
+        return {}
+    whole = Model.of(model.fit.structure, model.fit.values, hold)
+    names = dict.fromkeys(record.origin for record in context.records)
+    return {
+        name: tuple(own_numbers(whole, [r for r in context.records if r.origin == name], context.noise))
+        for name in names
+    }

@@ -16,7 +16,7 @@ import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from typing import Any
 
@@ -158,13 +158,7 @@ class Calibration:
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of the file."""
-        return {
-            "listed": dict(self.listed),
-            "first": dict(self.first),
-            "least_probability": self.least_probability,
-            "n_trials": self.n_trials,
-            "largest_gap": self.largest_gap,
-        }
+        return asdict(self)
 
 
 @functools.cache

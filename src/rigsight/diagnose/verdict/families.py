@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import FAMILIES, SEARCH
 from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 
 Key = tuple[Family, str]
@@ -83,35 +83,15 @@ def families_at_places(
     diagnosed: FittedModel,
     candidates: Sequence[tuple[FittedModel, float, float]],
     outside: float,
-    noise: NDArray[np.float64],
+    noise: Floats,
     rng: np.random.Generator,
     proposal: Proposal | None = None,
     by_motion: bool = False,
 ) -> tuple[FamilyAtPlace, ...]:
-    """Return the families of the diagnosed model and of its probable rivals, the largest share first.
-
-    Parameters
-    ----------
-    rig
-        The rig.
-    reidentified
-        The equations without an effect.
-    diagnosed
-        The model whose families divide the gap.
-    candidates
-        Every scored model with its probability and its share of the ranking.
-    outside
-        Probability of a cause that has none of the forms tried. It belongs to a family by what this explains of the gap: a real
-        law is no exact form, and what it leaves does not refute it.
-    noise
-        Noise floor of each output.
-    rng
-        Source of the resampling.
-    proposal
-        What the families explain along the measured motion; None where the sensors do not show it.
-    by_motion
-        Whether shares are those of the force along the motion, because it named the diagnosed model.
-    """
+    """Return the families of the diagnosed model and of its probable rivals, the largest share first."""
+    # Candidates are all scored models, each with its probability and its share of the ranking. A cause that has none of the forms
+    # tried (its probability is `outside`) belongs to a family by what this explains of the gap: a real law is no exact form, and
+    # what it leaves does not refute it. If the motion named the diagnosed model, shares are those of the force along it.
     usable = [
         own
         for own in candidates
@@ -180,7 +160,7 @@ def main_causes(
     rig: Rig,
     reidentified: FittedModel,
     candidates: Sequence[tuple[FittedModel, float]],
-    noise: NDArray[np.float64],
+    noise: Floats,
     proposal: Proposal | None,
 ) -> dict[Key, float]:
     """Return how probable each family is as the main cause where no law is exact, from models and their shares of the ranking."""
@@ -223,16 +203,14 @@ def _weighed(
     reidentified: FittedModel,
     models: Sequence[FittedModel],
     of_rank: Sequence[float],
-    explained: NDArray[np.float64],
+    explained: Floats,
     proposal: Proposal | None,
 ) -> dict[Key, float]:
-    """Return how probable each family is as the main cause where no law is exact.
-
-    A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
-    number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
-    the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap. The
-    motion says nothing of a family all of whose fits end at a size of zero.
-    """
+    """Return how probable each family is as the main cause where no law is exact."""
+    # A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
+    # number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
+    # the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap. The
+    # motion says nothing of a family all of whose fits end at a size of zero.
     counts = float(np.clip(np.max(explained, initial=0.0), 0.0, 1.0))
     keys = [frozenset(keys_of(rig, model.effects)) for model in models]
     standing = [own for model, own in zip(models, keys, strict=True) if stands(model, reidentified, models)]
@@ -261,16 +239,14 @@ def _second_cause(together: float, without: float) -> float:
 
 
 def _evidence(explained: float, without: float, per_share: float) -> float:
-    """Return the evidence [nats] of a family, from the shares that are explained with it and without it.
-
-    What a law errs remains in both.
-    """
+    """Return the evidence [nats] of a family, from the shares that are explained with it and without it."""
+    # What a law errs remains in both.
     of_law = SEARCH.law_error**2
     with_it, without_it = (1.0 - min(max(own, 0.0), 1.0) + of_law for own in (explained, without))
     return per_share * math.log(without_it / with_it)
 
 
-def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: NDArray[np.float64]) -> float:
+def _explained_by(model: FittedModel, models: Sequence[FittedModel], explained: Floats) -> float:
     return max((float(explained[i]) for i, own in enumerate(models) if own is model), default=0.0)
 
 
@@ -282,7 +258,7 @@ def keys_of(rig: Rig, effects: Sequence[Effect]) -> tuple[Key, ...]:
 def _share(
     key: Key,
     of_model: Sequence[Key],
-    explained: NDArray[np.float64],
+    explained: Floats,
     of_sets: Mapping[frozenset[Key], Sequence[int]],
 ) -> float:
     """Return what a family adds to what the others explain, averaged over the orders of adding them: Shapley's value."""
@@ -293,9 +269,7 @@ def _share(
     return float(np.mean(steps))
 
 
-def _best(
-    keys: frozenset[Key], explained: NDArray[np.float64], of_sets: Mapping[frozenset[Key], Sequence[int]]
-) -> float:
+def _best(keys: frozenset[Key], explained: Floats, of_sets: Mapping[frozenset[Key], Sequence[int]]) -> float:
     """Return what a set of families explains: at least what the best part of it does that was fitted."""
     found = (float(explained[i]) for own, at in of_sets.items() if own <= keys for i in at)
     return max(0.0, max(found, default=0.0))

@@ -1,4 +1,8 @@
-"""From scored models to a verdict: none, parameters, effect or unknown."""
+"""From scored models to a verdict: none, parameters, effect or unknown; by simulations, or by the missing force along the motion.
+
+If models at other places explain the same part of the gap, such as a delayed drive and a delayed sensor, only the place of the
+cause is open. What a main cause leaves is the remainder: on a measured rig no law is exact, so a remainder does not refute it.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,83 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
-from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.verdict.main_cause import MainCause
+import numpy as np
+
+from rigsight.diagnose.fit_context import FittedModel
+from rigsight.diagnose.noise.block_means import squared_errors
+from rigsight.diagnose.policy import FAMILIES, VERDICT
+from rigsight.diagnose.verdict.families import keys_of, main_causes
+from rigsight.diagnose.verdict.plausibility import stands
+from rigsight.diagnose.verdict.ranking import Ranking
+from rigsight.inverse import MissingForce, Proposal
+from rigsight.records.record import Floats
+from rigsight.rigs import Rig
+
+
+@dataclass(frozen=True)
+class MainCause:
+    """The share of the re-identified gap that a model explains."""
+
+    share: float  # of the squared gap above the noise floor
+    at_least: float  # lower limit of the share in 95 % of the resamplings of the records' stretches
+    # Equally good models that act at other places and explain another part of the gap.
+    contradicted_by: tuple[FittedModel, ...] = ()
+    # Equally good models that act at other places but explain the same part.
+    equalled_by: tuple[FittedModel, ...] = ()
+
+    @property
+    def clear(self) -> bool:
+        """True if the model explains more than half."""
+        return self.share > VERDICT.larger_part
+
+
+def main_cause(
+    rig: Rig,
+    reidentified: FittedModel,
+    best: FittedModel,
+    tied: Sequence[FittedModel],
+    noise: Floats,
+    rng: np.random.Generator,
+) -> MainCause:
+    """Determine the share of the residual of the equations that a model explains."""
+    squares = squared_errors([model.residuals for model in (reidentified, best)], noise)
+    gap, remainder = squares.resampled(squares.draws(rng)).T
+    share = _share_of_gap(*squares.mean)
+    lowest = float(
+        np.quantile([_share_of_gap(g, r) for g, r in zip(gap, remainder, strict=True)], VERDICT.surely)
+    )
+    places = {rig.acts_at(effect) for effect in best.effects}
+    elsewhere = [m for m in tied if places.isdisjoint(rig.acts_at(effect) for effect in m.effects)]
+    same = [m for m in elsewhere if _common_part(reidentified, best, m, noise) > VERDICT.larger_part]
+    other = [m for m in elsewhere if m not in same]
+    return MainCause(share, lowest, tuple(other), tuple(same))
+
+
+def _common_part(reidentified: FittedModel, one: FittedModel, other: FittedModel, noise: Floats) -> float:
+    """Return the share of the squared gap explained by one model that another explains too."""
+    explained = differing = 0.0
+    for gap, remainder, others_left in zip(
+        reidentified.residuals, one.residuals, other.residuals, strict=True
+    ):
+        explained += float(np.nansum(((gap - remainder) / noise) ** 2))
+        differing += float(np.nansum(((others_left - remainder) / noise) ** 2))
+    return 1.0 - differing / explained if explained > 0.0 else 0.0
+
+
+def _share_of_gap(gap: float, remainder: float) -> float:
+    return float((gap - remainder) / (gap - 1.0)) if gap > 1.0 else 0.0
+
+
+def traced_to(rig: Rig, forces: Sequence[MissingForce]) -> tuple[str, ...]:
+    """Return the only joint at which a missing force explains the larger part, with the drives that act along its motion."""
+    # Empty where no joint does, or several of them leave about as much.
+    least = min((1.0 - force.share for force in forces), default=1.0)
+    agreeing = [force for force in forces if 1.0 - force.share <= VERDICT.comparable**2 * least]
+    if len(forces) < 2 or len(agreeing) != 1 or agreeing[0].share < VERDICT.larger_part:
+        return ()
+    joint = next(joint for joint in rig.mechanism.joints if joint.name == agreeing[0].where)
+    return (joint.name, *(drive.name for drive in rig.mechanism.drives if drive.along == joint.motion))
+
 
 Verdict = Literal["effect", "parameters", "none", "unknown"]
 
@@ -108,3 +186,58 @@ def judge(
 
 def _listed(models: Sequence[FittedModel]) -> str:
     return "; ".join(", ".join(model.names) for model in models[:3])
+
+
+def is_exact(
+    judgement: Judgement,
+    best: FittedModel,
+    allowed: float,
+    is_adequate: Callable[[FittedModel], bool],
+) -> bool:
+    """Return True if no cause is needed, or the best model leaves no more than noise: the simulations decide."""
+    if judgement.verdict in ("none", "parameters") or best.error_over_noise <= allowed:
+        return True
+    return judgement.verdict == "effect" and is_adequate(best)
+
+
+def by_motion(
+    judgement: Judgement,
+    rig: Rig,
+    reidentified: FittedModel,
+    ranking: Ranking,
+    noise: Floats,
+    proposal: Proposal | None,
+) -> Judgement:
+    """Return the judgement with the most probable family, where it is another one."""
+    # It is more probable than not, or explains the larger part of the missing force.
+    if proposal is None:
+        return judgement
+    shares = [grounds.share for grounds in ranking.grounds]
+    main = main_causes(rig, reidentified, list(zip(ranking.order, shares, strict=True)), noise, proposal)
+    key = max(main, key=lambda own: main[own], default=None)
+    along = {(cause.family, cause.where): cause.share for cause in proposal.alone}
+    share = 0.0 if key is None else along.get(key, 0.0)
+    is_probable = key is not None and main[key] >= FAMILIES.probable and share > proposal.by_chance
+    if key is None or not (is_probable or share >= VERDICT.larger_part):
+        return judgement
+    if judgement.verdict == "effect" and key in keys_of(rig, judgement.model.effects):
+        return judgement
+    forms = [
+        model
+        for model in ranking.order
+        if model.residuals
+        and keys_of(rig, model.effects) == (key,)
+        and stands(model, reidentified, ranking.order)
+    ]
+    if not forms:
+        return judgement
+    of_rank = {model.names: share for model, share in zip(ranking.order, shares, strict=True)}
+    form = max(forms, key=lambda model: (of_rank[model.names], -model.error_over_noise))
+    simulated = form.error_over_noise / reidentified.error_over_noise
+    return Judgement(
+        "effect",
+        form,
+        f"{', '.join(form.names)} explains {along[key]:.0%} of the force that the equations leave along the measured motion, on "
+        f"stretches that it was not fitted to. Simulated, it leaves {simulated:.0%} of the error of the equations.",
+        by_motion=True,
+    )

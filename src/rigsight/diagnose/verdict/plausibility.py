@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2, norm
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.policy import NOTES, VERDICT
-from rigsight.diagnose.search.basins import is_lower
+from rigsight.diagnose.search.nested_models import is_lower
 from rigsight.diagnose.search.starts import ENDLESS
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.effects import Effect, placed_dimension
@@ -67,28 +67,23 @@ def doubts(model: FittedModel, reidentified: FittedModel) -> tuple[Doubt, ...]:
 
 
 def has_size_of_zero(model: FittedModel, others: Sequence[FittedModel]) -> bool:
-    """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named.
-
-    It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
-    of that, tested together by Wald's chi square. Where these are determined only with others, the former decides alone; so it
-    does for an effect without a state of its own that removes the larger part of the squared error of records that it was not
-    fitted to (a hidden state could do so from a free start).
-    """
+    """Return True if the size of one of the effects of a model does not differ from zero: it cannot be named."""
+    # It does not if removing the effect does not raise chi square, or if its parameters with a null value are within their errors
+    # of that, tested together by Wald's chi square. Where these are determined only with others, the former decides alone; so it
+    # does for an effect without a state of its own that removes the larger part of the squared error of records that it was not
+    # fitted to (a hidden state could do so from a free start).
     models = {frozenset(other.names): other for other in others}
 
     def is_zero(effect: Effect) -> bool:
         without = models.get(frozenset(model.names) - {effect.name})
         if without is not None and not is_lower(model.fit, without.fit):
             return True
-        is_shown = not effect.states and without is not None and _closes(model, without)
-        return not is_shown and _is_within_errors(model, effect)
+        if without is None or effect.states:
+            return _is_within_errors(model, effect)
+        smaller_part = (1.0 - VERDICT.larger_part) * without.error_over_noise**2
+        return model.error_over_noise**2 > smaller_part and _is_within_errors(model, effect)
 
     return any(map(is_zero, model.effects))
-
-
-def _closes(model: FittedModel, without: FittedModel) -> bool:
-    """Return True if a model leaves the smaller part of the squared error that another one leaves."""
-    return model.error_over_noise**2 <= (1.0 - VERDICT.larger_part) * without.error_over_noise**2
 
 
 def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[FittedModel]) -> bool:
@@ -97,11 +92,9 @@ def stands(model: FittedModel, reidentified: FittedModel, models: Sequence[Fitte
 
 
 def is_beyond_records(model: FittedModel, scales: Mapping[str, float], duration: float) -> bool:
-    """Return True if an effect is slower, longer or coarser than the records can show: it is another spring.
-
-    Its wave is longer than the motion, a time constant or a period longer than every record [s], or the length over which it
-    yields beyond its search.
-    """
+    """Return True if an effect is slower, longer or coarser than the records can show: it is another spring."""
+    # Its wave is longer than the motion, a time constant or a period longer than every record [s], or the length over which it
+    # yields beyond its search.
     fit = model.fit
 
     def is_too_long(effect: Effect, parameter: Parameter) -> bool:

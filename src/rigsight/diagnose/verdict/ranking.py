@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.fitting.fit_context import FittedModel
+from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import Blocks, squared_errors
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.several.one_law import is_linear
+from rigsight.diagnose.search.evidence_for_more import is_linear
 from rigsight.effects.effect import Place
+from rigsight.records.record import Floats
 
 
 @dataclass(frozen=True)
@@ -44,22 +45,17 @@ class Ranking:
 
 def rank(
     models: Sequence[FittedModel],
-    noise: NDArray[np.float64],
+    noise: Floats,
     rng: np.random.Generator,
     gap: float = 1.0,
     criterion: Callable[[FittedModel], float] | None = None,
     evidence_counts: bool = True,
 ) -> Ranking:
-    """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen.
-
-    Held-out errors are what an engineer sees, but they say little if noise or a disturbance force dominates the error of every
-    model. Then the spectrum of the residual says more.
-
-    References
-    ----------
-    H. R. Kuensch, Ann. Statist. 17 (1989) 1217, for the block bootstrap. B. Efron and R. Tibshirani, J. Am. Stat. Assoc. 92
-    (1997) 548, for errors on what was not drawn.
-    """
+    """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen."""
+    # Held-out errors are what an engineer sees, but they say little if noise or a disturbance force dominates the error of every
+    # model. Then the spectrum of the residual says more.
+    # H. R. Kuensch, Ann. Statist. 17 (1989) 1217, for the block bootstrap. B. Efron and R. Tibshirani, J. Am. Stat. Assoc. 92
+    # (1997) 548, for errors on what was not drawn.
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     failed = [m for m in models if m not in usable]
     if not usable:
@@ -142,7 +138,7 @@ def _error_of_choice(squares: Blocks, draws: NDArray[np.int64], winners: NDArray
 
 def _evidence_of(
     models: Sequence[FittedModel],
-    errors: NDArray[np.float64],
+    errors: Floats,
     criterion: Callable[[FittedModel], float] | None,
 ) -> list[float | None]:
     """Return the log evidence of each model relative to the most probable one; None if not fitted to convergence."""
@@ -156,13 +152,13 @@ def _evidence_of(
     return [None if value is None else value - most for value in reported]
 
 
-def _tempered(evidence: Sequence[float | None]) -> NDArray[np.float64]:
+def _tempered(evidence: Sequence[float | None]) -> Floats:
     """Return the tempered evidence in units of the largest; models without one have the least of the others."""
     least = min((value for value in evidence if value is not None), default=0.0)
     return np.exp(VERDICT.temper * np.array([least if value is None else value for value in evidence]))
 
 
-def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[np.float64]:
+def _shared(winners: NDArray[np.bool_], prior: Floats) -> Floats:
     """Return the share of each model in each resample's win, shape (n_resamples, n_models)."""
     shares = np.where(winners, prior, 0.0)
     return np.asarray(shares / np.sum(shares, axis=1, keepdims=True))
@@ -180,10 +176,8 @@ def _likened(model: FittedModel, others: Sequence[FittedModel]) -> bool:
 
 
 def _beside_a_new_force(model: FittedModel, others: Sequence[FittedModel]) -> bool:
-    """Return True if a model needs an unknown constant force that another model explains.
-
-    Models whose mean force is not needed have been removed before, see `same_equation`.
-    """
+    """Return True if a model needs an unknown constant force that another model explains."""
+    # Models whose mean force is not needed have been removed before, see `nested_models`.
     return any(
         other.n_free == model.n_free
         and len(other.effects) == len(model.effects)
@@ -198,8 +192,3 @@ def _unidentifiable_sensor_effect(model: FittedModel) -> bool:
     """Return True for a linear effect of the sensor of a rig with one output: it is equivalent to one of the drive."""
     one_output = len(model.fit.structure.rig.outputs) == 1
     return one_output and any(effect.place is Place.SENSOR and is_linear(effect) for effect in model.effects)
-
-
-def noise_vector(outputs: Sequence[str], noise: Mapping[str, float]) -> NDArray[np.float64]:
-    """Return the noise floor of each output in order; infinite for one that was never measured, shape (n_outputs,)."""
-    return np.array([noise.get(name, np.inf) for name in outputs])

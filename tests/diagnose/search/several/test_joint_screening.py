@@ -8,7 +8,7 @@ import numpy as np
 
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.screening import Response
-from rigsight.diagnose.search.several.joint_screening import best_sets
+from rigsight.diagnose.search.together import best_sets
 from rigsight.effects import effect_named
 
 RNG = np.random.default_rng(4)
@@ -72,9 +72,7 @@ def test_starts_that_differ_in_size_only_count_once() -> None:
 
 
 def test_an_effect_with_many_starts_leaves_room_for_others(monkeypatch) -> None:
-    monkeypatch.setattr(
-        "rigsight.diagnose.search.several.joint_screening.SEARCH", replace(SEARCH, joint_beam=3)
-    )
+    monkeypatch.setattr("rigsight.diagnose.search.together.SEARCH", replace(SEARCH, joint_beam=3))
     friction, damping, spring = COLUMNS[:3]
     starts = [friction + 1e-2 * RNG.standard_normal(500) for _ in range(9)]
     responses = [

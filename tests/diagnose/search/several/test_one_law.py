@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.search.several.one_law import is_linear, is_one_law, split_distinguishable
+from rigsight.diagnose.search.evidence_for_more import is_linear, is_one_law, split_distinguishable
 from rigsight.effects import CATALOGUE
 
 SPRINGS = ("bouc_wen_hysteresis", "cubic_stiffness")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.places import search_places
-from rigsight.diagnose.search.several.one_more_effect import with_one_more
+from rigsight.diagnose.search.one_more_effect import with_one_more
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.diagnose.search.worth_fitting import search_places
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales

@@ -8,8 +8,8 @@ from typing import cast
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms
+from rigsight.diagnose.fit_context import FitContext, FittedModel
+from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.effects import effect_named
 from rigsight.rigs import AXIS
 

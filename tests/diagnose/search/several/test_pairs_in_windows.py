@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
+from rigsight.diagnose.search.horizon import pairs_in_windows
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales

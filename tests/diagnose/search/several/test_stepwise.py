@@ -10,16 +10,15 @@ import pytest
 
 from rigsight.campaign import Campaign
 from rigsight.diagnose import diagnose
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.several import stepwise
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.parts import each_once
-from rigsight.diagnose.search.several.stepwise import Stepwise, refit_singles, several_effects
-from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search import stepwise
+from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.one_more_effect import each_once
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
-from rigsight.diagnose.search.single_models import SingleModels
-from rigsight.diagnose.search.worth_fitting import WorthFitting
+from rigsight.diagnose.search.stepwise import Stepwise, refit_singles, several_effects
+from rigsight.diagnose.search.together import Together
+from rigsight.diagnose.search.worth_fitting import SingleModels, WorthFitting
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
 from rigsight.identify import characteristic_scales
@@ -121,7 +120,7 @@ def searching(
     context: FitContext, without: FittedModel, singles: list[FittedModel], effects: list[Effect]
 ) -> Stepwise:
     forms, together = OtherForms(context, lower_bound=False), Together(context, without, effects)
-    return Stepwise(context, singles, effects, forms, together, None)
+    return Stepwise(context, singles, effects, forms, together)
 
 
 @pytest.mark.slow
@@ -196,7 +195,7 @@ def test_a_step_that_closes_less_than_half_ends_the_search(monkeypatch: pytest.M
     monkeypatch.setattr(stepwise, "without_repeated_equations", lambda _, models: models)
     effects = [effect_named(name) for name in two]
     forms = SimpleNamespace(partners=lambda parent, effects: effects)
-    search = Stepwise(None, [single], effects, forms, SimpleNamespace(fitted=fitted), None)
+    search = Stepwise(None, [single], effects, forms, SimpleNamespace(fitted=fitted))
     assert search.found(VERDICT.at_floor, None) == []
     assert asked == [2, 3], "three may explain together what no two do"
 
@@ -223,7 +222,7 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
     alone = scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))
     checks = SimpleNamespace(is_adequate=lambda _: adequate)
     models = single_models(scored((), error_over_noise=40.0), alone, WorthFitting())
-    kept = several_effects(models, lambda _: None, None, checks, adequate is not None, None)
+    kept = several_effects(models, lambda _: None, None, checks, adequate is not None)
     assert kept == (found if competes else [])
 
 
@@ -255,7 +254,7 @@ def test_near_the_floor_a_remainder_that_is_no_noise_asks_for_a_second_effect(
     alone = scored(("periodic_disturbance",), error_over_noise=single, residuals=np.ones(8))
     checks = SimpleNamespace(is_adequate=lambda _: adequate)
     models = single_models(scored((), error_over_noise=15.0), alone, WorthFitting())
-    several_effects(models, lambda _: None, None, checks, lower_bound, None)
+    several_effects(models, lambda _: None, None, checks, lower_bound)
     assert asked == [nothing_remains]
 
 
@@ -263,13 +262,13 @@ def test_a_remainder_too_small_to_part_a_pair_from_a_single_effect_asks_for_none
     single = scored(("iwan_hysteresis",), error_over_noise=1.08, residuals=np.ones(8))
     checks = SimpleNamespace(is_adequate=lambda _: False)
     models = single_models(scored((), error_over_noise=130.0), single, WorthFitting())
-    assert several_effects(models, lambda _: None, None, checks, False, None) == []
+    assert several_effects(models, lambda _: None, None, checks, False) == []
 
 
 def test_a_residual_of_the_size_of_a_law_error_asks_for_no_second_effect(scored) -> None:
     single = scored(("cubic_stiffness",), error_over_noise=1.9, residuals=np.ones(8))
     models = single_models(scored((), error_over_noise=40.0), single, WorthFitting(is_shown=True))
-    assert several_effects(models, lambda _: None, None, None, False, None) == []
+    assert several_effects(models, lambda _: None, None, None, False) == []
 
 
 def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:

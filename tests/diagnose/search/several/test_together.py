@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.search.single_effects import reidentify
+from rigsight.diagnose.search.together import Together
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales

@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import BOOTSTRAP
+from rigsight.diagnose.replicates import FEWEST, SLOWER, Replicates, Sources, likeliest_sources
 from rigsight.diagnose.result import Candidate, Diagnosis, StdMethod
-from rigsight.diagnose.uncertainty.replicates import FEWEST, SLOWER, Replicates, Sources, likeliest_sources
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, OneStep
 from rigsight.records.record import Floats
@@ -144,7 +144,7 @@ def _sources(
         remainder, [excited(i) for i in range(noise.size)], responses, [r.dt for r in records], corners
     )
     found = Sources(found.noise_std * noise, found.force_std, corners)
-    return found.with_forces_times(_set_right(found, whole, step, replicates, rng))
+    return replace(found, force_std=_set_right(found, whole, step, replicates, rng) * found.force_std)
 
 
 def _size_at(

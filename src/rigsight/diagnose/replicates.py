@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.signal.windows import tukey
 
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.pushes.probes import push
 from rigsight.identify import FitResult
 from rigsight.records.record import Floats, Record
@@ -84,10 +84,6 @@ class Sources:
             if np.any(size > 0.0):
                 total += size[:, None] * colored(total.shape, corner * dt, rng)
         return total
-
-    def with_forces_times(self, factor: float) -> Sources:
-        """Return the same with other forces."""
-        return replace(self, force_std=factor * self.force_std)
 
 
 def colored(shape: tuple[int, ...], corner: float, rng: np.random.Generator) -> Floats:

@@ -20,20 +20,17 @@ from functools import partial
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.noise.adequacy import Checks
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.basins import in_lowest_basins
+from rigsight.diagnose.search.by_motion import Ask, NamedByMotion
+from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.first_look import LOOK_ACCURACY, FirstLook
-from rigsight.diagnose.search.same_equation import without_repeated_equations
-from rigsight.diagnose.search.several.by_motion import Ask, NamedByMotion
-from rigsight.diagnose.search.several.evidence_for_more import OtherForms
-from rigsight.diagnose.search.several.one_more_effect import with_one_more
-from rigsight.diagnose.search.several.parts import each_once, part_of, reduced
-from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search.nested_models import in_lowest_basins, without_repeated_equations
+from rigsight.diagnose.search.one_more_effect import each_once, part_of, reduced, with_one_more
 from rigsight.diagnose.search.single_effects import finished, followed, refine
-from rigsight.diagnose.search.single_models import SingleModels
+from rigsight.diagnose.search.together import Together
+from rigsight.diagnose.search.worth_fitting import SingleModels
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over
 
@@ -47,13 +44,11 @@ class Stepwise:
     effects: Sequence[Effect]  # candidates for a further cause
     forms: OtherForms  # how much another form of an effect would explain
     together: Together  # sets of effects that explain the residual of the equations
-    prepare: Prepare | None  # compiles structures that are about to be fitted side by side
 
     def found(self, at_floor: float, checks: Checks | None) -> list[FittedModel]:
-        """Return the models of several effects that compete, and their parts, best first.
-
-        `at_floor` is the error at which nothing remains to explain; a model near it is also asked whether its residual is noise.
-        """
+        """Return the models of several effects that compete, and their parts, best first."""
+        # `at_floor` is the error at which nothing remains to explain; a model near it is also asked whether its residual is
+        # noise.
         before, competing = self.singles[0].error_over_noise, list[FittedModel]()
         parts: list[FittedModel] = []
         for size in range(2, SEARCH.most_effects + 1):
@@ -98,20 +93,16 @@ class Stepwise:
     ) -> list[FittedModel]:
         if len(parent.effects) > 1:
             least = max(VERDICT.larger_part, self.forms.share(parent))
-            return with_one_more(self.context, parent, self.effects, known, self.singles, self.prepare, least)
+            return with_one_more(self.context, parent, self.effects, known, self.singles, least)
         # Pairs fitted from where the screening puts them may have ended in another minimum: others start from a single effect.
         settled = [pair for pair in known if pair.error_over_noise <= VERDICT.exact]
         partners = self.forms.partners(parent, self.effects)
-        return with_one_more(
-            self.context, parent, partners, settled, self.singles, self.prepare, enough=enough
-        )
+        return with_one_more(self.context, parent, partners, settled, self.singles, enough=enough)
 
     def _parents(self) -> list[FittedModel]:
-        """Return the single effects to which a second one is added: the plainest of those near the best, and unlike ones.
-
-        Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as many,
-        the one that the catalogue has first is the plainer.
-        """
+        """Return the single effects to which a second one is added: the plainest of those near the best, and unlike ones."""
+        # Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as
+        # many, the one that the catalogue has first is the plainer.
         nearest = self.singles[0].error_over_noise
         close = [model for model in self.singles if model.error_over_noise <= SEARCH.beam * nearest]
         best = min(close, key=lambda model: (model.n_free, model.error_over_noise))
@@ -127,10 +118,8 @@ class Stepwise:
         return min(tied, key=lambda model: (model.n_free, order.get(model.names[0], len(order))))
 
     def exchanged(self, found: Sequence[FittedModel]) -> list[FittedModel]:
-        """Return the models with those in which another effect stands for one of the best.
-
-        One found beside an incomplete model may only be similar to the right one, or more general than needed.
-        """
+        """Return the models with those in which another effect stands for one of the best."""
+        # One found beside an incomplete model may only be similar to the right one, or more general than needed.
         known = list(found)
         replaced: FittedModel | None = None
         for _ in range(SEARCH.most_swaps):
@@ -146,7 +135,6 @@ class Stepwise:
                     self.effects,
                     known,
                     self.singles,
-                    self.prepare,
                     replaced=(effect, best.fit),
                 )
         return each_once(known)
@@ -195,14 +183,11 @@ def several_effects(
     forms: OtherForms,
     checks: Checks,
     lower_bound: bool,
-    prepare: Prepare | None,
 ) -> list[FittedModel]:
-    """Return models of several effects if a single effect does not explain everything.
-
-    `ask` says what the motion shows of the force that a model leaves.
-    Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
-    bound. Where errors of laws are larger than noise, a residual of the size of the error of one law asks for no second one.
-    """
+    """Return models of several effects if a single effect does not explain everything."""
+    # `ask` says what the motion shows of the force that a model leaves. Above a lower bound of the floor the residual of a single
+    # effect may be noise: the checks decide, and a pair must reach that bound. Where errors of laws are larger than noise, a
+    # residual of the size of the error of one law asks for no second one.
     context, reidentified, worth = models.context, models.reidentified, models.worth
     usable = sorted(
         (model for model in models.singles if model.residuals and np.isfinite(model.error_over_noise)),
@@ -215,7 +200,7 @@ def several_effects(
     if worth.is_shown and best.error_over_noise <= enough:
         return []
     if worth.is_shown and models.proposal is not None:
-        sets = Together(context, reidentified, worth.alone, prepare)
+        sets = Together(context, reidentified, worth.alone)
         closed = larger_part_closed(reidentified)
         named = NamedByMotion(
             context,
@@ -223,7 +208,6 @@ def several_effects(
             models.proposal,
             models.together,
             models.effects,
-            prepare,
             sets,
             ask,
             closed,
@@ -238,8 +222,8 @@ def several_effects(
     # A floor is known to a few percent. Within these, the residual of the best effect is tested for being noise.
     is_near = not lower_bound and VERDICT.exact < best.error_over_noise <= VERDICT.at_floor
     at_floor = VERDICT.exact if is_near and not checks.is_adequate(best) else VERDICT.at_floor
-    together = Together(context, reidentified, models.effects, prepare)
-    search = Stepwise(context, usable, models.effects, forms, together, prepare)
+    together = Together(context, reidentified, models.effects)
+    search = Stepwise(context, usable, models.effects, forms, together)
     found = search.found(at_floor, None if lower_bound else checks)
     return [model for model in found if not is_excused or model.error_over_noise <= VERDICT.at_floor]
 
@@ -250,10 +234,8 @@ def settled(reidentified: FittedModel) -> float:
 
 
 def tied_at_the_floor(reidentified: FittedModel) -> float:
-    """Return the error of a single effect that ties in the ranking with any pair, in units of the noise floor.
-
-    What remains is too small a part of the gap to tell a second cause from a disturbance, and the single effect is plainer.
-    """
+    """Return the error of a single effect that ties in the ranking with any pair, in units of the noise floor."""
+    # What remains is too small a part of the gap to tell a second cause from a disturbance, and the single effect is plainer.
     return 1.0 + VERDICT.inexact * reidentified.error_over_noise
 
 
@@ -280,10 +262,8 @@ def larger_first(models: Sequence[FittedModel], singles: Sequence[FittedModel]) 
 def refit_singles(
     context: FitContext, singles: Sequence[FittedModel], larger: Sequence[FittedModel]
 ) -> list[FittedModel]:
-    """Return the singles, refitted where they are better from their values in a larger model than from their own starts.
-
-    A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
-    """
+    """Return the singles, refitted where they are better from their values in a larger model than from their own starts."""
+    # A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
     better = {model.names: model for model in singles}
     for model in sorted(larger, key=lambda model: model.error_over_noise)[: SEARCH.most_refitted]:
         for effect in model.effects:

@@ -1,24 +1,46 @@
-"""What every candidate is fitted and scored with: records, scales, noise, and which parameters a fit moves."""
+"""What every candidate is fitted and scored with, and how it follows from a campaign: records, scales, noise, free parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.policy import HORIZON
 from rigsight.effects import Effect, Place, placed
 from rigsight.effects import symbols as canonical
-from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads, free_names
+from rigsight.identify import (
+    DEFAULT_ACCURACY,
+    FitMemory,
+    FitResult,
+    GreyBoxFit,
+    IdleThreads,
+    characteristic_scales,
+    free_names,
+    linear_start,
+    swallowed_by_offsets,
+)
 from rigsight.identify.fit.fit_data import Prior
-from rigsight.identify.fit.windows import cut, strongest
-from rigsight.inverse import NumbersBeside
+from rigsight.identify.fit.windows import (
+    Observer,
+    Windowing,
+    cut,
+    followed_sensors,
+    liveliest,
+    strongest,
+    until_rest,
+)
+from rigsight.inverse import NumbersBeside, numbers_along_motion
 from rigsight.records.record import Floats, Record
 from rigsight.records.signals import is_constant
 from rigsight.rigs import Rig, joint_of
-from rigsight.simulate import Structure, compose, special_values
+from rigsight.simulate import Structure, compose, special_values, structure_of_fit
+
+Prepare = Callable[[Sequence[Structure]], None]
+"""Called with the structures that are about to be simulated, to compile them side by side."""
 
 _ROUGH_ACCURACY = 1e-3
 _FINE_TOLERANCE = 1e-7
@@ -79,6 +101,7 @@ class FitContext:
     # Effects already in the given simulation; every candidate is added to them.
     modelled: tuple[Effect, ...] = ()
     memory: FitMemory | None = None  # where the outcomes of fits are kept
+    compiler: Prepare | None = None  # compiles side by side what is about to be fitted
     threads: IdleThreads = field(default_factory=IdleThreads)  # threads that help with the records of a fit
     # Where simulations track the sensors and the motion shows the forces: fits must hold along the motion, too.
     along_motion: NumbersBeside | None = None
@@ -89,11 +112,15 @@ class FitContext:
         """All records, each once."""
         return self.estimation if self.scoring == self.estimation else (*self.estimation, *self.scoring)
 
+    def prepare(self, structures: Iterable[Structure]) -> None:
+        """Compile structures side by side that are about to be fitted."""
+        if self.compiler is not None:
+            self.compiler([structure_of_fit(s, (*self.estimation, *self.scoring)) for s in structures])
+
     @cached_property
-    def driven(self) -> tuple[Record, ...]:
-        """The records to fit in which an input moves; in the others the rig moves freely."""
-        names = [signal.name for signal in self.rig.inputs]
-        return tuple(r for r in self.estimation if any(not is_constant(r[name]) for name in names))
+    def floors(self) -> Floats:
+        """Noise floor of each output of the rig in order; infinite for one that was never measured, shape (n_outputs,)."""
+        return np.array([self.noise.get(signal.name, np.inf) for signal in self.rig.outputs])
 
     @property
     def period(self) -> float:
@@ -124,17 +151,14 @@ class FitContext:
         self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY
     ) -> GreyBoxFit:
         """Return the fit of a structure to records, with the bench's scales and noise."""
-        prior = self._along_motion(structure)
+        prior = None
+        if self.along_motion is not None:
+            # A force that the numbers leave along the measured motion costs what it causes in a simulation.
+            found = self.along_motion.beside([e for e in structure.effects if e not in self.modelled])
+            prior = Prior(found.names, found.values, self.error_of_force**2 * found.curvature)
         return GreyBoxFit(
             structure, records, self.scales, self.noise, accuracy, self.memory, self.threads, prior
         )
-
-    def _along_motion(self, structure: Structure) -> Prior | None:
-        """Return what the measured motion says of the numbers: the force that they leave costs what it causes in a simulation."""
-        if self.along_motion is None:
-            return None
-        found = self.along_motion.beside([e for e in structure.effects if e not in self.modelled])
-        return Prior(found.names, found.values, self.error_of_force**2 * found.curvature)
 
     def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
         """Return the equations of the given simulation with effects added."""
@@ -305,3 +329,69 @@ def _places(rig: Rig, effect: Effect) -> tuple[str, ...]:
         return places
     motions = {joint.name: joint.motion for joint in rig.mechanism.joints}
     return tuple({motions[place]: place for place in reversed(places)}.values())[::-1]
+
+
+def fit_context_of(
+    campaign: Campaign,
+    noise: Mapping[str, float],
+    windowing: Windowing,
+    memory: FitMemory | None,
+    threads: IdleThreads,
+    start: Mapping[str, float],
+    compiler: Prepare | None = None,
+) -> FitContext:
+    """Return the context in which candidates of a campaign are fitted and scored."""
+    fitted = windowing.cut(campaign.estimation)
+    held = frozenset(_set_aside(campaign))
+    if campaign.rig.has_one_motion and not all(
+        any(symbol.name in record for record in campaign.estimation) for symbol in campaign.rig.downstream
+    ):
+        held |= campaign.rig.downstream_parameters  # these records do not determine them
+    asked = [p.name for p in campaign.rig.parameters if p.name not in held]
+    scales = characteristic_scales(campaign.rig, campaign.estimation, start)
+    held |= frozenset(
+        swallowed_by_offsets(compose(campaign.rig), campaign.estimation, scales, noise, start, asked)
+    )
+    return FitContext(
+        rig=campaign.rig,
+        estimation=fitted,
+        look=liveliest(until_rest(fitted, campaign.rig), campaign.rig, HORIZON.examined),
+        scoring=windowing.cut(campaign.validation or campaign.estimation),
+        scales=scales,
+        noise=noise,
+        held=held,
+        start=start,
+        given=campaign.given,
+        modelled=campaign.modelled,
+        memory=memory,
+        compiler=compiler,
+        threads=threads,
+    )
+
+
+def structures_to_fit(campaign: Campaign, structures: Iterable[Structure]) -> list[Structure]:
+    """Return structures as they are simulated in fits to the records of a campaign: with free offsets and with an observer."""
+    sensors = followed_sensors(campaign.rig, campaign.records) if campaign.drifts else ()
+    records = Observer(sensors, bandwidth=0.0).following(campaign.records)
+    return [structure_of_fit(structure, records) for structure in structures]
+
+
+def start_values_of(campaign: Campaign) -> dict[str, float]:
+    """Return values of all constants and parameters before any fit."""
+    held = _set_aside(campaign)
+    rig, given = campaign.rig, {**campaign.constants, **campaign.given, **held}
+    along = None
+    if not rig.has_one_motion and all(p.name in given for p in rig.parameters):
+        along = numbers_along_motion(campaign, given)
+    regressed = along or linear_start(rig, campaign.estimation, campaign.constants, held)
+    # Numbers fitted without the effects that the simulation has are farther off than those it came with.
+    sure = campaign.given if campaign.modelled or rig.mechanism.bodies_are_nonlinear else {}
+    return {**campaign.constants, **regressed, **sure}
+
+
+def _set_aside(campaign: Campaign) -> dict[str, float]:
+    """Return the values of an absent spring and of one number of a factor that is open."""
+    held = {} if campaign.absent_spring is None else {campaign.absent_spring: 0.0}
+    if campaign.open_factor is not None:
+        held[campaign.open_factor.held] = campaign.open_factor.value
+    return held

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.diagnose import verdict_notes as notes
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.verdict import verdict_notes as notes
 from rigsight.effects import effect_named
 from rigsight.identify.fit.windows import Windowing
 from rigsight.records import Record

@@ -1,26 +1,81 @@
-"""Which effects, added to a model, explain its residual? Every effect gets a first fit; the promising ones are fitted carefully.
+"""Models beside a model: with one effect more, with causes that the motion names, or with a part of its effects alone.
 
-The first fit is tried in both orders: from the model with the new effect added, and from the new effect alone with those of the
-model added. Otherwise the effect found first could hide a strong effect with memory.
+Every further effect gets a first fit; the promising ones are fitted carefully. The first fit is tried in both orders: from the
+model with the new effect added, and from the new effect alone with those of the model added. Otherwise the effect found first
+could hide a strong effect with memory.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from types import MappingProxyType
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
-from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.screening import structures_of_shortlist
 from rigsight.diagnose.search.single_effects import followed
+from rigsight.diagnose.search.starts import start_values, with_own_values
+from rigsight.diagnose.search.worth_fitting import search_places
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
+from rigsight.inverse import Proposal, ProposedCause
+from rigsight.simulate import Structure, carried_over
+
+
+def reduced(
+    context: FitContext, model: FittedModel, kept: tuple[Effect, ...]
+) -> tuple[Structure, dict[str, float]]:
+    """Return the equations with the effects that are kept, and the values that a model gives them."""
+    structure = context.simplest(kept, model.fit.structure)
+    return structure, {
+        **carried_over(model.fit.values, model.fit.structure, structure),
+        **dict(structure.fixed),
+    }
+
+
+def part_of(context: FitContext, model: FittedModel, kept: tuple[Effect, ...]) -> FittedModel:
+    """Return a model with only the effects that are kept, fitted from the values that it gives them."""
+    structure, values = reduced(context, model, kept)
+    return fitted_from(context, model, kept, structure, values)
+
+
+def fitted_from(
+    context: FitContext,
+    model: FittedModel,
+    effects: tuple[Effect, ...],
+    structure: Structure,
+    values: dict[str, float],
+) -> FittedModel:
+    """Return equations with effects, fitted from given values and from the initial states of a model."""
+    start, free = replace(model.fit, values=values), tuple(context.free_parameters(structure))
+    look = FirstLook(effects, structure, free, (start,), float("inf"))
+    return followed(context, look, promising=True, finish=False)
+
+
+def with_causes(
+    context: FitContext, model: FittedModel, causes: Sequence[ProposedCause], found: Proposal
+) -> FittedModel:
+    """Return a model with further causes, fitted from the values that the motion gives them and the equations."""
+    numbers = {name: value for name, value in found.numbers.items() if name in model.fit.free}
+    effects, fit = model.effects, replace(model.fit, values={**model.fit.values, **numbers})
+    for cause in causes:
+        effects = (*effects, cause.effect)
+        structure = context.simplest(effects, fit.structure)
+        declared = next(start_values(context, structure, cause.effect, fit, {}))
+        values = {**declared, **with_own_values(structure, cause.effect, fit, cause.values)}
+        fit = replace(fit, values=values, structure=structure)
+    return fitted_from(context, model, effects, fit.structure, dict(fit.values))
+
+
+def each_once(models: Sequence[FittedModel]) -> list[FittedModel]:
+    """Return of the models with the same effects the best, best first."""
+    found: dict[frozenset[str], FittedModel] = {}
+    for model in sorted(models, key=lambda model: model.error_over_noise):
+        found.setdefault(frozenset(model.names), model)
+    return list(found.values())
 
 
 def with_one_more(
@@ -29,43 +84,38 @@ def with_one_more(
     effects: Sequence[Effect],
     known: Sequence[FittedModel],
     singles: Sequence[FittedModel],
-    prepare: Prepare | None = None,
     least_share: float = 0.0,
     enough: float = float("inf"),
     replaced: tuple[Effect, FitResult] | None = None,
 ) -> list[FittedModel]:
-    """Return a model with each effect added that lowers its cost clearly, fitted and scored.
-
-    `replaced` is an effect that was left out of the model, with the fit in which it was: its simpler and more general forms are
-    fitted whatever the screening says, the general ones from there.
-    """
+    """Return a model with each effect added that lowers its cost clearly, fitted and scored."""
+    # `replaced` is an effect that was left out of the model, with the fit in which it was: its simpler and more general forms are
+    # fitted whatever the screening says, the general ones from there.
     context = context.looking_at_residual(parent.fit)
+    known_sets = {frozenset(model.names) for model in known}
     open_ones = [
         effect
         for effect in context.offered(effects)
-        if effect not in parent.effects and not is_among(known, {*parent.names, effect.name})
+        if effect not in parent.effects and frozenset((*parent.names, effect.name)) not in known_sets
     ]
-    if prepare is not None:
-        prepare(structures_of_shortlist(context.rig, open_ones, (*context.modelled, *parent.effects)))
+    context.prepare(structures_of_shortlist(context.rig, open_ones, (*context.modelled, *parent.effects)))
     search = search_places(context, parent, open_ones)
     if search.most < least_share * _above_noise(parent.fit) / parent.fit.cost:
         # The screening says nothing about effects that no push represents, such as periodic ones.
         unscreened = [effect for effect in search.effects if effect.name not in search.shares]
-        return _fitted_beside(context, parent, unscreened, search.starts, singles, prepare)
-    forms = [] if replaced is None else [e for e in search.others if _is_form_of(e, replaced[0])]
-    parents = {} if replaced is None else {replaced[0].name: replaced[1]}
+        return _fitted_beside(context, parent, unscreened, search.starts, singles)
+    forms, parents = list[Effect](), dict[str, FitResult]()
+    if replaced is not None:
+        other, fit = replaced
+        forms = [e for e in search.others if other.name in e.parents or e.name in other.parents]
+        parents = {other.name: fit}
     chosen = [*search.effects, *forms]
-    found = _fitted_beside(context, parent, chosen, search.starts, singles, prepare, parents)
+    found = _fitted_beside(context, parent, chosen, search.starts, singles, parents)
     movable = [effect for effect in search.others if _has_a_shape(effect)]
     if movable and min((model.error_over_noise for model in found), default=float("inf")) > enough:
         # A push cannot move from its start: a resonance far from it explains little until it is fitted.
-        found += _fitted_beside(context, parent, movable, search.starts, singles, prepare)
+        found += _fitted_beside(context, parent, movable, search.starts, singles)
     return found
-
-
-def is_among(models: Sequence[FittedModel], names: AbstractSet[str]) -> bool:
-    """Return True if one of the models has just these effects."""
-    return any(set(model.names) == names for model in models)
 
 
 def _fitted_beside(
@@ -74,13 +124,10 @@ def _fitted_beside(
     effects: Sequence[Effect],
     starts: Mapping[str, Mapping[str, float]],
     singles: Sequence[FittedModel],
-    prepare: Prepare | None,
     parents: Mapping[str, FitResult] = MappingProxyType({}),
 ) -> list[FittedModel]:
     base = parent.fit
-    if prepare is not None:
-        prepare([context.simplest((*parent.effects, effect), base.structure) for effect in effects])
-
+    context.prepare(context.simplest((*parent.effects, effect), base.structure) for effect in effects)
     alone = {model.names[0]: model.fit for model in singles}
 
     def steps(effect: Effect) -> tuple[int, ...]:
@@ -124,10 +171,6 @@ def _fitted_beside(
         return followed(context, found, promising=True, finish=False)
 
     return list(context.threads.side_by_side(follow, promising[: SEARCH.most_followed]))
-
-
-def _is_form_of(one: Effect, other: Effect) -> bool:
-    return other.name in one.parents or one.name in other.parents
 
 
 def _above_noise(fit: FitResult) -> float:

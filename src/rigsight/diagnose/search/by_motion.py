@@ -14,13 +14,11 @@ from functools import partial
 
 import numpy as np
 
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
-from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.fit_context import FitContext, FittedModel
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.several.one_more_effect import with_one_more
-from rigsight.diagnose.search.several.parts import each_once, part_of, reduced, with_causes
-from rigsight.diagnose.search.several.together import Together
+from rigsight.diagnose.search.one_more_effect import each_once, part_of, reduced, with_causes, with_one_more
 from rigsight.diagnose.search.single_effects import finished, refine
+from rigsight.diagnose.search.together import Together
 from rigsight.effects import Effect, Family
 from rigsight.inverse import Proposal, ProposedCause, ProposedForm
 
@@ -40,7 +38,6 @@ class NamedByMotion:
     proposal: Proposal  # the families that the motion names
     named: FittedModel | None  # all causes that it names, fitted together
     effects: Sequence[Effect]  # candidates for a further cause
-    prepare: Prepare | None  # compiles structures that are about to be fitted side by side
     together: Together  # sets of the effects that may be the main cause
     ask: Ask  # what the motion says of the force that a fitted model leaves
     enough: float  # error up to which a simulation follows the motion, in units of the noise floor
@@ -102,9 +99,7 @@ class NamedByMotion:
             follows = model.error_over_noise <= self.enough
             beside = self.ask(model) if follows else None
             further = unjudged if beside is not None or not follows else self.effects
-            larger_ones = with_one_more(
-                self.context, model, further, [], self.singles, self.prepare, VERDICT.larger_part
-            )
+            larger_ones = with_one_more(self.context, model, further, [], self.singles, VERDICT.larger_part)
             if beside is not None and (new := self._new(beside, model)):
                 larger_ones.append(with_causes(self.context, model, new, beside))
             best = min(larger_ones, key=_error, default=model)
@@ -136,11 +131,9 @@ class NamedByMotion:
         return list(self.context.threads.side_by_side(partial(part_of, self.context, model), kept))
 
     def _other_forms(self, model: FittedModel, replaced: Effect, part: FittedModel) -> list[FittedModel]:
-        """Return a model with other effects of the family of one at its place; the part is the model without it.
-
-        Those that the motion judges start from there; one that leaves far more of the missing force than the best form is no
-        candidate.
-        """
+        """Return a model with other effects of the family of one at its place; the part is the model without it."""
+        # Those that the motion judges start from there; one that leaves far more of the missing force than the best form is no
+        # candidate.
         key = self._key(replaced)
         if not part.residuals:
             return []
@@ -163,9 +156,7 @@ class NamedByMotion:
         found = [with_causes(self.context, beside, [cause], as_fitted) for cause in causes]
         if forms and model.error_over_noise > self.settled:
             of_model = (replaced, model.fit)
-            found += with_one_more(
-                self.context, part, forms, [], self.singles, self.prepare, replaced=of_model
-            )
+            found += with_one_more(self.context, part, forms, [], self.singles, replaced=of_model)
         return found
 
 

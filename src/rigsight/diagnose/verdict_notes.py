@@ -8,18 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.data_quality.finding import DataQuality
-from rigsight.diagnose.fitting.fit_context import FitContext, FittedModel
+from rigsight.diagnose.examination import Examination
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.predictability import growth_of_disturbances
-from rigsight.diagnose.verdict.judgement import Judgement
+from rigsight.diagnose.search.horizon import growth_of_disturbances
 from rigsight.identify.closed_loop import closed_loop_notes
-from rigsight.identify.fit.windows import Windowing
 
 _REFERENCE_USED = (
     "It is used as instrument when the frequency responses of two amplitudes are compared, if the input responds to it in both; "
@@ -27,31 +23,12 @@ _REFERENCE_USED = (
 )
 
 
-class _Found(Protocol):
-    """What a rule may read of an `Examination`; a further field of it is named here once a rule needs it."""
-
-    @property
-    def context(self) -> FitContext: ...
-    @property
-    def windowing(self) -> Windowing: ...
-    @property
-    def reidentified(self) -> FittedModel: ...
-    @property
-    def judgement(self) -> Judgement: ...
-    @property
-    def quality(self) -> DataQuality: ...
-    @property
-    def imitations(self) -> Sequence[FittedModel]: ...
-    @property
-    def doubts(self) -> Sequence[str]: ...
-
-
 @dataclass(frozen=True)
 class Basis:
     """What the notes are based on."""
 
     campaign: Campaign  # records and the given simulation
-    found: _Found  # what the examination found
+    found: Examination  # what the examination found
     rng: np.random.Generator  # for rules that simulate disturbances
     # The error of a model, in units of the noise floor measured at rest, that refuted this floor; None where
     # none did.

@@ -1,1 +1,0 @@
-"""Set-up of all fits: which records, over which stretch, with which parameters free."""
