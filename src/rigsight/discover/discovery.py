@@ -54,7 +54,8 @@ def discover(
         )
     say = progress or (lambda _: None)
     estimation, held_out, how = split(data)
-    values = _linear_values(data, estimation)
+    # Parameters of effects that are modelled are as they were given.
+    values = {**data.campaign.given, **_linear_values(data, estimation)}
     rig = data.rig.motion_alone() if data.rig.has_one_motion else data.rig
     modelled = data.campaign.modelled
     offered = [e for e in offered_terms(rig, own_effects) if e.name not in {m.name for m in modelled}]

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.campaign import Campaign
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fit_context import FitContext
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.diagnose.search.starts import start_values
 from rigsight.identify import FitResult
