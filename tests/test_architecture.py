@@ -19,7 +19,6 @@ MODULES = sorted(module for package in PACKAGES for module in package.rglob("*.p
 LONGEST_FILE = 600
 NAME_A_RIG = {
     "workflow/campaign/in_memory.py": "the records of the ten lines of the README come from a virtual axis",
-    "discover/hysteresis.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
     "identify/transfer/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
     "rigs/__init__.py": "the built-in rigs",

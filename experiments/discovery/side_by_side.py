@@ -27,6 +27,7 @@ with warnings.catch_warnings():
 from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.diagnose import run_diagnose
 from rigsight.workflow.discover import run_discover
 
 warnings.filterwarnings("ignore", module="pysindy")
@@ -155,49 +156,56 @@ def scored(terms: dict[str, float], held_out: Record, output: str, sizes: Sizes,
 
 
 def plain(estimation: list[Record], held_out: Record, output: str, sizes: Sizes) -> None:
+    """Print the best of all thresholds and derivatives of each library."""
     for library in ("polynomial", "custom"):
+        best, passed = (RUNAWAY, "", ""), 0.0
         for way, make in derivatives().items():
             started = time.process_time()
             found = [(t, fitted(estimation, output, sizes, make, library, t)) for t in THRESHOLDS]
-            passed = time.process_time() - started
-            different = {tuple(terms.items()): (t, terms) for t, terms in found if terms}
-            errors = [
-                (scored(terms, held_out, output, sizes, False), t, terms) for t, terms in different.values()
-            ]
-            if not errors:
-                print(f"| pysindy, {library}, {way} | - | no term | - | {passed:.1f} s |", flush=True)
-                continue
-            _, threshold, terms = min(errors, key=lambda e: e[0])
-            best = scored(terms, held_out, output, sizes, True)
-            shown = f"{100.0 * best:.3g} %" if best < RUNAWAY / 10 else "runs away"
-            text = ", ".join(name.replace("*", "·").replace("··", "^") for name in terms)
-            print(
-                f"| pysindy, {library}, {way} | {threshold:.2g} | {len(terms)}: {text} | {shown} | {passed:.1f} s |",
-                flush=True,
-            )
+            passed += time.process_time() - started
+            different = {tuple(terms.items()): terms for _, terms in found if terms}
+            for terms in different.values():
+                error = scored(terms, held_out, output, sizes, False)
+                text = ", ".join(name.replace("*", "·").replace("··", "^") for name in terms)
+                if error < best[0]:
+                    best = scored(terms, held_out, output, sizes, True), way, f"{len(terms)}: {text}"
+        shown = f"{100.0 * best[0]:.3g} %" if best[0] < RUNAWAY / 10 else "runs away"
+        print(
+            f"| pysindy, {library}, {best[1]} | {best[2] or 'no term'} | {shown} | {passed:.1f} s |",
+            flush=True,
+        )
 
 
 def main(folders: list[str]) -> None:
     for folder in folders:
         campaign = read_campaign(folder)
-        output = campaign.rig.outputs[0].name
-        estimation, held_out = list(campaign.estimation), campaign.validation[0]
+        rig = campaign.rig
+        print(f"\n{campaign.title}\n\n| way | terms | held-out NRMSE | processor time |")
+        print("|---|---|---|---|", flush=True)
+        started = time.process_time()
+        found = run_discover(folder, n_jobs=1)
+        passed = time.process_time() - started
+        terms = ", ".join(f"{term.name} {term.where}".strip() for term in found.kept) or "no term"
+        error = f"{100.0 * found.held_out_nrmse:.3g} % ({found.held_out_error:.3g} floors)"
+        print(f"| rigsight discover | rig's own, {terms} | {error} | {passed:.0f} s |", flush=True)
+        started = time.process_time()
+        diagnosis = run_diagnose(folder, n_jobs=1)
+        passed = time.process_time() - started
+        named = ", ".join(effect.name for effect in diagnosis.effects) or diagnosis.verdict
+        gap = math.sqrt(np.mean([100.0**2 * own.after**2 for own in diagnosis.gap.values()]))
+        print(f"| rigsight diagnose | {named} ({diagnosis.probability:.2f}) | {gap:.3g} % | {passed:.0f} s |")
+        print(f"| (noise floor) | | {100.0 * found.noise_floor:.3g} % | |", flush=True)
+        if not (rig.has_one_motion and rig.is_driven):
+            continue
+        source, output = rig.inputs[0].name, rig.outputs[0].name
+        named_u = [r if source == "u" else r.with_signals(u=r[source]) for r in campaign.records]
+        estimation = [record for record in named_u if record.role == "estimation"]
+        held_out = next(record for record in named_u if record.role == "validation")
         measured = np.concatenate([record[output] for record in estimation])
         rates = np.concatenate([np.gradient(record[output], record.dt) for record in estimation])
         inputs = np.concatenate([record["u"] for record in estimation])
         size = float(np.std(measured))
         sizes = Sizes(size, float(np.std(inputs)), size / float(np.std(rates)), float(np.mean(measured)))
-        print(f"\n{campaign.title}\n\n| way | threshold | terms of x'' | held-out NRMSE | processor time |")
-        print("|---|---|---|---|---|", flush=True)
-        started = time.process_time()
-        found = run_discover(folder, n_jobs=1)
-        passed = time.process_time() - started
-        terms = ", ".join(term.name for term in found.kept)
-        print(
-            f"| rigsight discover | | rig's own, {terms} | {100.0 * found.held_out_nrmse:.3g} % | {passed:.0f} s |",
-            flush=True,
-        )
-        print(f"| (noise floor) | | | {100.0 * found.noise_floor:.3g} % | |", flush=True)
         plain(estimation, held_out, output, sizes)
 
 

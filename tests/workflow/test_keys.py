@@ -57,9 +57,9 @@ def test_every_key_of_a_campaign_is_in_the_table() -> None:
 def _quick() -> Any:
     """Few draws, one offered term: whether a key is used does not depend on them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rigsight.discover.regression.N_ENSEMBLE", 2)
+        patch.setattr("rigsight.discover.stability._N_ENSEMBLE", 2)
         patch.setattr(
-            "rigsight.discover.one_motion.offered_effects", lambda *_: [effect_named("cubic_stiffness")]
+            "rigsight.discover.discovery.offered_terms", lambda *_: [effect_named("cubic_stiffness")]
         )
         yield
 

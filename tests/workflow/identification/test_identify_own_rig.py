@@ -9,13 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep
-from rigsight.records.record import Record
 from rigsight.rigs import RIGS, read_rig_file, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.workflow.campaign.in_memory import make_campaign
-from rigsight.workflow.discover import regression_data
 from rigsight.workflow.identification import rig as identified_rig
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import checked_options, identify_campaign, run_identify, write_identification
@@ -142,26 +139,12 @@ def test_the_name_of_a_rig_changes_nothing() -> None:
     found = {}
     for rig in (axis, stage):
         campaign = make_campaign(rig, [record], title="same")
-        regression_data(campaign)
         found[rig.name] = identify_campaign(campaign, checked_options("local_rational", None))
     own = {name: identification_json(one, {}) for name, one in found.items()}
     assert own["axis"]["records"][0]["paths"][0]["fit"] is not None
     for content in own.values():
         content.pop("rig")
     assert json.dumps(own["axis"]) == json.dumps(own["stage"])
-
-
-def test_a_rig_of_one_motion_in_other_words_is_refused_where_words_count() -> None:
-    words = (
-        rig_file_text("axis")
-        .replace('name = "axis"', 'name = "stage"')
-        .replace("[parameters.d]", "[parameters.damper]")
-    )
-    stage = rig_of_text(words.replace('damping = "d"', 'damping = "damper"'))
-    t = np.linspace(0.0, 1.0, 50)
-    record = Record("one", 0.02, {"u": np.sin(t), "x": np.cos(t)}, {"u": "N", "x": "m"})
-    with pytest.raises(InputError, match="your rig 'stage': for rigs of one motion it supports only axis"):
-        regression_data(make_campaign(stage, [record]))
 
 
 def test_poles_are_those_of_the_place_that_the_records_show(
