@@ -191,7 +191,7 @@ def main(folders: list[str]) -> None:
         started = time.process_time()
         diagnosis = run_diagnose(folder, n_jobs=1)
         passed = time.process_time() - started
-        named = ", ".join(effect.name for effect in diagnosis.effects) or diagnosis.verdict
+        named = ", ".join(diagnosis.effects) or diagnosis.verdict
         gap = math.sqrt(np.mean([100.0**2 * own.after**2 for own in diagnosis.gap.values()]))
         print(f"| rigsight diagnose | {named} ({diagnosis.probability:.2f}) | {gap:.3g} % | {passed:.0f} s |")
         print(f"| (noise floor) | | {100.0 * found.noise_floor:.3g} % | |", flush=True)

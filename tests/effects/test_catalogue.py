@@ -146,3 +146,13 @@ def test_an_encoder_of_speed_has_no_error_over_position() -> None:
     car, eccentric = RIGS["quarter_car"], effect_named("encoder_eccentricity")
     assert car.offers(placed(eccentric, "travel"))
     assert not car.offers(placed(eccentric, "body"))
+
+
+@pytest.mark.parametrize(
+    ("name", "holds"),
+    [("directional_friction", True), ("directional_damping", False), ("asymmetric_stiffness", False)],
+)
+def test_only_the_mean_of_a_force_of_the_direction_alone_is_that_of_a_constant_force(
+    name: str, holds: bool
+) -> None:
+    assert effect_named(name).holds_constant_force is holds

@@ -108,6 +108,24 @@ def test_a_wrong_spring_between_two_masses_is_fitted_and_no_cause() -> None:
     assert found.numbers["k_s"] == pytest.approx(TRAIN["k_s"], rel=0.02)
 
 
+def test_a_size_that_no_fit_reaches_is_not_proposed() -> None:
+    # Of a motion of millimeters a pendulum of some 6000 times the stiffness imitates a cubic spring.
+    hidden = [effect_named("cubic_stiffness"), effect_named("quadratic_damping")]
+    values = {**AXIS_VALUES, "k_3": 4e5, "c_2": 12.0}
+    found = proposed(campaign(AXIS, values, hidden, (1.0, 2.0)))
+    assert {cause.effect.name for cause in found.taken} == {"cubic_stiffness", "quadratic_damping"}
+    assert "gravity_pendulum" in found.judged
+    assert "gravity_pendulum" not in found.starts
+
+
+@pytest.mark.parametrize("size", [2.0, -2.0])
+def test_damping_that_depends_on_the_direction_pushes_either_way(size: float) -> None:
+    hidden = effect_named("directional_damping")
+    found = proposed(campaign(AXIS, {**AXIS_VALUES, "d_a": size, "v_k": 1.0}, [hidden], (10.0, 20.0)))
+    assert found.taken[0].effect.name == "directional_damping"
+    assert found.taken[0].values["d_a"] == pytest.approx(size, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("effect", "values", "number"),
     [

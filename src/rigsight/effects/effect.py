@@ -292,11 +292,16 @@ class Effect:
         """True for a reading whose time base stands off, either way: what is recorded, not what a control law reads."""
         return self.reading_delay is not None and any(p.lower < 0.0 for p in self.parameters)
 
-    @property
+    @cached_property
     def holds_constant_force(self) -> bool:
-        """True for a force whose mean depends on the direction: no record distinguishes this mean from a constant force."""
-        lopsided = self.torque is not None and self.signature.even_harmonics
-        return lopsided and not (self.reads(symbols.x) or self.reads(symbols.position))
+        """True for a force that depends on the direction alone: no record distinguishes its mean from a constant force.
+
+        The mean of one that grows with the speed differs from motion to motion.
+        """
+        if self.torque is None or not self.signature.even_harmonics:
+            return False
+        depends_on_x = self.reads(symbols.x) or self.reads(symbols.position)
+        return not depends_on_x and symbols.derivative(self.torque, symbols.v) == 0
 
     @cached_property
     def linear_parameters(self) -> tuple[Parameter, ...]:

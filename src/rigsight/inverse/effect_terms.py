@@ -256,7 +256,8 @@ def _of_joint(
         except RigsightError:
             return
         if all(np.all(np.isfinite(column)) for column in columns):
-            yield Term(effect, inner, tuple(p.name for p in linear), tuple(units), columns, one_sided)
+            names, most = tuple(p.name for p in linear), tuple(max(map(abs, p.search)) for p in linear)
+            yield Term(effect, inner, names, tuple(units), columns, one_sided, most)
 
 
 def is_late(effect: Effect) -> bool:

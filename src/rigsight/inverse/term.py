@@ -30,14 +30,19 @@ class Term:
     # Of each record, filtered and thinned, shape (n_parts, n_equations, n_rows) each.
     columns: tuple[Floats, ...]
     one_sided: tuple[bool, ...]  # whether a coefficient cannot be negative
+    most: tuple[
+        float, ...
+    ] = ()  # size of each coefficient that fits reach at most; empty where they have no such limit
     is_given: bool = False  # whether the column is a force, not that of a unit of a number
     is_sized: bool = False  # whether the column is a force whose coefficient must come out near one
 
     def allows(self, coefficients: Floats) -> bool:
-        """Return whether coefficients, shape (n_parts,), have the sign and order that the effect needs."""
+        """Return whether coefficients, shape (n_parts,), have the sign, size and order that the effect needs."""
         if self.is_sized and not np.all((coefficients > 1.0 / _SIZED) & (coefficients < _SIZED)):
             return False
         if any(sided and own < 0.0 for sided, own in zip(self.one_sided, coefficients, strict=True)):
+            return False
+        if any(abs(own) > most for most, own in zip(self.most, coefficients, strict=False)):
             return False
         numbers = {
             name: own * unit for name, own, unit in zip(self.names, coefficients, self.units, strict=False)
