@@ -89,12 +89,12 @@ unit = "N"
 [parameters]
 m_1 = { unit = "kg", lower = 1e-3, log = true, default = 1.0 }
 m_2 = { unit = "kg", lower = 1e-3, log = true, default = 1.0 }
-k_1 = { unit = "N/m", lower = 0.0, log = true, default = 800.0 }
-d_1 = { unit = "N s/m", lower = 0.0, log = true, default = 1.0 }
-k_2 = { unit = "N/m", lower = 0.0, log = true, default = 600.0 }
-d_2 = { unit = "N s/m", lower = 0.0, log = true, default = 1.0 }
-k_12 = { unit = "N/m", lower = 0.0, log = true, default = 600.0 }
-d_12 = { unit = "N s/m", lower = 0.0, log = true, default = 1.0 }
+k_1 = { unit = "N/m", lower = 1e-3, log = true, default = 800.0 }
+d_1 = { unit = "N s/m", lower = 1e-3, log = true, default = 1.0 }
+k_2 = { unit = "N/m", lower = 1e-3, log = true, default = 600.0 }
+d_2 = { unit = "N s/m", lower = 1e-3, log = true, default = 1.0 }
+k_12 = { unit = "N/m", lower = 1e-3, log = true, default = 600.0 }
+d_12 = { unit = "N s/m", lower = 1e-3, log = true, default = 1.0 }
 [coordinates]
 q_1 = { unit = "m" }
 q_2 = { unit = "m" }

@@ -43,7 +43,7 @@ RUNS = (
     Run("power", "Smallest effects", "power", "power", "power.json",
         "How small may an effect be and still be named by these records?"),
     Run("discovery", "Equation", "discover", "discovery", "discovery.svg",
-        "Which equation do the records give by sparse regression, without naming an effect?", takes_own_effects=False),
+        "Which equation do the records give by sparse regression, without naming an effect?"),
 )  # fmt: skip
 
 
