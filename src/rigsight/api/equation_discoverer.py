@@ -108,7 +108,7 @@ class DiscoveryResult(Result, Discovery):
         return discovery_html(self)
 
     def plot(self) -> Figure:
-        """Draw the terms with their inclusion probabilities, the coefficients, and the free run on the records.
+        """Draw the terms with the error without each, the coefficients, the free run on the records, and the missing forces.
 
         Returns
         -------

@@ -39,7 +39,7 @@ def result_page(site: Site, step: Run) -> None:
             ui.link("Begin one: the rig", "/rig").classes("next")
             return
         options = [typed_option(site, step.key, name, label) for name, label in step.fields]
-        if step.takes_own_effects and (own := own_effects_option(site, step.key)):
+        if own := own_effects_option(site, step.key):
             options.append(own)
 
         def arguments() -> tuple[str, ...]:

@@ -28,7 +28,6 @@ class Run:
     out: str
     page: str  # of its results, to be shown; what the command prints is shown where a browser cannot show it
     words: str  # what it does
-    takes_own_effects: bool = True
     fields: tuple[tuple[str, str], ...] = ()  # options to be typed, each with what is asked for
 
 

@@ -313,11 +313,13 @@ def _terms(found: Found) -> tuple[Term, ...]:
         own = {name: coefficients[name] for name in names if name in coefficients}
         terms.append(_term(found, effect, own))
     there = set(structure.effect_names)
-    tried = {name for trial in found.selection.trials for name in trial.support}
-    others = {*inclusion, *tried} - there
-    for name in sorted(others, key=lambda n: (found.selection.otherwise(n), -inclusion.get(n, 0.0), n)):
-        terms.append(_term(found, found.bench.effects[name]))
-    return tuple(terms)
+    fitted = {name for trial in found.selection.trials for name in trial.support}
+    others = {*inclusion, *fitted} - there
+    offered = [_term(found, found.bench.effects[name]) for name in sorted(others)]
+    tried = [term for term in offered if math.isfinite(term.otherwise)]
+    rest = [term for term in offered if term not in tried]
+    terms += sorted(tried, key=lambda term: term.otherwise)
+    return (*terms, *sorted(rest, key=lambda term: -(term.inclusion or 0.0)))
 
 
 def _term(found: Found, effect: Effect, own: Mapping[str, Coefficient] | None = None) -> Term:
