@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigsight.effects import Effect
+from rigsight.effects import Effect, placed_dimension
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, free_names
 from rigsight.records.record import Floats, Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over, compose, unique_names
+from rigsight.units import characteristic_value
 
 Support = frozenset[str]
 Release = frozenset[tuple[str, str]]
@@ -158,6 +159,16 @@ class Bench:
             for p in effect.linear_parameters:
                 if p.null is not None:
                     values.setdefault(structure.parameter_name(effect, p.name), p.null)
+        return values
+
+    def declared(self, structure: Structure) -> dict[str, float]:
+        """Return the first start that each parameter of the effects of a structure declares."""
+        values = {}
+        for effect in structure.effects:
+            for p in effect.parameters:
+                size = characteristic_value(placed_dimension(effect, p.dimension), self.scales)
+                start = p.starts[0] * size if p.fitted and p.starts else p.held_at(size)
+                values[structure.parameter_name(effect, p.name)] = start
         return values
 
     def scored(self, support: Support, fit: FitResult) -> Trial:

@@ -18,6 +18,7 @@ from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
 from rigsight.discover.stability import information_criterion
 from rigsight.errors import SimulationError
 from rigsight.records.record import Floats
+from rigsight.simulate import carried_over
 
 STRONG = 10.0
 """Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
@@ -139,11 +140,14 @@ class _Search:
         """Return the attempts with one term more than an equation."""
         if self.along is not None:
             return [self.attempt(proposed, trial) for proposed in self.along.beside(trial.fit)]
-        supports = [trial.support | {name} for name in self.bench.effects if name not in trial.support]
-        return [
-            Attempt(support, [self.bench.carried(trial.fit, self.bench.structure(support))])
-            for support in supports
-        ]
+        found = []
+        for name in self.bench.effects:
+            if name not in trial.support:
+                structure = self.bench.structure(trial.support | {name})
+                known = carried_over(trial.fit.all_values, trial.fit.structure, structure)
+                start = {**self.bench.values, **self.bench.declared(structure), **known}
+                found.append(Attempt(trial.support | {name}, [start]))
+        return found
 
     def attempt(self, proposed: Proposed, shorter: Trial) -> Attempt:
         """Return an attempt that starts from the regression, and from the fit of a shorter equation.
