@@ -23,7 +23,8 @@ POWER_LAW = effect_named("power_law_stiffness")
 @pytest.fixture
 def bench() -> Bench:
     """Return a bench of two terms, both with an exponent n."""
-    return Bench(AXIS, (), (), {}, {}, {}, frozenset(), {effect.name: effect for effect in (LOOP, POWER_LAW)})
+    scales = dict.fromkeys(("x", "time", "force", "drive"), 1.0)
+    return Bench(AXIS, (), (), {}, scales, {}, frozenset(), {e.name: e for e in (LOOP, POWER_LAW)})
 
 
 @pytest.mark.parametrize("support", [{LOOP.name}, {LOOP.name, POWER_LAW.name}])
