@@ -135,7 +135,7 @@ class JointForce:
         if not self.terms:
             return f"No term acts at {self.joint}. What the equation leaves there: {size}, RMS."
         law = " and ".join(name.replace("_", " ") for name in self.terms)
-        return f"Of the {size} (RMS) missing at {self.joint}, {law} explains {self.share_of_force:.0%}."
+        return f"{self.share_of_force:.0%} of the square of what is missing at {self.joint} ({size}, RMS) is {law}."
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry of a file."""

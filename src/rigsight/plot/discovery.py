@@ -15,6 +15,7 @@ from rigsight.plot.drawing import (
     WITH_EFFECT,
     line,
     new_figure,
+    plain_log_ticks,
     shown_in,
     style,
 )
@@ -81,16 +82,20 @@ def _draw_terms(ax: Axes, terms: Sequence[Term], error: float) -> None:
     names = [_spoken(f"{term.name} at {term.where}" if term.where else term.name) for term in terms]
     for place, term in enumerate(terms):
         word, color = ("without", WITH_EFFECT) if term.kept else ("with", OTHER)
+        where = (max(term.otherwise, error), place)
         ax.plot([error, term.otherwise], [place, place], color=color, linewidth=2.0)
         ax.plot(term.otherwise, place, "o", color=color, markersize=4)
-        ax.text(
-            1.1 * max(term.otherwise, error), place, f"{word} {term.otherwise:.3g}", va="center", fontsize=8
+        ax.annotate(
+            f"{word} {term.otherwise:.3g}", where, (5, 0), textcoords="offset points", va="center", fontsize=8
         )
     ax.axvline(error, color=MEASURED, linewidth=0.8, linestyle=":")
     ax.set_yticks(range(len(names)), names)
     ax.set_ylim(max(len(names), 1) - 0.4, -0.6)
+    left, largest = 0.8 * error, max([error, *(term.otherwise for term in terms)])
+    right = largest * (largest / left) ** 0.35
     ax.set_xscale("log")
-    ax.set_xlim(0.8 * error, 4.0 * max([error, *(term.otherwise for term in terms)]))
+    ax.set_xlim(left, right)
+    plain_log_ticks(ax, left, right)
     ax.set_xlabel("held-out error [noise floors]")
     ax.set_title("Terms: error without it, or with it" if names else "No term beside the rig's own")
 
@@ -125,7 +130,7 @@ def _draw_coefficients(ax: Axes, numbers: list[tuple[str, float]]) -> None:
     ax.set_ylim(len(numbers) - 0.4, -0.6)
     ax.set_xlim(-100 * reach, 100 * reach)
     ax.set_xlabel("95 % interval [% of the value]")
-    ax.set_title("Coefficients after the free-run fit")
+    ax.set_title("Coefficients")
 
 
 def _draw_run(upper: Axes, lower: Axes, run: Run) -> None:

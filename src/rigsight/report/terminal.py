@@ -176,7 +176,7 @@ def _term(term: Term) -> str:
     numbers = [
         f"{name} = {estimate_text(Estimate(c.value, c.std, c.unit))}" for name, c in term.coefficients.items()
     ]
-    family = [term.family] if term.family else []
+    family = [term.family.replace("_", " ")] if term.family else []
     without = [f"without it {term.otherwise:.3g} x floor"] if math.isfinite(term.otherwise) else []
     selected = [] if term.inclusion is None else [f"selected in {100 * term.inclusion:.0f} % of the draws"]
     return f"{'; '.join(numbers)} ({'; '.join([*family, *without, *selected])})"
