@@ -169,7 +169,8 @@ def _still_missing(stages: Found) -> list[str]:
         else "An effect is still missing, or disturbances are larger than the noise floor."
     )
     return [
-        f"The equations leave {error:.1f} times the noise floor in free run on the held-out records. {outside}"
+        f"The equations leave {error:.1f} times the noise floor in free run on the held-out records. {outside} Standard errors "
+        "count what scatters, not what is missing: they are too small here."
     ]
 
 

@@ -109,7 +109,7 @@ def select(
         shorter = [best.support - {name} for name in sorted(best.support)]
         longer: list[Attempt] = []
         if number < _ROUNDS and len(best.support) < _MOST_TERMS and not any(map(at_floor, pool)):
-            for trial in _to_extend(bench, pool, best):
+            for trial in _to_extend(bench, pool, best) if along is not None else [best]:
                 longer += search.longer(trial)
         pool += search.tried(longer)
         pool += bench.shortened(shorter, best) + search.tried(search.special_cases(best))
