@@ -61,6 +61,8 @@ def test_the_whole_catalogue_gives_json_without_numbers_that_json_lacks(both_way
     content = json.loads(json.dumps(found.to_json(), allow_nan=False))
     judged = [entry["effect"] for entry in content["effects"]["judged"]]
     assert "flexible_mode" in content["effects"]["not_judged"]
+    # The control is no motion that anyone is advised to make.
+    assert "the same motion" not in {entry["motion"] for entry in content["effects"]["other_motions"]}
     assert [len(row) for row in content["effects"]["told_apart"]] == [len(judged)] * len(judged)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -112,3 +113,15 @@ def test_further_laws_are_found_at_their_joints(
     for term in found.kept:
         for name, coefficient in term.coefficients.items():
             assert abs(coefficient.value - values[name]) < Z_MAX * coefficient.std, name
+
+
+def test_where_a_sensor_is_missing_every_term_is_tried_by_a_fit(drive_train: Rig) -> None:
+    data = campaign(drive_train, {**TRAIN, "k_t": 0.05, "c_2": DAMPING})
+    hidden = tuple(
+        replace(record, signals={name: record[name] for name in ("u", "load_angle")})
+        for record in data.records
+    )
+    found = discover(DiscoveryData(replace(data.campaign, records=hidden), data.noise))
+    assert [(term.name, term.where) for term in found.kept] == [("quadratic_damping", "motor_bearing")]
+    assert found.joints == ()
+    assert found.kept[0].inclusion is None
