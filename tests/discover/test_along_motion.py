@@ -16,6 +16,7 @@ from rigsight.discover.terms import offered_terms
 from rigsight.effects import Effect, kind_of, placed
 from rigsight.effects.effect import Energy, GainTrend, Place, Signature
 from rigsight.effects.symbols import x
+from rigsight.errors import SimulationError
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.parameters import Parameter
 from rigsight.records import Record
@@ -150,3 +151,41 @@ def test_a_rig_of_the_user_with_one_motion_is_discovered(tmp_path: Path) -> None
     found = discover(data)
     assert [term.name for term in found.kept] == ["quadratic_damping"]
     assert found.held_out_error < 1.1
+
+
+def test_the_law_of_a_free_motion_is_found_and_no_delay_of_its_reading(tmp_path: Path) -> None:
+    path = tmp_path / "free.toml"
+    driven = ("inputs.u =", "drives.motor =")
+    path.write_text("\n".join(line for line in PENDULUM.splitlines() if not line.startswith(driven)), "utf-8")
+    rig, values = read_rig_file(path), {"I": 0.02, "s": 0.08, "d": 2e-3, "c_2": 2e-3}
+    structure, rng = compose(rig, [known_terms()["quadratic_damping"]]), np.random.default_rng(0)
+    records = []
+    for begin, role in ((1.0, "estimation"), (0.6, "estimation"), (0.8, "validation")):
+        still = Record(f"from {begin}", DT, {"angle": np.zeros(T.size)}, {"angle": "rad"}, role=role)
+        run = simulate(structure, values, still, np.array([begin, 0.0]))
+        records.append(run.with_signals(angle=run["angle"] + rng.normal(scale=1e-4, size=T.size)))
+    # Only the ratio to the inertia is known: it is held as it was given.
+    data = DiscoveryData(Campaign("free", rig, {}, {"I": 0.02}, tuple(records)), {"angle": 1e-4})
+    found = discover(data)
+    assert [term.name for term in found.kept] == ["quadratic_damping"]
+    assert found.kept[0].coefficients["c_2"].value == pytest.approx(2e-3, rel=0.02)
+    assert found.held_out_error < 1.1
+
+
+def test_a_rig_that_leaves_every_free_run_is_refused() -> None:
+    # A mass on a spring that pushes away, held by a loop that no simulation has.
+    values = {**AXIS_VALUES, "k": -40.0}
+    rng, records = np.random.default_rng(0), []
+    for number, role in enumerate(("estimation", "validation")):
+        position, speed = np.zeros(T.size), 0.0
+        goal, inputs = 5e-3 * np.sin(6.0 * T + number), np.zeros(T.size)
+        for i in range(T.size - 1):
+            inputs[i] = 900.0 * (goal[i] - position[i]) - 20.0 * speed
+            force = inputs[i] - values["d"] * speed - values["k"] * position[i]
+            speed += DT * force / values["m"]
+            position[i + 1] = position[i] + DT * speed
+        reading = position + rng.normal(scale=1e-5, size=T.size)
+        records.append(Record(f"held {number}", DT, {"u": inputs, "x": reading}, {}, role=role))
+    data = DiscoveryData(Campaign("held", AXIS, {"gain": 1.0}, {}, tuple(records)), {"x": 1e-5})
+    with pytest.raises(SimulationError, match="unstable without its controller"):
+        discover(data)

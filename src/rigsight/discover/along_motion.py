@@ -6,8 +6,9 @@ equations leave, beside the numbers of the rig and the terms that an equation ha
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -122,7 +123,7 @@ class AlongMotion:
         there = {effect.name for effect in fit.structure.effects}
         before = self._left(chosen, ())
         families: dict[tuple[Family, str], list[tuple[float, int]]] = {}
-        for left, i in self._best_of_each(chosen, there):
+        for left, i in self._best_of_each(chosen, self._names - there):
             effect = chosen.selection.terms[i].effect
             families.setdefault((effect.family, self._rig.where(effect)), []).append((left, i))
         found = []
@@ -137,8 +138,8 @@ class AlongMotion:
     def instead(self, fit: FitResult, left_out: Effect, other: Effect) -> Proposed | None:
         """Return an equation with another effect in place of one of its own; None where it cannot be a term."""
         chosen = self._of_equation(fit, left_out)
-        best = [i for _, i in self._best_of_each(chosen, set()) if chosen.selection.terms[i].effect == other]
-        return self._proposed(chosen, best[0]) if best else None
+        best = self._best_of_each(chosen, {other.name})
+        return self._proposed(chosen, best[0][1]) if best else None
 
     def inclusion(self, fit: FitResult, rng: np.random.Generator) -> dict[str, float]:
         """Return how often sparse regression selects each term of an equation, and the best others that are not its rivals."""
@@ -156,7 +157,7 @@ class AlongMotion:
             return np.asarray(mixed / max(float(np.linalg.norm(mixed)), np.finfo(np.float64).tiny))
 
         columns = {i: column(i) for i in chosen.terms}
-        for _, i in self._best_of_each(chosen, there):
+        for _, i in self._best_of_each(chosen, self._names - there):
             if len(columns) >= max(_COMPETING, len(chosen.terms)):
                 break
             further = column(i)
@@ -203,14 +204,18 @@ class AlongMotion:
         first = len(self._selection.terms)
         return _Chosen(self._selection.with_terms(terms), tuple(range(first, first + len(terms))))
 
-    def _best_of_each(self, chosen: _Chosen, there: set[str]) -> list[tuple[float, int]]:
-        """Return the best term of every further effect beside chosen ones with what it leaves, the best effect first."""
-        selection = chosen.selection
-        asked = [i for i in range(len(self._selection.terms)) if selection.terms[i].effect.name not in there]
+    @cached_property
+    def _names(self) -> frozenset[str]:
+        """Names of the effects that are terms."""
+        return frozenset(term.effect.name for term in self._selection.terms)
+
+    def _best_of_each(self, chosen: _Chosen, names: Collection[str]) -> list[tuple[float, int]]:
+        """Return the best term of each named effect beside chosen ones with what it leaves, the best effect first."""
         best: dict[str, tuple[float, int]] = {}
-        for i in asked:
-            if selection.allows(i, chosen.columns):
-                name, found = selection.terms[i].effect.name, (self._left(chosen, selection.places[i]), i)
+        for i, term in enumerate(self._selection.terms):
+            name = term.effect.name
+            if name in names and chosen.selection.allows(i, chosen.columns):
+                found = (self._left(chosen, chosen.selection.places[i]), i)
                 best[name] = min(best.get(name, found), found)
         return sorted(best.values())
 
@@ -239,9 +244,7 @@ class AlongMotion:
         effect = selection.terms[best].effect
         if not any(state.limit is not None for state in effect.states):
             return found
-        own = [
-            i for i, term in enumerate(selection.terms[: len(self._selection.terms)]) if term.effect is effect
-        ]
+        own = [i for i, term in enumerate(self._selection.terms) if term.effect is effect]
         allowed = [i for i in own if selection.allows(i, chosen.columns)]
         for i in sorted(allowed, key=lambda i: self._left(chosen, selection.places[i])):
             inner = selection.terms[i].inner

@@ -70,8 +70,8 @@ def _rounded(equation: ShownEquation) -> ShownEquation:
 
 _ZERO = 3.0
 _VAGUE = 0.05
-_FLOOR = 1.5
-"""Held-out error in noise floors above which an effect is still missing."""
+BY_NOISE = 1.5
+"""Held-out error in noise floors up to which it may be noise; above, an effect is still missing."""
 _NOISY = 0.1
 """Noise floor, relative to the motion, from which it may mask terms."""
 _MOST_NAMED = 3
@@ -160,7 +160,7 @@ def warnings_of(data: DiscoveryData, stages: Found, terms: Sequence[Term], floor
 def _still_missing(stages: Found) -> list[str]:
     """Return a warning about an error that the noise does not explain; empty if it does."""
     error = stages.judged.error_over_noise
-    if error <= _FLOOR:
+    if error <= BY_NOISE:
         return []
     outside = (
         "No further term lowers it: what is missing is outside the library, or disturbances are larger than the noise floor. The "

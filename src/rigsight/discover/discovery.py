@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.discover.along_motion import AlongMotion
-from rigsight.discover.assembly import Found, assembled
+from rigsight.discover.assembly import BY_NOISE, Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.records import DiscoveryData, split
 from rigsight.discover.result import Discovery
@@ -26,6 +26,7 @@ from rigsight.identify import (
     swallowed_by_offsets,
     without_offsets,
 )
+from rigsight.metrics import rms
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, special_values
@@ -89,12 +90,30 @@ def discover(
         judged = bench.scored(chosen.support, judged.fit)
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
+    _check_predicts(judged, bench)
     say("polished")
     inclusion = {} if along is None else along.inclusion(final, np.random.default_rng(seed))
     say("ensembles")
     return assembled(
         data, Found(estimation, held_out, how, bench, selection, judged, final, along, inclusion, held)
     )
+
+
+def _check_predicts(judged: Trial, bench: Bench) -> None:
+    """Refuse equations that say less of the held-out records than their means do, for another reason than noise."""
+    apart = [
+        (record[name] - np.mean(record[name])) / floor
+        for record in bench.held_out
+        for name, floor in bench.noise.items()
+        if name in record
+    ]
+    of_means, error = rms(np.concatenate(apart)), judged.error_over_noise
+    if error > max(of_means, BY_NOISE):
+        raise SimulationError(
+            f"In free run the best equation of {bench.rig.name} leaves {error:.3g} times the noise floor on the held-out records; "
+            f"their means alone leave {of_means:.3g}. A rig that is unstable without its controller leaves every free run. Use "
+            "'rigsight diagnose', whose fits follow the sensors of such a rig."
+        )
 
 
 def _along(

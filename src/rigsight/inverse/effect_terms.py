@@ -27,6 +27,7 @@ from rigsight.inverse.parameter_grid import LEAST_SHARE, POINTS, beside, grid_of
 from rigsight.inverse.sensor_terms import influence, late_reading, of_sensor
 from rigsight.inverse.term import Term, compiled
 from rigsight.records import Record
+from rigsight.records.signals import is_constant
 from rigsight.rigs import evaluated
 from rigsight.rigs.rig import joint_of
 
@@ -86,6 +87,8 @@ class EffectTerms:
         """
         if effect.place is Place.SENSOR and self._is_redundant:
             return
+        if is_late(effect) and self._is_free:
+            return  # A free motion that is read later is another one of the same equations.
         if is_late(effect):
             yield from self._of_late(effect, self._lengths(effect))
         else:
@@ -205,6 +208,13 @@ class EffectTerms:
     def _is_redundant(self) -> bool:
         n = self.fit.motions[0].equations.n_coordinates
         return n > 0 and any(len(motion.sensors) > n for motion in self.fit.motions)
+
+    @cached_property
+    def _is_free(self) -> bool:
+        """Whether one coordinate moves and nothing drives it."""
+        inputs = [signal.name for signal in self.fit.rig.inputs]
+        still = all(is_constant(m.record[name]) for m in self.fit.motions for name in inputs)
+        return still and self.fit.motions[0].equations.n_coordinates == 1
 
     @cached_property
     def _by_motion(self) -> list[Floats]:

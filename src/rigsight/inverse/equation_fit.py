@@ -212,7 +212,7 @@ class EquationFit:
         narrow = high <= low
         high = np.where(narrow, low + _APART * np.maximum(1.0, np.abs(low)), high)
         change = lsq_linear(
-            np.concatenate([r, held]), -np.r_[q.T @ target, np.zeros(len(held))], (low, high)
+            np.concatenate([r, held]), -np.r_[q.T @ target, np.zeros(len(held))], (low, high), method="bvls"
         ).x
         moved = np.clip(changed(now, change / size, is_gain), *np.array(self.bounds).T)
         return {**values, **dict(zip(self.free, map(float, moved), strict=True))}

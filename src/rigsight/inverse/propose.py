@@ -198,6 +198,8 @@ def _fitted(campaign: Campaign, known: Mapping[str, float]) -> tuple[EquationFit
     held |= {campaign.absent_spring} if campaign.absent_spring else set()
     motions = record_motions(rig, campaign.estimation, start)
     held |= undriven_inertias(motions, start)
+    # Of a motion that nothing drives, equations without any force would hold best.
+    held |= {campaign.open_factor.held} if campaign.open_factor else set()
     free = identifiable(rig, motions, campaign.modelled, start, held)
     values, _ = EquationFit(rig, motions, campaign.modelled, free, start).settled(start)
     return EquationFit(rig, motions, campaign.modelled, free, values), values
