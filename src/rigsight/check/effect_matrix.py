@@ -25,8 +25,6 @@ Visible = Literal["yes", "at some sizes", "no"]
 _VISIBLE: Mapping[bool | None, Visible] = {True: "yes", None: "at some sizes", False: "no"}
 _OTHER = 3.0
 """Factor of the amplitude and of the speed of other motions."""
-_SAME = "the same motion"
-"""As it was measured: a control for the others."""
 _LONGEST = 1500
 """Samples of each other motion."""
 
@@ -131,12 +129,8 @@ def _told_by_other_motions(
     place = {names.index(effect.name): k for k, effect in enumerate(pushes.effects)}
     along = {what: pushes.along([k]) for k, (what, _) in enumerate(others)}
     along["all of these"] = pushes.along(range(len(others)))
-    # What differs along the same motion, only simulated, differs by the simulation and not by the motion.
-    same = along.pop(_SAME, None)
     found: dict[tuple[int, int], str] = {}
     for i, j in (pair for pair in pairs if place.keys() >= set(pair)):
-        if same is not None and same.are_apart(place[i], place[j]):
-            continue
         by = next((what for what, own in along.items() if own.are_apart(place[i], place[j])), None)
         if by is not None:
             found[i, j] = by
@@ -161,7 +155,6 @@ def _other_motions(
     # Where an input has one sign only, three times its amplitude reverses it as well.
     has_one_sign = any(float(np.min(record[n]) * np.max(record[n])) >= 0.0 for n in inputs)
     asked = ({"a motion in both directions": both_ways} if has_one_sign else {}) | {
-        _SAME: record,
         "a larger amplitude": record.with_signals(**scaled(_OTHER)),
         "a smaller amplitude": record.with_signals(**scaled(1.0 / _OTHER)),
         "a faster motion": replace(record, dt=record.dt / _OTHER),

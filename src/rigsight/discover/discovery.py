@@ -110,9 +110,9 @@ def _check_predicts(judged: Trial, bench: Bench) -> None:
     of_means, error = rms(np.concatenate(apart)), judged.error_over_noise
     if error > max(of_means, BY_NOISE):
         raise SimulationError(
-            f"In free run the best equation of {bench.rig.name} leaves {error:.3g} times the noise floor on the held-out records; "
-            f"their means alone leave {of_means:.3g}. A rig that is unstable without its controller leaves every free run. Use "
-            "'rigsight diagnose', whose fits follow the sensors of such a rig."
+            f"In free run the best equation of {bench.rig.name} leaves {error:.3g} times the noise floor on the held-out "
+            f"records; their means alone leave {of_means:.3g}. A rig that is unstable without its controller leaves every free "
+            "run. Use 'rigsight diagnose', whose fits follow the sensors of such a rig."
         )
 
 

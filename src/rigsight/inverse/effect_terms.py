@@ -193,8 +193,13 @@ class EffectTerms:
         if key not in self._of_lateness:
             along = zip(self.fit.motions, self._by_motion, strict=True)
             of_place = late_reading if effect.place is Place.SENSOR else late_drive
+            rows = [of_place(key[0], late, motion, by, self.values) for motion, by in along]
+            # At its ends a motion that is ahead is not known, and its derivatives even less.
             self._of_lateness[key] = self._thinned(
-                [of_place(key[0], late, motion, by, self.values) for motion, by in along]
+                [
+                    None if own is None else own * motion.known_ahead(late)
+                    for own, motion in zip(rows, self.fit.motions, strict=True)
+                ]
             )
         return self._of_lateness[key]
 

@@ -231,8 +231,21 @@ class RecordMotion:
         return self._inside(self.filtered(rows))
 
     def _inside(self, rows: Floats) -> Floats:
-        n_end = min(max(1, int(_END / self.band)), rows.shape[-1] // 10)
+        n_end = self._n_end
         return rows[..., n_end : rows.shape[-1] - n_end]
+
+    @property
+    def _n_end(self) -> int:
+        return min(max(1, int(_END / self.band)), self.record.n_samples // 10)
+
+    def known_ahead(self, time: float) -> Floats:
+        """Return 1 at the samples at which the motion so much later is inside of the record, else 0, shape (n_samples,).
+
+        What is ahead is filtered twice, as motion and as a row, so that the end that this spoils is twice as long.
+        """
+        later, n = np.arange(self.record.n_samples) + time / self.record.dt, self.record.n_samples
+        inside = later < n - 2 * self._n_end if time > 0.0 else later >= 2 * self._n_end
+        return np.asarray(inside, dtype=np.float64)
 
     @cached_property
     def row_weights(self) -> Floats:
