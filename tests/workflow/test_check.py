@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from .slider import SLIDER
+
 Run = Callable[..., tuple[int, str, str]]
 
 
@@ -31,40 +33,8 @@ def test_every_record_that_cannot_be_read_is_reported(axis_campaign: Path, tmp_p
     assert not (tmp_path / "out").exists()
 
 
-RIG = """
-name = "slider"
-summary = "A mass on a spring."
-[inputs.force]
-unit = "N"
-[parameters.m]
-unit = "kg"
-default = 2.0
-[parameters.k]
-unit = "N/m"
-default = 800.0
-[parameters.d]
-unit = "N s/m"
-default = 5.0
-[coordinates.x]
-unit = "m"
-[energy]
-kinetic = "m*d(x)^2/2"
-[joints.guide]
-motion = "x"
-stiffness = "k"
-damping = "d"
-[drives.motor]
-signal = "force"
-force = "motor"
-along = "x"
-[sensors.position]
-reads = "x"
-unit = "m"
-"""
-
-
 def test_a_rig_file_is_checked_before_there_are_records(tmp_path: Path, run: Run) -> None:
-    (tmp_path / "slider.toml").write_text(RIG)
+    (tmp_path / "slider.toml").write_text(SLIDER)
     code, stdout, stderr = run("check", tmp_path / "slider.toml", "-o", tmp_path / "out", "--json")
     assert code == 0, stderr
     found = json.loads(stdout)
@@ -75,7 +45,7 @@ def test_a_rig_file_is_checked_before_there_are_records(tmp_path: Path, run: Run
 
 
 def test_a_rig_file_without_numbers_is_refused(tmp_path: Path, run: Run) -> None:
-    (tmp_path / "slider.toml").write_text(RIG.replace("default = 800.0", ""))
+    (tmp_path / "slider.toml").write_text(SLIDER.replace("default = 800.0", ""))
     code, _, stderr = run("check", tmp_path / "slider.toml", "-o", tmp_path / "out")
     assert code == 2
     assert "slider.toml" in stderr

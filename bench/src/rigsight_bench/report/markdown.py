@@ -7,6 +7,7 @@ from typing import Any
 
 from rigsight_bench.report import conditions, views
 from rigsight_bench.report.confusion import confusion, rows_of_several
+from rigsight_bench.report.wrong_trials import wrong_rows
 
 _MOST_WRONG = 100
 """Wrong trials that the text lists; ``blind.json`` has all."""
@@ -114,7 +115,7 @@ def _confusion_rows(content: Mapping[str, Any]) -> list[list[str]]:
 def _wrong(content: Mapping[str, Any]) -> str:
     if not content["wrong"]:
         return "None."
-    rows = views.wrong_rows(content, _MOST_WRONG)
+    rows = wrong_rows(content, _MOST_WRONG)
     table = _table(
         ["Trial", "Hidden", "Named", "Gap", "Stated", "On the truth", "Withheld error", "Remark"],
         [

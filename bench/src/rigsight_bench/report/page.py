@@ -10,6 +10,7 @@ from rigsight.report.render import environment
 from rigsight_bench.report import conditions, views
 from rigsight_bench.report.confusion import confusion, rows_of_several
 from rigsight_bench.report.figures import held_out_figure, reliability_figure
+from rigsight_bench.report.wrong_trials import wrong_rows
 
 _MOST_WRONG = 500
 """Wrong trials that a page lists; ``blind.json`` has all."""
@@ -51,7 +52,7 @@ def render_blind(content: Mapping[str, Any]) -> str:
         parameters=views.parameter_rows(content),
         group_heads=views.GROUP_HEADS,
         groups=views.group_views(content),
-        wrong=views.wrong_rows(content, _MOST_WRONG),
+        wrong=wrong_rows(content, _MOST_WRONG),
         n_wrong=len(content["wrong"]),
         scored_by=views.own_versions(content),
         command=content["command"],

@@ -21,11 +21,9 @@ from rigsight_bench.report.views import (
     FAMILY_HEADS,
     bench_text,
     family_rows,
-    hidden_text,
-    named_text,
     number,
-    trial_text,
 )
+from rigsight_bench.report.wrong_trials import hidden_text, named_text, trial_text
 
 _MOST_WRONG = 15
 
