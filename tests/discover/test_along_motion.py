@@ -174,13 +174,13 @@ def test_the_law_of_a_free_motion_is_found_and_no_delay_of_its_reading(tmp_path:
 
 def test_a_rig_that_leaves_every_free_run_is_refused() -> None:
     # A mass on a spring that pushes away, held by a loop that no simulation has.
-    values = {**AXIS_VALUES, "k": -40.0}
+    values = {**AXIS_VALUES, "k": -200.0}
     rng, records = np.random.default_rng(0), []
     for number, role in enumerate(("estimation", "validation")):
         position, speed = np.zeros(T.size), 0.0
         goal, inputs = 5e-3 * np.sin(6.0 * T + number), np.zeros(T.size)
         for i in range(T.size - 1):
-            inputs[i] = 900.0 * (goal[i] - position[i]) - 20.0 * speed
+            inputs[i] = 2000.0 * (goal[i] - position[i]) - 40.0 * speed
             force = inputs[i] - values["d"] * speed - values["k"] * position[i]
             speed += DT * force / values["m"]
             position[i + 1] = position[i] + DT * speed

@@ -18,7 +18,7 @@ from rigsight.effects import Effect, Family
 from rigsight.identify import FitResult
 from rigsight.inverse import MissingForce, along_motion, missing_forces, selection_of
 from rigsight.inverse.effect_terms import EffectTerms, is_joint_force
-from rigsight.inverse.equation_fit import EquationFit
+from rigsight.inverse.equation_fit import LAW_ERROR, EquationFit
 from rigsight.inverse.joint_force import effect_force, joint_motion
 from rigsight.inverse.measured_motion import WIDER
 from rigsight.inverse.selection import Selection
@@ -31,8 +31,8 @@ _PLACES, _FORMS = 3, 3
 """Families at places that are tried beside an equation, and forms of each: the fits decide between forms that are alike here."""
 _WORTH = 0.02
 """Share of the residual that a term must remove to be tried, unless it is the best."""
-_NEAR = 0.5
-"""Share of what the best form of a family removes from which another one is tried."""
+_ALIKE = (1.0 - LAW_ERROR) ** 2
+"""Share of the squares that the best form of a family removes from which another one is alike, to what laws err."""
 _STARTS = 3
 """Sizes of sliders from which fits start."""
 _COMPETING = 6
@@ -131,7 +131,7 @@ class AlongMotion:
             removed = before - forms[0][0]
             if rank > 0 and removed < _WORTH * before:
                 break
-            near = [i for left, i in forms if before - left >= _NEAR * removed]
+            near = [i for left, i in forms if before - left >= _ALIKE * removed]
             found += [self._proposed(chosen, i) for i in near[:_FORMS]]
         return found
 
