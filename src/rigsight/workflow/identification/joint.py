@@ -171,8 +171,6 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
             "Only one estimation record was fitted, so its parameters cannot be compared with others. Another kind of record, "
             "such as a step beside a sweep, or another amplitude would test them."
         )
-    if not math.isfinite(fit.probability):
-        return "There is no parameter that every record determines, so the records cannot be compared."
     by_name = {record.name: record for record in fitted}
 
     def errors(is_told: Callable[[float, Floats], bool]) -> list[str]:
@@ -185,11 +183,13 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], fitted: Sequence[Re
         ]
 
     unserved = errors(_is_unserved)
-    if fit.probability >= _DIFFERENT and unserved:
+    if unserved and not fit.probability < _DIFFERENT:
         return (
             "The joint fit is too poor to judge whether one parameter set fits all records: its error is "
             f"{', '.join(unserved[:3])}. Its parameter values are not reliable; check signals for wrong sign, unit or column."
         )
+    if not math.isfinite(fit.probability):
+        return "There is no parameter that every record determines, so the records cannot be compared."
     if fit.probability >= _DIFFERENT:
         agree = f"equally large differences arise by chance with probability {fit.probability:.2g}"
         left = errors(_leaves_motion)
