@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import sympy as sp
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.effects import Place, State
 from rigsight.identify.rig_equations import RigEquations, equations_of
@@ -29,10 +30,12 @@ _BENT = 5
 _SURELY = 3.0
 """Curvature of a path in standard deviations from which it is bent."""
 _MOST_EVALUATIONS = 100
+_DIFFERENCE = float(np.sqrt(np.finfo(float).eps))
+"""Step of a difference, relative to numbers above one."""
 _HUGE = 1e6
 _OF_SIGNALS = (Place.ACTUATOR, Place.CONTROLLER, Place.SENSOR)
 _CONTROL = ("error", "command")
-_known: WeakKeyDictionary[Record, dict[tuple[RigEquations, int | None], Floats]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[Record, dict[tuple[RigEquations, int | None, bytes], Floats]] = WeakKeyDictionary()
 
 
 def first_state(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
@@ -74,15 +77,15 @@ def rig_state(
     equations: RigEquations, record: Record, values: Mapping[str, float], resting: int | None = None
 ) -> Floats:
     """Return the state of a rig without effects that agrees best with the first samples of its sensors."""
-    # States that they do not determine are those of the static equilibrium under the first input.
-    if not equations.shows_all_states(set(record.signals)):
-        return _rig_state(equations, record, values, resting, equations.sensor_names, _PULL)
-    # The state then does not depend on the values, so it is cached for all candidates.
-    moving = [name for name in equations.sensor_names if name not in equations.of_own_states]
+    # States that they do not determine are those of the static equilibrium under the first input. Else the state does not depend
+    # on the numbers. Candidates that start from the same numbers of the rig start from the same state.
+    shown = equations.shows_all_states(set(record.signals))
+    numbers = b"" if shown else equations.parameters(values, record).tobytes()
     known = _known.setdefault(record, {})
-    key = (equations, resting)
+    key = (equations, resting, numbers)
     if key not in known:
-        known[key] = _rig_state(equations, record, values, resting, moving, 0.0)
+        moving = [n for n in equations.sensor_names if not shown or n not in equations.of_own_states]
+        known[key] = _rig_state(equations, record, values, resting, moving, 0.0 if shown else _PULL)
     return known[key].copy()
 
 
@@ -114,20 +117,21 @@ def _rig_state(
     n, still = equations.n_coordinates, resting is not None
 
     def full(moved: Floats) -> Floats:
-        state: Floats = begin + scale * moved
+        state: Floats = begin[:, None] + scale[:, None] * moved
         if still:
             state[n : 2 * n] = 0.0
         return state
 
     def remainder(moved: Floats) -> Floats:
-        z = full(moved)[:, None]
-        level = (equations.readings(z, u, p)[seen, 0] - shown[:, 0]) / sizes[:, 0]
+        z = full(moved)
+        inputs = np.repeat(u, z.shape[1], axis=1)
+        level = (equations.readings(z, inputs, p)[seen] - shown[:, :1]) / sizes[:, :1]
         if still:
             return np.concatenate([level, pull * moved])
-        slope = (equations.reading_slopes(z, u, p)[seen, 0] - shown[:, 1]) / sizes[:, 1]
+        slope = (equations.reading_slopes(z, inputs, p)[seen] - shown[:, 1:]) / sizes[:, 1:]
         return _finite(np.concatenate([level, slope[sloping], pull * moved]))
 
-    return full(least_squares(remainder, np.zeros(begin.size), max_nfev=_MOST_EVALUATIONS).x)
+    return full(_least_squares(remainder, np.zeros(begin.size)).x[:, None])[:, 0]
 
 
 def _of_one_motion(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
@@ -194,16 +198,27 @@ def _equilibrium(equations: RigEquations, declared: Floats, u: Floats, p: Floats
     # Two of three rows are derivatives of inputs.
     steady = np.where((np.arange(u.shape[0]) % 3 > 0)[:, None], 0.0, u)
 
-    def unbalanced(place: Floats) -> Floats:
-        z = resting.copy()
-        z[held] = place
-        return _finite(equations.rates(z[:, None], steady, p)[n:, 0])
+    def unbalanced(places: Floats) -> Floats:
+        z = np.repeat(resting[:, None], places.shape[1], axis=1)
+        z[held] = places
+        return _finite(equations.rates(z, np.repeat(steady, places.shape[1], axis=1), p)[n:])
 
     if np.any(held):
-        found = least_squares(unbalanced, state[held], x_scale="jac", max_nfev=_MOST_EVALUATIONS)
+        found = _least_squares(unbalanced, state[held], x_scale="jac")
         if found.success:
             state[held] = found.x
     return state
+
+
+def _least_squares(of: Callable[[Floats], Floats], start: Floats, **options: Any) -> OptimizeResult:
+    """Return the least squares of a function of columns, whose differences are taken of all columns at once."""
+
+    def slopes(place: Floats) -> Floats:
+        steps = _DIFFERENCE * np.where(place < 0.0, -1.0, 1.0) * np.maximum(1.0, np.abs(place))
+        moved = of(place[:, None] + np.column_stack([np.zeros(place.size), np.diag(steps)]))
+        return np.asarray((moved[:, 1:] - moved[:, :1]) / steps)
+
+    return least_squares(lambda x: of(x[:, None])[:, 0], start, slopes, max_nfev=_MOST_EVALUATIONS, **options)
 
 
 def _finite(values: Floats) -> Floats:
