@@ -233,6 +233,9 @@ def test_a_tone_and_a_spring_law_are_named_together() -> None:
     of = {cause.effect.name: cause for cause in found.taken}
     assert set(of) == {"periodic_disturbance", "cubic_stiffness"}
     assert of["periodic_disturbance"].values["w_p"] == pytest.approx(37.0, rel=5e-3)
+    assert of["periodic_disturbance"].values["T_p"] == pytest.approx(
+        6.0, rel=0.1
+    )  # to the frequency that records resolve
     assert found.explained > 0.9
 
 

@@ -20,6 +20,7 @@ from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.evidence_for_more import beyond_disturbance, split_distinguishable, with_parts
 from rigsight.diagnose.search.fitted_models import AllModels, single_models, with_several_effects
 from rigsight.diagnose.search.horizon import restores, windowing_of
+from rigsight.diagnose.search.one_more_effect import as_along_motion
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate
 from rigsight.diagnose.search.worth_fitting import SuspectedPlace
 from rigsight.diagnose.verdict.families import keys_of, probable_part
@@ -118,9 +119,11 @@ def examine(
         lower_bound,
     )
     if not is_exact(judgement, best, allowed, checks.is_adequate):
+        along = partial(as_along_motion, context, reidentified)
         judgement = by_motion(
-            judgement, campaign.rig, reidentified, ranking, context.floors, models.alone.proposal
+            judgement, campaign.rig, reidentified, ranking, context.floors, models.alone.proposal, along
         )
+        ranking = ranking.with_model(judgement.model)
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
     remainder = checks.of(judgement.model) if judgement.model.residuals else None

@@ -267,6 +267,10 @@ class Selection:
             name: float(number) * unit
             for name, number, unit in zip(term.names, numbers, term.units, strict=False)
         }
+        if term.effect.pulsation is not None:
+            # A sine and a cosine of each record, whose amplitudes are those of one tone.
+            (amplitude,) = term.effect.linear_parameters
+            linear[amplitude.name] = float(np.sqrt(2.0 * np.mean(numbers**2)))
         ratio = term.effect.post_yield_stiffness_ratio
         if ratio is not None:
             linear[ratio] = self._soft_share(

@@ -21,7 +21,7 @@ from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.diagnose.search.worth_fitting import search_places
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
-from rigsight.inverse import Proposal, ProposedCause
+from rigsight.inverse import Proposal, ProposedCause, ProposedStart
 from rigsight.simulate import Structure, carried_over
 
 
@@ -68,6 +68,24 @@ def with_causes(
         values = {**declared, **with_own_values(structure, cause.effect, fit, cause.values)}
         fit = replace(fit, values=values, structure=structure)
     return fitted_from(context, model, effects, fit.structure, dict(fit.values))
+
+
+def as_along_motion(
+    context: FitContext, reidentified: FittedModel, model: FittedModel, start: ProposedStart
+) -> FittedModel:
+    """Return the equations with an effect at the numbers that the motion gives it; a fit moves those of the rig alone."""
+    (effect,), base = model.effects, reidentified.fit
+    structure = context.simplest((effect,), base.structure)
+    declared = next(start_values(context, structure, effect, base, {}))
+    values = {**declared, **with_own_values(structure, effect, base, start.own)}
+    free = context.free_parameters(structure)
+    own = {structure.parameter_name(effect, parameter.name) for parameter in effect.parameters}
+    problem = context.problem(structure, context.estimation)
+    settled = problem.fit(values, [name for name in free if name not in own])
+    # Standard errors of all numbers, where they are.
+    there = problem.fit(settled.values, free, settled.initial_states, max_evaluations=1)
+    message = "the numbers of the effect are those along the measured motion"
+    return context.score((effect,), replace(there, success=settled.success, message=message))
 
 
 def each_once(models: Sequence[FittedModel]) -> list[FittedModel]:

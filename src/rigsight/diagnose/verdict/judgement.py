@@ -18,7 +18,7 @@ from rigsight.diagnose.policy import FAMILIES, VERDICT
 from rigsight.diagnose.verdict.families import keys_of, main_causes
 from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.diagnose.verdict.ranking import Ranking
-from rigsight.inverse import MissingForce, Proposal
+from rigsight.inverse import MissingForce, Proposal, ProposedStart
 from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 
@@ -207,9 +207,11 @@ def by_motion(
     ranking: Ranking,
     noise: Floats,
     proposal: Proposal | None,
+    as_along_motion: Callable[[FittedModel, ProposedStart], FittedModel],
 ) -> Judgement:
     """Return the judgement with the most probable family, where it is another one."""
-    # It is more probable than not, or explains the larger part of the missing force.
+    # It is more probable than not, or explains the larger part of the missing force. Where no fit of a form lowers the error of the
+    # simulation, a probable family is named nevertheless, with its numbers `as_along_motion`.
     if proposal is None:
         return judgement
     shares = [grounds.share for grounds in ranking.grounds]
@@ -222,13 +224,14 @@ def by_motion(
         return judgement
     if judgement.verdict == "effect" and key in keys_of(rig, judgement.model.effects):
         return judgement
-    forms = [
-        model
-        for model in ranking.order
-        if model.residuals
-        and keys_of(rig, model.effects) == (key,)
-        and stands(model, reidentified, ranking.order)
-    ]
+    of_family = [m for m in ranking.order if m.residuals and keys_of(rig, m.effects) == (key,)]
+    standing = [model for model in of_family if stands(model, reidentified, ranking.order)]
+    forms = [m for m in standing if m.error_over_noise <= reidentified.error_over_noise]
+    starts = [(proposal.starts[m.names[0]], m) for m in of_family if m.names[0] in proposal.starts]
+    if not forms and is_probable and starts:
+        start, model = min(starts, key=lambda own: own[0].unexplained)
+        forms = [own for own in [as_along_motion(model, start)] if own.residuals]
+    forms = forms or standing
     if not forms:
         return judgement
     of_rank = {model.names: share for model, share in zip(ranking.order, shares, strict=True)}

@@ -42,6 +42,10 @@ class Ranking:
     # this selection. NaN if a model was selected by other means, or nothing was left out.
     error_of_choice: float = math.nan
 
+    def with_model(self, model: FittedModel) -> Ranking:
+        """Return the ranking with another fit of one of its models."""
+        return replace(self, order=tuple(model if m.names == model.names else m for m in self.order))
+
 
 def rank(
     models: Sequence[FittedModel],
