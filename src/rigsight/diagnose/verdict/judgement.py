@@ -210,8 +210,8 @@ def by_motion(
     as_along_motion: Callable[[FittedModel, ProposedStart], FittedModel],
 ) -> Judgement:
     """Return the judgement with the most probable family, where it is another one."""
-    # It is more probable than not, or explains the larger part of the missing force. Where no fit of a form lowers the error of the
-    # simulation, a probable family is named nevertheless, with its numbers `as_along_motion`.
+    # It is more probable than not, or explains the larger part of the missing force. Where no fit of a form lowers the error of
+    # the simulation, a probable family is named nevertheless, with its numbers `as_along_motion`.
     if proposal is None:
         return judgement
     shares = [grounds.share for grounds in ranking.grounds]
