@@ -31,6 +31,7 @@ from rigsight.diagnose.verdict.judgement import (
     judge,
     main_cause,
     most_remainder,
+    with_unseen,
 )
 from rigsight.diagnose.verdict.plausibility import (
     doubts,
@@ -119,11 +120,9 @@ def examine(
         lower_bound,
     )
     if not is_exact(judgement, best, allowed, checks.is_adequate):
-        along = partial(as_along_motion, context, reidentified)
-        judgement = by_motion(
-            judgement, campaign.rig, reidentified, ranking, context.floors, models.alone.proposal, along
-        )
-        ranking = ranking.with_model(judgement.model)
+        proposal, along = models.alone.proposal, partial(as_along_motion, context, reidentified)
+        ranking = with_unseen(campaign.rig, reidentified, ranking, proposal, along)
+        judgement = by_motion(judgement, campaign.rig, reidentified, ranking, context.floors, proposal)
     quality = with_best_model(quality, context, judgement.model)
     quality = with_offsets_told(quality, context, judgement.model)
     remainder = checks.of(judgement.model) if judgement.model.residuals else None

@@ -55,6 +55,7 @@ class FittedModel:
     # The same numbers on the scoring records, only initial states fitted; without residuals where they cannot be simulated.
     held_out: FitResult
     error_over_noise: float  # RMS of the residuals in units of the noise floor
+    along_motion: bool = False  # whether the numbers of its effect are those along the measured motion, which no simulation sees
 
     @property
     def residuals(self) -> tuple[Floats, ...]:

@@ -85,7 +85,8 @@ def as_along_motion(
     # Standard errors of all numbers, where they are.
     there = problem.fit(settled.values, free, settled.initial_states, max_evaluations=1)
     message = "the numbers of the effect are those along the measured motion"
-    return context.score((effect,), replace(there, success=settled.success, message=message))
+    scored = context.score((effect,), replace(there, success=settled.success, message=message))
+    return replace(scored, along_motion=True)
 
 
 def each_once(models: Sequence[FittedModel]) -> list[FittedModel]:

@@ -210,20 +210,19 @@ def _weighed(
     # A family that leaves the share r of a squared error is 1/r^n times as probable as one that explains nothing: n is half the
     # number of independent pieces of evidence that law errors leave in records. Simulation and motion are asked, and the share of
     # the ranking, which also knows which parameters are plausible; it counts as far as the best simulation explains the gap. The
-    # motion says nothing of a family all of whose fits end at a size of zero, as far as simulations explain the gap: a force that
-    # is too fast to move the rig, or whose phase is lost where the simulation is off, shows along the motion alone.
+    # motion says nothing of a family all of whose fits end at a size of zero, unless simulations do not see its force.
     counts = float(np.clip(np.max(explained, initial=0.0), 0.0, 1.0))
     keys = [frozenset(keys_of(rig, model.effects)) for model in models]
+    counting = [
+        own
+        for model, own in zip(models, keys, strict=True)
+        if model.along_motion or stands(model, reidentified, models)
+    ]
     of_motion: dict[Key, float] = {}
     if proposal is not None:
-        standing = set[Key]().union(
-            *(own for m, own in zip(models, keys, strict=True) if stands(m, reidentified, models))
-        )
         per_share = FAMILIES.per_motion * (1.0 - proposal.by_chance)
-        for own in proposal.alone:
-            key = own.family, own.where
-            said = 1.0 if key in standing else 1.0 - counts
-            of_motion[key] = _evidence(own.share, 0.0, said * per_share)
+        alone = [own for own in proposal.alone if any((own.family, own.where) in key for key in counting)]
+        of_motion = {(own.family, own.where): _evidence(own.share, 0.0, per_share) for own in alone}
     weights = {}
     for key in dict.fromkeys(itertools.chain(*map(sorted, keys))):
         share = math.fsum(own for own, having in zip(of_rank, keys, strict=True) if key in having)

@@ -15,7 +15,7 @@ import numpy as np
 from rigsight.diagnose.fit_context import FittedModel
 from rigsight.diagnose.noise.block_means import squared_errors
 from rigsight.diagnose.policy import FAMILIES, VERDICT
-from rigsight.diagnose.verdict.families import keys_of, main_causes
+from rigsight.diagnose.verdict.families import Key, keys_of, main_causes
 from rigsight.diagnose.verdict.plausibility import stands
 from rigsight.diagnose.verdict.ranking import Ranking
 from rigsight.inverse import MissingForce, Proposal, ProposedStart
@@ -200,6 +200,41 @@ def is_exact(
     return judgement.verdict == "effect" and is_adequate(best)
 
 
+def with_unseen(
+    rig: Rig,
+    reidentified: FittedModel,
+    ranking: Ranking,
+    proposal: Proposal | None,
+    as_along_motion: Callable[[FittedModel, ProposedStart], FittedModel],
+) -> Ranking:
+    """Return the ranking with families that the motion shows and simulations do not see, at their numbers along the motion.
+
+    No fit of such a family lowers the error of the equations, and at those numbers it does not raise it: its force is too fast to
+    move the rig, or its phase is lost where the simulation is off.
+    """
+    if proposal is None:
+        return ranking
+    for cause in proposal.alone:
+        forms = _of_family(rig, ranking, (cause.family, cause.where))
+        starts = [(proposal.starts[m.names[0]], m) for m in forms if m.names[0] in proposal.starts]
+        is_seen = any(
+            m.error_over_noise <= reidentified.error_over_noise and stands(m, reidentified, ranking.order)
+            for m in forms
+        )
+        if is_seen or not starts or cause.share < max(VERDICT.larger_part, proposal.by_chance):
+            continue
+        start, form = min(starts, key=lambda own: own[0].unexplained)
+        model = as_along_motion(form, start)
+        if model.residuals and model.error_over_noise <= VERDICT.worthwhile * reidentified.error_over_noise:
+            ranking = ranking.with_model(model)
+    return ranking
+
+
+def _of_family(rig: Rig, ranking: Ranking, key: Key) -> list[FittedModel]:
+    """Return the models of a ranking with effects of one family alone."""
+    return [m for m in ranking.order if m.residuals and keys_of(rig, m.effects) == (key,)]
+
+
 def by_motion(
     judgement: Judgement,
     rig: Rig,
@@ -207,11 +242,9 @@ def by_motion(
     ranking: Ranking,
     noise: Floats,
     proposal: Proposal | None,
-    as_along_motion: Callable[[FittedModel, ProposedStart], FittedModel],
 ) -> Judgement:
     """Return the judgement with the most probable family, where it is another one."""
-    # It is more probable than not, or explains the larger part of the missing force. Where no fit of a form lowers the error of
-    # the simulation, a probable family is named nevertheless, with its numbers `as_along_motion`.
+    # It is more probable than not, or explains the larger part of the missing force.
     if proposal is None:
         return judgement
     shares = [grounds.share for grounds in ranking.grounds]
@@ -224,18 +257,13 @@ def by_motion(
         return judgement
     if judgement.verdict == "effect" and key in keys_of(rig, judgement.model.effects):
         return judgement
-    of_family = [m for m in ranking.order if m.residuals and keys_of(rig, m.effects) == (key,)]
-    standing = [model for model in of_family if stands(model, reidentified, ranking.order)]
-    forms = [m for m in standing if m.error_over_noise <= reidentified.error_over_noise]
-    starts = [(proposal.starts[m.names[0]], m) for m in of_family if m.names[0] in proposal.starts]
-    if not forms and is_probable and starts:
-        start, model = min(starts, key=lambda own: own[0].unexplained)
-        forms = [own for own in [as_along_motion(model, start)] if own.residuals]
-    forms = forms or standing
+    forms = [
+        m for m in _of_family(rig, ranking, key) if m.along_motion or stands(m, reidentified, ranking.order)
+    ]
     if not forms:
         return judgement
     of_rank = {model.names: share for model, share in zip(ranking.order, shares, strict=True)}
-    form = max(forms, key=lambda model: (of_rank[model.names], -model.error_over_noise))
+    form = max(forms, key=lambda m: (m.along_motion, of_rank[m.names], -m.error_over_noise))
     simulated = form.error_over_noise / reidentified.error_over_noise
     return Judgement(
         "effect",
