@@ -7,15 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigsight import plot
-from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPart, StatePart
+from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPart, PathPart, StatePart
 from rigsight.diagnose.result import Diagnosis
-from rigsight.effects import kind_of
 from rigsight.records.stamps import written_span
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.labels import (
-    TIMES,
-    effect_label,
-    family_label,
     gap_percent,
     listed,
     percent,
@@ -27,7 +23,6 @@ from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names, stages_reported
 
 _JOINTS_SHOWN = 3
-_LAWS_SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -39,24 +34,10 @@ class OutputMaps:
     figures: list[PageFigure]
 
 
-def path_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the legs of the signal path as text."""
-    rows = []
-    for part in diagnosis.localization.by_path:
-        delay = f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
-        shift = delay if math.isfinite(part.shift) else ""
-        rows.append(
-            {
-                "path": part.path.replace("->", "\u2192"),
-                "before": gap_percent(part.before),
-                "reidentified": gap_percent(part.reidentified),
-                "noise_floor": gap_percent(part.noise_floor),
-                "noise_share": percent(part.noise_share),
-                "times": f"{part.reidentified / part.noise_floor:.3g} {TIMES}",
-                "shift": shift.replace("-", "\u2212"),
-            }
-        )
-    return rows
+def shift_text(part: PathPart) -> str:
+    """Return the delay with which a leg of the signal path follows best, and its gap then; empty where none was tested."""
+    delay = f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
+    return delay.replace("-", "\u2212") if math.isfinite(part.shift) else ""
 
 
 def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
@@ -110,22 +91,6 @@ def force_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
         for number, force in enumerate(diagnosis.missing_force.forces[:_JOINTS_SHOWN], start=1)
     ]
     return [OutputMaps("where-missing-force", "Missing force, before any law", figures)]
-
-
-def law_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return what each family explains of the missing force alone, beyond chance, the largest share first."""
-    if diagnosis.missing_force is None:
-        return []
-    found = diagnosis.missing_force
-    return [
-        (
-            sentence_case(family_label(cause)),
-            effect_label(kind_of(cause.effect.name)),
-            percent(cause.share),
-        )
-        for cause in found.alone[:_LAWS_SHOWN]
-        if cause.share > found.by_chance
-    ]
 
 
 def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
