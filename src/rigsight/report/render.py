@@ -140,6 +140,7 @@ def environment(*packages: str) -> Environment:
         "gap": gap_percent,
         "case": sentence_case,
         "effects": lambda names: sentence_case(effects_label(names)),
+        "is_finite": math.isfinite,
         "arrows": lambda text: text.replace("->", "\u2192"),
         "floors": lambda error: f"{error:.3g} {TIMES}" if math.isfinite(error) else "not scored",
         # The heads of a table: title -> class of its column.
