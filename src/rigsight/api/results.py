@@ -13,7 +13,7 @@ from rigsight.discover import Discovery
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
-from rigsight.plot.discovery import discovery_figure
+from rigsight.plot.fitted_numbers import discovery_figure
 from rigsight.report.identification import identification_html
 from rigsight.report.record_views import record_drawing
 from rigsight.report.sections import TRUST_COLUMNS, budget_drawing, ranking_drawing, trust_drawing, trust_rows

@@ -232,12 +232,12 @@ def _plan_summary(found: Plan) -> Group:
     from rich.console import Group
     from rich.markup import escape
 
-    from rigsight.report.plan_page import headline, promise
+    from rigsight.report.check_and_plan import plan_headline, promise
 
     rivals = [(one.effects, f"{one.probability:.2f}", f"{one.rms_left:.3g} errors") for one in found.rivals]
     limits = [(limit.name, f"{limit.value:g}", f"{largest:.3g}") for limit, largest in found.limits]
     return Group(
-        escape(headline(found)),
+        escape(plan_headline(found)),
         table(("Rival", "Probability now", "Residual when fitted again"), rivals),
         table(("Signal", "Limit", "Largest predicted"), limits),
         promise(found),

@@ -323,7 +323,7 @@ def _check_summary(found: Check) -> Group:
     from rich.console import Group
     from rich.markup import escape
 
-    from rigsight.report.check_page import forms, headline, rivals
+    from rigsight.report.check_and_plan import check_headline, forms, rivals
 
     findings = [(r.severity, f"{r.sentence} {r.remedy}") for r in found.remarks if r.severity != "note"]
     apart = []
@@ -335,7 +335,7 @@ def _check_summary(found: Check) -> Group:
     heads = ("Effect", "Where", "Not told apart from")
     effects = [table(heads, apart)] if apart else ["All families of effects can be told apart."]
     return Group(
-        headline(found),
+        check_headline(found),
         *([table(("", "Finding"), findings)] if findings else []),
         found.identifiability,
         *([found.matrix.reason] if found.matrix.reason else [*effects, *map(escape, alike)]),
