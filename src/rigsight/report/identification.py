@@ -21,6 +21,7 @@ from rigsight.identify.identification import (
     RecordScore,
 )
 from rigsight.identify.linear_view import LinearView
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.plot import with_unit
 from rigsight.records.record import Floats
 from rigsight.report import labels
@@ -136,15 +137,11 @@ def _by_amplitude(found: Identification) -> list[RecordIdentification]:
 def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
     """Yield subject and words: the numbers of the joint fit, and how it follows each record."""
     fit, reached = found.joint.fit.fit, {bound.name: bound.side for bound in found.reached}
-    for name in found.joint.names:
-        reported = estimate_text(
-            Estimate(fit.values[name], fit.standard_errors[name], found.units.get(name, ""))
-        )
+    for name, estimate in _estimates(found.joint.names, fit, found.units).items():
+        reported = estimate_text(estimate)
         yield name, f"{reported}, at its {reached[name]} bound" if name in reached else reported
     if found.joint.pooled is not None:
-        errors = found.joint.pooled.standard_errors
-        for name, value in found.joint.pooled.values.items():
-            estimate = Estimate(value, errors[name], found.units.get(name, ""))
+        for name, estimate in _estimates(found.joint.pooled.values, found.joint.pooled, found.units).items():
             yield name, f"{estimate_text(estimate)}, mean of the records' own"
     if found.joint.conicity is not None:
         yield "delta_0", found.joint.conicity.statement
@@ -182,8 +179,8 @@ def _score_text(score: RecordScore) -> str:
 def hysteresis_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]]:
     """Yield subject and words: parameters with their standard errors, and what follows from them."""
     fit = found.calibration.fit
-    for name in fit.free:
-        yield name, estimate_text(Estimate(fit.values[name], fit.standard_errors[name], found.units[name]))
+    for name, estimate in _estimates(fit.free, fit, found.units).items():
+        yield name, estimate_text(estimate)
     for name, value in found.held.items():
         yield name, f"{value:.4g}{behind(found.units[name])}, held"
     yield from derived_rows(found)
@@ -275,13 +272,17 @@ def _parameters(
     names: Iterable[str], fit: FitResult, units: Mapping[str, str], meanings: Mapping[str, str]
 ) -> list[ParameterRow]:
     return [
-        parameter_row(
-            name,
-            Estimate(fit.values[name], fit.standard_errors[name], units.get(name, "")),
-            description=meanings.get(name, ""),
-        )
-        for name in names
+        parameter_row(name, estimate, description=meanings.get(name, ""))
+        for name, estimate in _estimates(names, fit, units).items()
     ]
+
+
+def _estimates(
+    names: Iterable[str], fit: FitResult | PhysicalEstimates, units: Mapping[str, str]
+) -> dict[str, Estimate]:
+    return {
+        name: Estimate(fit.values[name], fit.standard_errors[name], units.get(name, "")) for name in names
+    }
 
 
 def _figures(views: Sequence[LinearView], drawings: Sequence[Figure]) -> Iterator[PageFigure | None]:

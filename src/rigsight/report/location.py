@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rigsight import plot
 from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPart, PathPart, StatePart
@@ -21,6 +22,9 @@ from rigsight.report.labels import (
 )
 from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names, stages_reported
+
+if TYPE_CHECKING:
+    from rigsight.plot import Figure
 
 _JOINTS_SHOWN = 3
 
@@ -105,7 +109,11 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         (part for part in where.by_amplitude if part.output == output), key=lambda p: (p.amplitude, p.scored)
     )
     one_record_each = 1 < len(amplitudes) == len(records) and all(len(p.records) == 1 for p in amplitudes)
-    figures = []
+    figures: list[PageFigure] = []
+
+    def add(drawing: Figure, of: str, alt: str, caption: str) -> None:
+        figures.append(page_figure(drawing, f"{key}-{of}", alt, caption))
+
     if bands:
         spread = (
             "spread over frequency as in the stretches that contain only noise"
@@ -117,16 +125,14 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             for p in bands
         ]
         named = [(f"{limit} rad/s", part) for limit, part in zip(limits, bands, strict=True)]
-        figures.append(
-            page_figure(
-                plot.gap_bars(
-                    bands, [_band(p) for p in bands], stages, "frequency [rad/s]", "gap in the band [%]"
-                ),
-                f"{key}-bands",
-                f"Bars of the gap by band of frequency. {_reported(named, diagnosis)}",
-                f"By frequency. {_largest(named, rest)} The squares of the bars add up to the square of the gap; the "
-                f"noise floor is {spread}.",
-            )
+        add(
+            plot.gap_bars(
+                bands, [_band(p) for p in bands], stages, "frequency [rad/s]", "gap in the band [%]"
+            ),
+            "bands",
+            f"Bars of the gap by band of frequency. {_reported(named, diagnosis)}",
+            f"By frequency. {_largest(named, rest)} The squares of the bars add up to the square of the gap; the noise floor is "
+            f"{spread}.",
         )
     if states:
         figures.append(_states_figure(states, output, _motion(diagnosis), key, rest))
@@ -134,38 +140,31 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         labels = [f"{_size(p)}\n{'scored' if p.scored else 'fitted'}" for p in amplitudes]
         spoken = list(zip((label.replace("\n", " ") for label in labels), amplitudes, strict=True))
         which = "; ".join(f"{_size(p)} {p.records[0]}" for p in amplitudes)
-        figures.append(
-            page_figure(
-                plot.gap_bars(amplitudes, labels, stages, "amplitude of the input"),
-                f"{key}-amplitudes",
-                f"Bars of the gap by amplitude of the input. {_reported(spoken, diagnosis)}",
-                f"By amplitude of the input, each relative to the motion there{f': {which}' if one_record_each else ''}.",
-            )
+        add(
+            plot.gap_bars(amplitudes, labels, stages, "amplitude of the input"),
+            "amplitudes",
+            f"Bars of the gap by amplitude of the input. {_reported(spoken, diagnosis)}",
+            f"By amplitude of the input, each relative to the motion there{f': {which}' if one_record_each else ''}.",
         )
     # Where each amplitude is one record, the picture is the same.
     if len(records) > 1 and not one_record_each:
         labels = [str(i) for i, _ in enumerate(records, start=1)]
-        figures.append(
-            page_figure(
-                plot.gap_bars(records, labels, stages, "record"),
-                f"{key}-records",
-                f"Bars of the gap by record. {_reported([(p.record, p) for p in records], diagnosis)}",
-                "By record, each relative to its own motion: "
-                + "; ".join(f"{i} {p.record} ({p.role})" for i, p in enumerate(records, start=1))
-                + ".",
-            )
+        which = "; ".join(f"{i} {p.record} ({p.role})" for i, p in enumerate(records, start=1))
+        add(
+            plot.gap_bars(records, labels, stages, "record"),
+            "records",
+            f"Bars of the gap by record. {_reported([(p.record, p) for p in records], diagnosis)}",
+            f"By record, each relative to its own motion: {which}.",
         )
     if times:
         worst_time = max(times, key=lambda p: p.reidentified)
-        figures.append(
-            page_figure(
-                plot.gap_times(times, stages),
-                f"{key}-times",
-                f"Steps of the gap over time, {rest} largest with {gap_percent(worst_time.reidentified)} from "
-                f"{written_span(worst_time.t_start, worst_time.t_end)} of {worst_time.record}; noise floor "
-                f"{gap_percent(worst_time.noise_floor)}.",
-                "Over time within each scored record, relative to the motion of all of them.",
-            )
+        add(
+            plot.gap_times(times, stages),
+            "times",
+            f"Steps of the gap over time, {rest} largest with {gap_percent(worst_time.reidentified)} from "
+            f"{written_span(worst_time.t_start, worst_time.t_end)} of {worst_time.record}; noise floor "
+            f"{gap_percent(worst_time.noise_floor)}.",
+            "Over time within each scored record, relative to the motion of all of them.",
         )
     return figures
 

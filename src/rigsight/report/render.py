@@ -18,6 +18,7 @@ from markupsafe import Markup, escape
 
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect
+from rigsight.plot import display_scale
 from rigsight.report import labels, location, sections, wording
 from rigsight.report.figures import loop_figures, rig_figure
 from rigsight.report.labels import (
@@ -31,7 +32,13 @@ from rigsight.report.labels import (
     rig_of,
     sentence_case,
 )
-from rigsight.report.record_views import amplitude_figures, record_responses, record_views
+from rigsight.report.record_views import (
+    amplitude_figures,
+    record_charts,
+    record_errors,
+    record_facts,
+    record_responses,
+)
 from rigsight.report.wording import advice_sentences, stage_names
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
@@ -88,9 +95,12 @@ def render_report(
         equations=equation_groups(diagnosis, known),
         amplitude_figures=amplitude_figures(diagnosis, responses),
         loops=loop_figures(diagnosis),
-        records=list(record_views(diagnosis, responses)),
+        records=list(record_charts(diagnosis, responses)),
+        record_facts=record_facts,
+        record_errors=record_errors,
         advice=advice_sentences(diagnosis),
-        floors=sections.floor_rows(diagnosis),
+        display_scale=display_scale,
+        output_label=sections.output_label,
         script=Markup(script),
         script_hash=f"sha256-{digest}",
     )

@@ -132,28 +132,6 @@ def errors_reported(diagnosis: Diagnosis) -> str:
     )
 
 
-def floor_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the noise floor of each output in display units, and how it was found."""
-    rows = []
-    for floor in diagnosis.noise_floors:
-        scale, force = plot.display_scale(floor.unit, floor.std), floor.disturbance
-        disturbed = (
-            ""
-            if force is None
-            else f". The error of the model above it corresponds to a random force of {force.std:.2g} {force.unit} added to the "
-            f"drive, up to {force.below:.3g} rad/s"
-        )
-        rows.append(
-            {
-                "output": output_label(diagnosis, floor.output),
-                "std": f"{floor.std * scale.factor:.3g}" if math.isfinite(floor.std) else "not finite",
-                "unit": scale.unit,
-                "method": floor.method + disturbed,
-            }
-        )
-    return rows
-
-
 def output_label(diagnosis: Diagnosis, output: str) -> str:
     """Return an output for people: ``"yaw angle psi"``; the bare name on a rig that is not ours."""
     rig = labels.rig_of(diagnosis)
