@@ -37,6 +37,11 @@ def effect(about: str, by_default: str = "the catalogue and your own") -> Any:
     return typer.Option(metavar="NAME", show_default=by_default, help=about, autocompletion=effect_names)
 
 
+def repeated(name: str, metavar: str, about: str) -> Any:
+    """Return an option that may be given several times, or not at all."""
+    return typer.Option(name, metavar=metavar, show_default="none", help=f"{about} May be repeated.")
+
+
 Campaign = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that contains it.")
 ]
@@ -50,30 +55,21 @@ Model = Annotated[
 ResultsFolder = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
 OwnEffects = Annotated[
     list[Path] | None,
-    typer.Option(
-        "--effects",
-        metavar="FILE",
-        show_default="none",
-        help="A Python file that declares effects of your own; the file is executed. May be repeated.",
-    ),
+    repeated("--effects", "FILE", "A Python file that declares effects of your own; the file is executed."),
 ]
 OwnRigs = Annotated[
     list[Path] | None,
-    typer.Option(
-        "--rigs",
-        metavar="FILE",
-        show_default="none",
-        help="A rig file that declares a rig of your own, which can then be used by its name. May be repeated.",
+    repeated(
+        "--rigs", "FILE", "A rig file that declares a rig of your own, which can then be used by its name."
     ),
 ]
 Simulators = Annotated[
     list[str] | None,
-    typer.Option(
+    repeated(
         "--simulator",
-        metavar="FILE.py:FUNCTION",
-        show_default="none",
-        help="A Python function that computes the motion of the bodies, for rig files with an external simulator; the Python "
-        "file is executed. May be repeated.",
+        "FILE.py:FUNCTION",
+        "A Python function that computes the motion of the bodies, for rig files with an external simulator; the Python file is "
+        "executed.",
     ),
 ]
 Seed = Annotated[
