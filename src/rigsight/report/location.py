@@ -44,6 +44,11 @@ def shift_text(part: PathPart) -> str:
     return delay.replace("-", "\u2212") if math.isfinite(part.shift) else ""
 
 
+def all_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
+    """Return all figures of the section: the missing force, each output, the joints."""
+    return [*force_maps(diagnosis), *output_maps(diagnosis), *joint_maps(diagnosis)]
+
+
 def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
     """Return the figures that show where the gap of each output lies."""
     maps = []
