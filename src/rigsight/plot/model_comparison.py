@@ -22,13 +22,7 @@ from rigsight.plot.drawing import (
     shown_in,
     style,
 )
-from rigsight.plot.frequency_responses import (
-    draw_measured,
-    label_bode,
-    limit,
-    span,
-    thinned,
-)
+from rigsight.plot.frequency_responses import draw_measured, label_bode, limit, span, thinned
 from rigsight.records.record import Floats
 
 if TYPE_CHECKING:

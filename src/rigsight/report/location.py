@@ -12,14 +12,7 @@ from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPar
 from rigsight.diagnose.result import Diagnosis
 from rigsight.records.stamps import written_span
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.labels import (
-    gap_percent,
-    listed,
-    percent,
-    rig_of,
-    sentence_case,
-    unit_text,
-)
+from rigsight.report.labels import gap_percent, listed, percent, rig_of, sentence_case, unit_text
 from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names, stages_reported
 
