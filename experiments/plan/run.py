@@ -167,7 +167,7 @@ def judged(number: int, rng: np.random.Generator) -> Iterator[dict[str, object]]
         return
     rival, contest = found
     by_menu = advised(contest, campaign)
-    shown = simulate(contest.best.fit.structure, contest.best.fit.values, by_menu)
+    shown = simulate(contest.rivals[0].fit.structure, contest.rivals[0].fit.values, by_menu)
     stroke = max(Limit("x", 1.0).reached(record) for record in (first, shown))
     pair = [Named((hidden,)), Named((rival,))]
     seed = int(rng.integers(2**31))

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rigsight.api.comparing import ComparisonResult as ComparisonResult
     from rigsight.api.comparing import compare_models as compare_models
-    from rigsight.api.diagnoser import Diagnoser as Diagnoser
-    from rigsight.api.diagnoser import DiagnosisResult as DiagnosisResult
-    from rigsight.api.equation_discoverer import DiscoveryResult as DiscoveryResult
-    from rigsight.api.equation_discoverer import EquationDiscoverer as EquationDiscoverer
-    from rigsight.api.linear_identifier import IdentificationResult as IdentificationResult
-    from rigsight.api.linear_identifier import LinearIdentifier as LinearIdentifier
-    from rigsight.api.reading import read_record as read_record
-    from rigsight.api.rig import Rig as Rig
+    from rigsight.api.estimators import Diagnoser as Diagnoser
+    from rigsight.api.estimators import EquationDiscoverer as EquationDiscoverer
+    from rigsight.api.estimators import LinearIdentifier as LinearIdentifier
+    from rigsight.api.inputs import Rig as Rig
+    from rigsight.api.inputs import read_record as read_record
+    from rigsight.api.results import DiagnosisResult as DiagnosisResult
+    from rigsight.api.results import DiscoveryResult as DiscoveryResult
+    from rigsight.api.results import IdentificationResult as IdentificationResult
     from rigsight.campaign import Campaign as Campaign
     from rigsight.effects import CATALOGUE as CATALOGUE
     from rigsight.effects import Effect as Effect
@@ -41,17 +41,17 @@ _HOMES = {
     "Campaign": "rigsight.campaign",
     "ColumnMapping": "rigsight.records",
     "ComparisonResult": "rigsight.api.comparing",
-    "Diagnoser": "rigsight.api.diagnoser",
-    "DiagnosisResult": "rigsight.api.diagnoser",
-    "DiscoveryResult": "rigsight.api.equation_discoverer",
+    "Diagnoser": "rigsight.api.estimators",
+    "DiagnosisResult": "rigsight.api.results",
+    "DiscoveryResult": "rigsight.api.results",
     "Effect": "rigsight.effects",
-    "EquationDiscoverer": "rigsight.api.equation_discoverer",
-    "IdentificationResult": "rigsight.api.linear_identifier",
+    "EquationDiscoverer": "rigsight.api.estimators",
+    "IdentificationResult": "rigsight.api.results",
     "InputError": "rigsight.errors",
-    "LinearIdentifier": "rigsight.api.linear_identifier",
+    "LinearIdentifier": "rigsight.api.estimators",
     "Model": "rigsight.simulate.model",
     "Record": "rigsight.records",
-    "Rig": "rigsight.api.rig",
+    "Rig": "rigsight.api.inputs",
     "RigsightError": "rigsight.errors",
     "SimulationError": "rigsight.errors",
     "compare_models": "rigsight.api.comparing",
@@ -61,7 +61,7 @@ _HOMES = {
     "own_effects": "rigsight.workflow.own.own_effects",
     "read_campaign": "rigsight.workflow.campaign.read_campaign",
     "read_model": "rigsight.workflow.campaign.model_file",
-    "read_record": "rigsight.api.reading",
+    "read_record": "rigsight.api.inputs",
     "simulate_model": "rigsight.workflow.simulate",
 }
 """Public name -> module that defines it."""

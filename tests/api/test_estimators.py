@@ -156,7 +156,7 @@ def test_none_is_the_whole_catalogue(campaign: rs.Campaign, monkeypatch: pytest.
         tried.extend(effect.name for effect in arguments[1])
         raise rs.SimulationError("enough")
 
-    monkeypatch.setattr("rigsight.api.diagnoser.diagnose_campaign", diagnose)
+    monkeypatch.setattr("rigsight.api.estimators.diagnose_campaign", diagnose)
     with pytest.raises(rs.SimulationError):
         rs.Diagnoser(n_jobs=1).fit(campaign)
     assert tried == [effect.name for effect in rs.CATALOGUE]

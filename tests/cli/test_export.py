@@ -48,7 +48,7 @@ def test_help_names_every_target(run: Run) -> None:
     stepping = {name for name, target in TARGETS.items() if target.fixed_step}
     for option, expected in (("--to", {*TARGETS, *ROBOT_TARGETS}), ("--step", stepping)):
         missing = expected - described[option]
-        assert not missing, f"Name {missing} in the help of {option} in cli/export.py."
+        assert not missing, f"Name {missing} in the help of {option} in cli/model_use.py."
 
 
 def test_the_folder_of_a_model_and_a_default_name_do(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.api.reading import read_record
+from rigsight.api.inputs import read_record
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -13,7 +13,7 @@ from rigsight.campaign import Campaign
 from rigsight.discover import Discovery, DiscoveryData, discover
 from rigsight.effects import effect_named, kind_of, placed
 from rigsight.plot import svg_text
-from rigsight.plot.discovery import discovery_figure
+from rigsight.plot.fitted_numbers import discovery_figure
 from rigsight.records.record import Record
 from rigsight.report.terminal import discovery_rows
 from rigsight.rigs import Rig

@@ -14,9 +14,9 @@ from rigsight.check import check_campaign
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.plan import Named, Plan, plan_experiment, read_limits, read_payloads
-from rigsight.plan.discrimination import about, posterior
-from rigsight.plan.limits import use_of
+from rigsight.plan.experiments import use_of
 from rigsight.plan.rivals import contest_of
+from rigsight.plan.search import about, posterior
 from rigsight.plan.usual_sizes import truths_of_usual_size
 from rigsight.records import Record
 from rigsight.records.read_record import ReadingOptions, read_record
@@ -93,15 +93,15 @@ def test_the_record_separates_rivals_much_better_than_the_old_one_repeated(
     contest = contest_of(one_amplitude, PAIR, lambda _: None)
     wrong = next(rival for rival in contest.rivals if rival.label == "quadratic_damping")
     (first,) = one_amplitude.records
-    assert contest.best.probability < 0.8
+    assert contest.rivals[0].probability < 0.8
     assert about(contest, wrong, moved(plan.record)) > 10.0 * about(contest, wrong, moved(first))
 
 
 def test_the_measured_record_decides_for_the_truth(one_amplitude: Campaign, plan: Plan) -> None:
     new = replace(measured(plan.record, 2), name="plan")
     after = contest_of(replace(one_amplitude, records=(*one_amplitude.records, new)), PAIR, lambda _: None)
-    assert after.best.label == "coulomb_friction"
-    assert after.best.probability > 0.95
+    assert after.rivals[0].label == "coulomb_friction"
+    assert after.rivals[0].probability > 0.95
 
 
 def test_limits_are_kept_in_the_simulations_of_all_rivals(plan: Plan) -> None:

@@ -18,7 +18,7 @@ from rigsight.report.figures import (
     curve_names,
     points_per_curve,
 )
-from rigsight.report.record_views import record_views
+from rigsight.report.record_views import record_charts
 
 
 def drawn(x: np.ndarray, y: np.ndarray, name: str = "m", title: str = "x") -> dict[str, Any]:
@@ -79,9 +79,7 @@ def test_stages_that_are_the_same_simulation_are_drawn_once(
 def test_records_over_unix_time_are_drawn_from_their_first_stamp(diagnosis: Diagnosis) -> None:
     (trace, *_) = diagnosis.traces
     later = replace(trace, t=trace.t + 1.7e9)
-    plain, late = (
-        next(iter(record_views(replace(diagnosis, traces=(one,)), {}))).charts[0] for one in (trace, later)
-    )
+    plain, late = (next(record_charts(replace(diagnosis, traces=(one,)), {}))[1][0] for one in (trace, later))
     at_zero, moved = (json.loads(chart.data) for chart in (plain, late))
     assert moved["label"].startswith("time [s] since 17000000")
     assert at_zero["label"] == "time [s]"
@@ -101,12 +99,12 @@ def test_a_long_record_is_drawn_with_its_peaks(diagnosis: Diagnosis) -> None:
     off[7_777] = -0.12
     signals = {"measured": psi, "before": off, "reidentified": off, "after": psi}
     made = replace(trace, t=t, inputs={"u": t}, **{name: {"psi": own} for name, own in signals.items()})
-    (view,) = record_views(replace(diagnosis, traces=(made,)), {})
-    content = json.loads(view.charts[0].data)
+    ((_, charts),) = record_charts(replace(diagnosis, traces=(made,)), {})
+    content = json.loads(charts[0].data)
     assert 2_000 < len(content["x"]) <= 6_000
     above, below = (panel["curves"] for panel in content["panels"])
     assert max(above[0]["y"]) == pytest.approx(150.0)
     assert min(above[1]["y"]) == pytest.approx(-120.0)
     assert above[0]["y"][content["x"].index(31.234)] == pytest.approx(150.0)
     assert below[0]["name"] == "twice the noise floor"
-    assert f"Of {n} samples {len(content['x'])} are drawn" in view.charts[0].caption
+    assert f"Of {n} samples {len(content['x'])} are drawn" in charts[0].caption

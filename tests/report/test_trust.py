@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from rigsight.api.diagnoser import DiagnosisResult
+from rigsight.api.results import DiagnosisResult
 from rigsight.diagnose.result import Diagnosis
 from rigsight.diagnose.trust.patterns import Pattern, Role, meaning
 from rigsight.diagnose.trust.statement import GroupValue, ParameterTrust, Trust, statement

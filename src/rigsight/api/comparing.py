@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from rigsight.api.base import Result
+from rigsight.api.results import Result
 from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor
 from rigsight.report.comparison import comparison_html, overall_figure, record_figures

@@ -1,6 +1,6 @@
 """The command line: each command calls one public function, and errors become exit codes.
 
-One file per command, listed in `application`; shared code is in `options`, `exit_codes` and `terminal`.
+One file per kind of command, all listed in `application`; shared code is in `options`, `exit_codes` and `terminal`.
 Heavy imports are inside the commands, so that ``rigsight --help`` is fast.
 """
 

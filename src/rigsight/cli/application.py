@@ -10,26 +10,12 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.check import check
-from rigsight.cli.compare import compare
-from rigsight.cli.demo import demo
-from rigsight.cli.diagnose import diagnose
-from rigsight.cli.difference import difference
-from rigsight.cli.discover import discover
-from rigsight.cli.effects import list_effects
+from rigsight.cli.diagnosis import demo, diagnose, plan, power, reproduce
 from rigsight.cli.exit_codes import ended_by_signals, report_errors, report_output_errors
-from rigsight.cli.export import export
-from rigsight.cli.gate import gate
-from rigsight.cli.identify import identify
-from rigsight.cli.init import init
-from rigsight.cli.inspect import inspect
-from rigsight.cli.open_app import open_app
-from rigsight.cli.plan import plan
-from rigsight.cli.power import power
-from rigsight.cli.reproduce import reproduce
-from rigsight.cli.rigs import list_rigs
-from rigsight.cli.simulate import simulate
-from rigsight.cli.vary import vary
+from rigsight.cli.fits import compare, difference, discover, gate, identify
+from rigsight.cli.model_use import export, simulate, vary
+from rigsight.cli.overview import list_effects, list_rigs, open_app
+from rigsight.cli.records import check, init, inspect
 from rigsight.errors import InputError
 
 _BENCH = "rigsight_bench"

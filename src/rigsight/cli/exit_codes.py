@@ -29,13 +29,13 @@ _OF_A_PATH = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR)
 _OF_THE_SESSION = (errno.EMFILE, errno.ENFILE, errno.EFBIG)
 _MOST_NAMED = 3
 """Largest number of result folders that an interruption lists by name; a bench has hundreds."""
-_NOTHING = "nothing was written"
-GOES_ON = f"{_NOTHING}; the same command continues from there"
+NOTHING = "nothing was written"
+GOES_ON = f"{NOTHING}; the same command continues from there"
 """Of an interrupted diagnosis no result file remains, but the finished fits are kept."""
 
 
 @contextlib.contextmanager
-def report_errors(debug: bool, outcome: str = _NOTHING) -> Iterator[None]:
+def report_errors(debug: bool, outcome: str = NOTHING) -> Iterator[None]:
     """Map errors of a command to one message on stderr and an exit code."""
     if debug:
         yield
@@ -49,7 +49,7 @@ def report_errors(debug: bool, outcome: str = _NOTHING) -> Iterator[None]:
         except RigsightError as error:
             leave(str(error), BAD_INPUT, isinstance(error, MachineError))
         except KeyboardInterrupt as error:
-            if written and outcome.startswith(_NOTHING):
+            if written and outcome.startswith(NOTHING):
                 outcome = f"the files written in {_named(written)} are complete"
             leave(f"interrupted; {outcome}.", exit_code(error))
         except BrokenPipeError:

@@ -28,12 +28,12 @@ def show(summary: RenderableType) -> None:
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    """Return a table whose cells are shown as they are written."""
+    """Return a table whose heads and cells are shown as they are written."""
     from rich import box
     from rich.markup import escape
     from rich.table import Table
 
-    made = Table(*heads, box=box.SIMPLE)
+    made = Table(*map(escape, heads), box=box.SIMPLE)
     for row in rows:
         made.add_row(*map(escape, row))
     return made

@@ -11,11 +11,9 @@ import numpy as np
 from rigsight.campaign import Campaign
 from rigsight.errors import InputError, SimulationError
 from rigsight.json_data import json_data
-from rigsight.plan.discrimination import posterior, predicted, refitted
-from rigsight.plan.experiments import Bench
-from rigsight.plan.limits import Limit, with_recorded_range
-from rigsight.plan.rivals import Named, Truth, contest_of, truths_of
-from rigsight.plan.search import Scored, Search
+from rigsight.plan.experiments import Bench, Limit, with_recorded_range
+from rigsight.plan.rivals import Named, Truth, contest_of
+from rigsight.plan.search import Scored, Search, posterior, predicted, refitted
 from rigsight.plan.usual_sizes import truths_of_usual_size
 from rigsight.records import Record
 from rigsight.records.record import Floats
@@ -196,7 +194,8 @@ def plan_experiment(
     n_samples, rng = round(seconds / dt), np.random.default_rng(seed)
     kept = with_recorded_range(limits, rig, campaign.records)
     if sizes == "fitted":
-        truths = truths_of(contest_of(campaign, named, say))
+        contest = contest_of(campaign, named, say)
+        truths = [Truth(contest, rival, rival.probability) for rival in contest.rivals]
     else:
         truths = truths_of_usual_size(campaign, named, n_samples, sizes == "usual", say)
     first = truths[0].contest
@@ -216,6 +215,9 @@ def plan_experiment(
         rms, before = float(np.sqrt(np.nanmean(own.left**2))), truth.contest.rivals[truth.index].probability
         evidence = own.against - best.against
         predictions.append(Prediction(rival.label, before, values, shown, own.left, rms, evidence))
+    kinds: dict[str, Scored] = {}
+    for scored in search:
+        kinds.setdefault(scored.experiment.what, scored)
     return Plan(
         campaign.title,
         rig.name,
@@ -231,7 +233,7 @@ def plan_experiment(
         else predictions[0].probability,
         without_noise,
         trials,
-        _different(search),
+        tuple(kinds.values())[:_LISTED],
     )
 
 
@@ -254,7 +256,12 @@ def _simulated(
         weight, index = truth.weight, truth.index
         without_noise += weight * _outcome(truth, shown, shown)[index]
         for _ in range(draws):
-            drawn, clean = _drawn_readings(truth, shown, rng)
+            drawn = truth.drawn(rng)
+            try:
+                clean = predicted(drawn.rival, shown)
+            except SimulationError:
+                # Drawn numbers that cannot be simulated are not drawn.
+                drawn, clean = truth, shown
             found = _outcome(drawn, _with_noise(drawn, clean, rng), clean)
             right += weight / draws * (int(np.argmax(found)) == index)
             expected += weight / draws * found[index]
@@ -284,20 +291,3 @@ def _with_noise(truth: Truth, clean: Record, rng: np.random.Generator) -> Record
         if name in clean
     }
     return clean.with_signals(**noisy)
-
-
-def _drawn_readings(truth: Truth, shown: Record, rng: np.random.Generator) -> tuple[Truth, Record]:
-    """Return a truth with drawn numbers and its readings; the same with its own numbers where they cannot be simulated."""
-    drawn = truth.drawn(rng)
-    try:
-        return drawn, predicted(drawn.rival, shown)
-    except SimulationError:
-        return truth, shown
-
-
-def _different(search: Sequence[Scored]) -> tuple[Scored, ...]:
-    """Return the best experiment of each kind."""
-    kinds: dict[str, Scored] = {}
-    for scored in search:
-        kinds.setdefault(scored.experiment.what, scored)
-    return tuple(kinds.values())[:_LISTED]

@@ -71,9 +71,8 @@ class Remainder:
     """What the best model leaves of the readings: the unit in which rivals differ."""
 
     floors: Mapping[str, float]
-    shares: Mapping[
-        str, float
-    ]  # by output: what is left above the floor, of the standard deviation of the reading
+    # By output: what is left above the floor, of the standard deviation of the reading.
+    shares: Mapping[str, float]
     independence: float  # samples per independent one
     samples: Floats  # the remainder in units of its RMS, shape (n_samples, n_outputs)
 
@@ -110,11 +109,6 @@ class Contest:
     remainder: Remainder
     rivals: tuple[Rival, ...]
 
-    @property
-    def best(self) -> Rival:
-        """The most probable model."""
-        return self.rivals[0]
-
 
 @dataclass(frozen=True)
 class Truth:
@@ -141,11 +135,6 @@ class Truth:
             for one in self.contest.rivals
         ]
         return replace(self, rival=rival, contest=replace(self.contest, rivals=tuple(rivals)))
-
-
-def truths_of(contest: Contest) -> list[Truth]:
-    """Return each rival as the truth as often as it is probable."""
-    return [Truth(contest, rival, rival.probability) for rival in contest.rivals]
 
 
 def prepared(campaign: Campaign) -> tuple[FitContext, Windowing]:
@@ -213,13 +202,9 @@ def _weighed(
     given = all(one.probability is not None for one in named)
     costs = [fit.cost for fit in fits]
     first = int(np.argmax([one.probability or 0.0 for one in named]) if given else np.argmin(costs))
-    spread = [
-        np.concatenate([r[n] for r in context.estimation if n in r] or [np.zeros(1)])
-        for n in remainder.floors
-    ]
     errors = {
-        name: float(np.hypot(floor, remainder.shares[name] * np.std(samples)))
-        for (name, floor), samples in zip(remainder.floors.items(), spread, strict=True)
+        name: float(np.hypot(floor, remainder.shares[name] * np.std(_readings(context, name))))
+        for name, floor in remainder.floors.items()
     }
     rivals = []
     for one, fit in zip(named, fits, strict=True):
@@ -251,16 +236,17 @@ def _remainder(context: FitContext, fit: FitResult) -> Remainder:
     shares = {}
     for i, name in enumerate(names):
         if name in context.noise:
-            reading = np.concatenate(
-                [record[name] for record in context.estimation if name in record] or [np.zeros(1)]
-            )
             above = max(float(np.mean(left[:, i] ** 2)) - context.noise[name] ** 2, 0.0)
-            shares[name] = float(np.sqrt(above) / (np.std(reading) or 1.0))
+            shares[name] = float(np.sqrt(above) / (np.std(_readings(context, name)) or 1.0))
     size = np.std(left, axis=0)
     samples = (left - np.mean(left, axis=0)) / np.where(size > 0.0, size, 1.0)
     # The output that repeats itself most decides.
     independence = max(_independence(column) for column in samples.T)
     return Remainder({n: context.noise[n] for n in shares}, shares, independence, samples)
+
+
+def _readings(context: FitContext, name: str) -> Floats:
+    return np.concatenate([r[name] for r in context.estimation if name in r] or [np.zeros(1)])
 
 
 def _independence(samples: Floats) -> float:

@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-from rigsight.plot.channels import channel_plots as channel_plots
 from rigsight.plot.diagnosis import ForceLoop as ForceLoop
 from rigsight.plot.diagnosis import comparison as comparison
 from rigsight.plot.diagnosis import detail_window as detail_window
@@ -18,11 +17,11 @@ from rigsight.plot.drawing import png_bytes as png_bytes
 from rigsight.plot.drawing import style as style
 from rigsight.plot.drawing import svg_text as svg_text
 from rigsight.plot.drawing import with_unit as with_unit
-from rigsight.plot.estimates import AmplitudePanel as AmplitudePanel
-from rigsight.plot.estimates import AmplitudePoint as AmplitudePoint
-from rigsight.plot.estimates import GroupPanel as GroupPanel
-from rigsight.plot.estimates import amplitude_dependence as amplitude_dependence
-from rigsight.plot.estimates import parameters_by_group as parameters_by_group
+from rigsight.plot.fitted_numbers import AmplitudePanel as AmplitudePanel
+from rigsight.plot.fitted_numbers import AmplitudePoint as AmplitudePoint
+from rigsight.plot.fitted_numbers import GroupPanel as GroupPanel
+from rigsight.plot.fitted_numbers import amplitude_dependence as amplitude_dependence
+from rigsight.plot.fitted_numbers import parameters_by_group as parameters_by_group
 from rigsight.plot.frequency_responses import FittedCurve as FittedCurve
 from rigsight.plot.frequency_responses import Panel as Panel
 from rigsight.plot.frequency_responses import bode as bode
@@ -39,9 +38,10 @@ from rigsight.plot.model_comparison import model_errors as model_errors
 from rigsight.plot.model_comparison import model_responses as model_responses
 from rigsight.plot.model_comparison import model_steps as model_steps
 from rigsight.plot.model_comparison import model_styles as model_styles
-from rigsight.plot.plan import planned_experiment as planned_experiment
 from rigsight.plot.rig_picture import PlaceMark as PlaceMark
 from rigsight.plot.rig_picture import rig_picture as rig_picture
+from rigsight.plot.signals import channel_plots as channel_plots
+from rigsight.plot.signals import planned_experiment as planned_experiment
 
 if TYPE_CHECKING:
     # For packages that pass figures on and must not import matplotlib.

@@ -69,8 +69,7 @@ def bode(panels: Sequence[Panel]) -> Figure:
     axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", height_ratios=[3, 2])
     for panel, (top, bottom) in zip(panels, axes.T, strict=True):
         measured = thinned(panel.measured)
-        _draw_magnitude(top, measured, panel.fitted)
-        _draw_phase(bottom, measured, panel.fitted)
+        _draw_path(top, bottom, measured, panel.fitted)
         label_bode(top, bottom, panel.title, measured.unit)
         span(bottom, [measured.omega])
         rises = measured.magnitude[-1] > measured.magnitude[0]
@@ -133,49 +132,48 @@ def decibel(values: Floats) -> Floats:
     return np.asarray(20.0 * np.log10(np.maximum(values, 1e-300)))
 
 
-def _draw_magnitude(ax: Axes, measured: FrequencyResponse, fitted: FittedCurve | None) -> None:
-    """Draw the magnitude of a path [dB] with its bands."""
-    values = [measured.magnitude_db]
+def draw_measured(
+    top: Axes, bottom: Axes, measured: FrequencyResponse, phase: Floats, markersize: float = 3.5
+) -> None:
+    """Draw magnitude [dB] and phase [deg] of a measured response as points with 95 % bands."""
     if measured.variance is not None:
         # A component of the complex error has half of its variance.
-        reach = TWO_SIDED * np.sqrt(0.5 * measured.variance)
-        low, high = decibel(measured.magnitude - reach), decibel(measured.magnitude + reach)
-        ax.fill_between(measured.omega, low, high, color=MEASURED, alpha=0.25, linewidth=0)
-    ax.plot(measured.omega, values[0], ".", color=MEASURED, markersize=3.5, label=measured_label(measured))
+        size, reach = measured.magnitude, TWO_SIDED * np.sqrt(0.5 * measured.variance)
+        band: dict[str, Any] = {"color": MEASURED, "alpha": 0.25, "linewidth": 0}
+        turn = np.degrees(reach / size)
+        top.fill_between(measured.omega, decibel(size - reach), decibel(size + reach), **band)
+        bottom.fill_between(measured.omega, phase - turn, phase + turn, **band)
+    points: dict[str, Any] = {"color": MEASURED, "markersize": markersize}
+    label = "measured, 95 % band" if measured.variance is not None else "measured"
+    top.plot(measured.omega, measured.magnitude_db, ".", label=label, **points)
+    bottom.plot(measured.omega, phase, ".", **points)
+
+
+def _draw_path(top: Axes, bottom: Axes, measured: FrequencyResponse, fitted: FittedCurve | None) -> None:
+    """Draw magnitude [dB] and phase [deg] of a path, measured and fitted, with their bands."""
+    from matplotlib.ticker import MultipleLocator
+
+    values, phase = [measured.magnitude_db], np.degrees(measured.phase)
+    if fitted is not None:
+        branch = np.unwrap(np.angle(fitted.values))
+        # A noisy line cannot turn all that follow by 360 degrees.
+        phase = np.degrees(measured.phase_next_to(fitted.omega, branch))
+    draw_measured(top, bottom, measured, phase)
     if fitted is not None:
         size, reach = np.abs(fitted.values), TWO_SIDED * np.sqrt(0.5) * fitted.std
         low, high = decibel(size - reach), decibel(size + reach)
-        ax.fill_between(fitted.omega, low, high, color=WITH_EFFECT, alpha=0.3, linewidth=0)
+        top.fill_between(fitted.omega, low, high, color=WITH_EFFECT, alpha=0.3, linewidth=0)
         values.append(decibel(size))
-        ax.plot(fitted.omega, values[1], color=WITH_EFFECT, linewidth=1.3, label=fitted.label)
-    limit(ax, np.concatenate(values))
-
-
-def measured_label(measured: FrequencyResponse) -> str:
-    """Return the legend's entry of a measured response, with its band where it has one."""
-    return "measured, 95 % band" if measured.variance is not None else "measured"
-
-
-def _draw_phase(ax: Axes, measured: FrequencyResponse, fitted: FittedCurve | None) -> None:
-    """Draw the phase of a path [deg] with its bands."""
-    from matplotlib.ticker import MultipleLocator
-
-    phase = np.degrees(measured.phase)
-    if fitted is not None:
-        branch = np.unwrap(np.angle(fitted.values))
-        own = np.degrees(branch)
-        # A noisy line cannot turn all that follow by 360 degrees.
-        phase = np.degrees(measured.phase_next_to(fitted.omega, branch))
-        reach = np.degrees(TWO_SIDED * np.sqrt(0.5) * fitted.std / np.abs(fitted.values))
-        ax.fill_between(fitted.omega, own - reach, own + reach, color=WITH_EFFECT, alpha=0.3, linewidth=0)
-        ax.plot(fitted.omega, own, color=WITH_EFFECT, linewidth=1.3, zorder=3)
-    if measured.variance is not None:
-        reach = np.degrees(TWO_SIDED * np.sqrt(0.5 * measured.variance) / measured.magnitude)
-        ax.fill_between(measured.omega, phase - reach, phase + reach, color=MEASURED, alpha=0.25, linewidth=0)
-    ax.plot(measured.omega, phase, ".", color=MEASURED, markersize=3.5)
+        top.plot(fitted.omega, values[1], color=WITH_EFFECT, linewidth=1.3, label=fitted.label)
+        own, turn = np.degrees(branch), np.degrees(reach / size)
+        # Below the band of the measured phase, which may be narrow.
+        band: dict[str, Any] = {"color": WITH_EFFECT, "alpha": 0.3, "linewidth": 0, "zorder": 0.9}
+        bottom.fill_between(fitted.omega, own - turn, own + turn, **band)
+        bottom.plot(fitted.omega, own, color=WITH_EFFECT, linewidth=1.3, zorder=3)
+    limit(top, np.concatenate(values))
     low, high = np.percentile(phase, [1.0, 99.0])
-    ax.set_ylim(45.0 * np.floor(low / 45.0) - 10.0, 45.0 * np.ceil(high / 45.0) + 10.0)
-    ax.yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
+    bottom.set_ylim(45.0 * np.floor(low / 45.0) - 10.0, 45.0 * np.ceil(high / 45.0) + 10.0)
+    bottom.yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
 
 
 def limit(ax: Axes, values: Floats) -> None:
@@ -244,8 +242,7 @@ def response_grid(
 
 def _draw_cell(top: Axes, bottom: Axes, own: FrequencyResponse | None, model: FittedCurve | None) -> None:
     if own is not None:
-        _draw_magnitude(top, thinned(own, _MOST_OF_CELL), model)
-        _draw_phase(bottom, thinned(own, _MOST_OF_CELL), model)
+        _draw_path(top, bottom, thinned(own, _MOST_OF_CELL), model)
         return
     if model is not None:
         size = decibel(np.abs(model.values))

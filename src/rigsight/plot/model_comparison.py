@@ -14,7 +14,6 @@ from rigsight.plot.drawing import (
     FLOOR,
     MEASURED,
     OTHER,
-    TWO_SIDED,
     WITH_EFFECT,
     new_figure,
     panel_grid,
@@ -23,14 +22,7 @@ from rigsight.plot.drawing import (
     shown_in,
     style,
 )
-from rigsight.plot.frequency_responses import (
-    decibel,
-    label_bode,
-    limit,
-    measured_label,
-    span,
-    thinned,
-)
+from rigsight.plot.frequency_responses import draw_measured, label_bode, limit, span, thinned
 from rigsight.records.record import Floats
 
 if TYPE_CHECKING:
@@ -93,22 +85,14 @@ def model_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
 def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Draw magnitude above phase, one column per path: measured as points with its 95 % band, each model as a line."""
     figure, axes = _responses_grid(2, len(panels), len(styles), 5.2)
-    points: dict[str, Any] = {"color": MEASURED, "markersize": 4.0}
     for place, panel in enumerate(panels):
         row, column = divmod(place, axes.shape[1])
         top, bottom = axes[2 * row : 2 * row + 2, column]
         top.sharex(bottom)
         top.tick_params(labelbottom=False)
         measured = thinned(panel.measured)
-        reach = None if measured.variance is None else TWO_SIDED * np.sqrt(0.5 * measured.variance)
         phase = np.degrees(measured.phase)
-        top.plot(measured.omega, measured.magnitude_db, ".", label=measured_label(measured), **points)
-        bottom.plot(measured.omega, phase, ".", **points)
-        if reach is not None:
-            size, turn = measured.magnitude, np.degrees(reach / measured.magnitude)
-            band = {"color": MEASURED, "alpha": 0.25, "linewidth": 0}
-            top.fill_between(measured.omega, decibel(size - reach), decibel(size + reach), **band)
-            bottom.fill_between(measured.omega, phase - turn, phase + turn, **band)
+        draw_measured(top, bottom, measured, phase, markersize=4.0)
         shown, turns = [measured.magnitude_db], [phase]
         for name, response in panel.simulated.items():
             curve = thinned(response)

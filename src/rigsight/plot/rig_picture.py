@@ -13,7 +13,6 @@ from rigsight.plot.rig_symbols import FAINT, INK, SUSPECTED, TEXT, block_size, w
 from rigsight.rigs import Rig
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _MARGIN = 0.12
@@ -136,49 +135,52 @@ class _Sheet:
     def figure(self) -> Figure:
         margin = max(0.0, (_NARROWEST - self._width) / 2.0)
         figure = new_figure(self._width + 2.0 * margin, self._height, layout=None)
-        ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        self._ax = ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         ax.set_axis_off()
         ax.set_xlim(-margin, self._width + margin)
         ax.set_ylim(0.0, self._height)
-        self._draw_couplings(ax)
+        self._draw_couplings()
         for row, body in enumerate(self._content.bodies):
-            self._draw_body(ax, row, body)
-            self._draw_grounded(ax, row)
-            self._draw_between(ax, row)
+            self._draw_body(row, body)
+            self._draw_grounded(row)
+            self._draw_between(row)
         if held := [row for row, joints in self._grounded.items() if joints]:
-            symbols.wall(ax, self._wall, self._bottom[held[-1]], self._top[held[0]])
-        self._draw_left(ax)
+            symbols.wall(self._ax, self._wall, self._bottom[held[-1]], self._top[held[0]])
+        self._draw_left()
         return figure
 
     def _color(self, place: Place) -> str:
         mark = self._mark(place)
         return SUSPECTED if mark is not None and mark.strength >= _SURE else INK
 
-    def _write(self, ax: Axes, place: Place | Body, left: float, middle: float) -> None:
-        write_block(ax, left, middle, place.title, place.lines, self._label(place))
+    def _draw_joint(self, joint: Place, start: symbols.Point, end: symbols.Point) -> None:
+        symbols.joint(self._ax, start, end, joint.spring, joint.damper, self._color(joint))
 
-    def _draw_halo(self, ax: Axes, place: Place | Body, corner: symbols.Point, size: symbols.Point) -> None:
+    def _write(self, place: Place | Body, left: float, middle: float) -> None:
+        write_block(self._ax, left, middle, place.title, place.lines, self._label(place))
+
+    def _draw_halo(self, place: Place | Body, corner: symbols.Point, size: symbols.Point) -> None:
         mark = self._mark(place)
         if mark is not None:
-            symbols.halo(ax, corner, size, mark.strength)
+            symbols.halo(self._ax, corner, size, mark.strength)
 
-    def _draw_body(self, ax: Axes, row: int, body: Body) -> None:
+    def _draw_body(self, row: int, body: Body) -> None:
         corner = (self._body, self._bottom[row])
         size = (self._body_end - self._body, self._top[row] - self._bottom[row])
-        self._draw_halo(ax, body, corner, size)
+        self._draw_halo(body, corner, size)
         dashed: dict[str, Any] = {"linestyle": (0, (4, 2))} if body.kind == "prescribed" else {}
-        symbols.box(ax, corner, size, _FILLS[body.kind], linewidth=1.0, **dashed)
-        self._write(ax, body, self._body + symbols.PAD, (self._top[row] + self._bottom[row]) / 2.0)
+        symbols.box(self._ax, corner, size, _FILLS[body.kind], linewidth=1.0, **dashed)
+        self._write(body, self._body + symbols.PAD, (self._top[row] + self._bottom[row]) / 2.0)
 
-    def _draw_couplings(self, ax: Axes) -> None:
+    def _draw_couplings(self) -> None:
         for upper, lower, what in self._content.couplings:
             x = self._body + 0.14
             ends = (self._bottom[upper], self._top[lower])
-            ax.plot([x, x], ends, color="#aebccb", linewidth=5.0, solid_capstyle="butt")
+            self._ax.plot([x, x], ends, color="#aebccb", linewidth=5.0, solid_capstyle="butt")
             if not self._between[upper]:
-                symbols.write(ax, x + 0.1, sum(ends) / 2.0, what, FAINT, style="italic")
+                symbols.write(self._ax, x + 0.1, sum(ends) / 2.0, what, FAINT, style="italic")
 
-    def _draw_grounded(self, ax: Axes, row: int) -> None:
+    def _draw_grounded(self, row: int) -> None:
         joints = self._grounded[row]
         heights = [self._size(joint)[1] + _JOINT_HEIGHT - symbols.PAD for joint in joints]
         used = sum(heights) + _BETWEEN * max(0, len(joints) - 1)
@@ -187,50 +189,44 @@ class _Sheet:
             text = height - _JOINT_HEIGHT
             left = self._lane_end + 0.1
             self._draw_halo(
-                ax, joint, (left - 0.02, y - height + 0.02), (self._wall - left - 0.06, height - 0.04)
+                joint, (left - 0.02, y - height + 0.02), (self._wall - left - 0.06, height - 0.04)
             )
-            self._write(ax, joint, left, y - text / 2.0 - symbols.PAD / 4.0)
+            self._write(joint, left, y - text / 2.0 - symbols.PAD / 4.0)
             level = y - text - _JOINT_HEIGHT / 2.0
             color = self._color(joint)
-            ax.plot([self._body_end, self._lane_end], [level, level], color=color, linewidth=1.2)
-            symbols.joint(ax, (self._lane_end, level), (self._wall, level), joint.spring, joint.damper, color)
+            self._ax.plot([self._body_end, self._lane_end], [level, level], color=color, linewidth=1.2)
+            self._draw_joint(joint, (self._lane_end, level), (self._wall, level))
             y -= height + _BETWEEN
 
-    def _draw_between(self, ax: Axes, row: int) -> None:
+    def _draw_between(self, row: int) -> None:
         x = self._body + 0.38
         for joint in self._between[row]:
             middle = (self._bottom[row] + self._top[row + 1]) / 2.0
             width, height = self._size(joint)
-            color = self._color(joint)
             if joint in self._long:
                 lane = self._lanes[self._long.index(joint)]
-                self._draw_halo(ax, joint, (lane - 0.12, middle - 0.3), (width + 0.3, 0.6))
-                self._draw_long(ax, joint, lane, color)
-                self._write(ax, joint, lane + 0.2, middle)
+                self._draw_halo(joint, (lane - 0.12, middle - 0.3), (width + 0.3, 0.6))
+                self._draw_long(joint, lane)
+                self._write(joint, lane + 0.2, middle)
                 continue
-            self._draw_halo(ax, joint, (x - 0.14, middle - height / 2.0 + 0.03), (width + 0.2, height - 0.06))
-            symbols.joint(
-                ax, (x, self._bottom[row]), (x, self._top[row + 1]), joint.spring, joint.damper, color
-            )
-            self._write(ax, joint, x + 0.2, middle)
+            self._draw_halo(joint, (x - 0.14, middle - height / 2.0 + 0.03), (width + 0.2, height - 0.06))
+            self._draw_joint(joint, (x, self._bottom[row]), (x, self._top[row + 1]))
+            self._write(joint, x + 0.2, middle)
             x += width + 0.3
 
-    def _draw_long(self, ax: Axes, joint: Place, lane: float, color: str) -> None:
+    def _draw_long(self, joint: Place, lane: float) -> None:
         first, last = joint.bodies[0], joint.bodies[-1]
+        look: dict[str, Any] = {"color": self._color(joint), "linewidth": 1.2}
         offset = _LANE * (self._long.index(joint) + 0.6)
         start, stop = self._bottom[first] + offset, self._top[last] - offset
-        symbols.joint(
-            ax, (lane, self._bottom[first]), (lane, self._top[first + 1]), joint.spring, joint.damper, color
-        )
-        ax.plot([self._body_end, lane, lane], [start, start, self._bottom[first]], color=color, linewidth=1.2)
-        ax.plot([lane, lane, self._body_end], [self._top[first + 1], stop, stop], color=color, linewidth=1.2)
+        self._draw_joint(joint, (lane, self._bottom[first]), (lane, self._top[first + 1]))
+        self._ax.plot([self._body_end, lane, lane], [start, start, self._bottom[first]], **look)
+        self._ax.plot([lane, lane, self._body_end], [self._top[first + 1], stop, stop], **look)
         for row in joint.bodies[1:-1]:
             level = self._top[row] - offset
-            ax.plot(
-                [self._body_end, lane], [level, level], color=color, linewidth=1.2, marker="o", markersize=2.5
-            )
+            self._ax.plot([self._body_end, lane], [level, level], marker="o", markersize=2.5, **look)
 
-    def _draw_left(self, ax: Axes) -> None:
+    def _draw_left(self) -> None:
         middles: dict[str, float] = {}
         lane = self._body - 0.2
         drives = {drive.name for drive in self._content.drives}
@@ -243,40 +239,38 @@ class _Sheet:
             )
             y = (self._top[row] + self._bottom[row] + used) / 2.0
             if body.input is not None:
-                symbols.write(ax, self._left_end - 0.3, y - 0.1, body.input, ha="right")
-                symbols.arrow(ax, [(self._left_end - 0.24, y - 0.1), (self._body, y - 0.1)], INK)
+                symbols.write(self._ax, self._left_end - 0.3, y - 0.1, body.input, ha="right")
+                symbols.arrow(self._ax, [(self._left_end - 0.24, y - 0.1), (self._body, y - 0.1)], INK)
                 y -= 0.2 + _BETWEEN
             for place, height in zip(places, heights, strict=True):
                 middles[place.name] = y - height / 2.0
                 if len(place.bodies) > 1:
                     lane -= _LANE
-                self._draw_place(ax, place, y, height, lane, place.name in drives)
+                self._draw_place(place, y, height, lane, place.name in drives)
                 y -= height + _BETWEEN
             if body.reads:
                 lane -= _LANE
-                self._draw_reading_state(ax, row, body, lane)
-        self._draw_signals(ax, middles)
+                self._draw_reading_state(row, body, lane)
+        self._draw_signals(middles)
 
-    def _draw_reading_state(self, ax: Axes, row: int, body: Body, lane: float) -> None:
+    def _draw_reading_state(self, row: int, body: Body, lane: float) -> None:
         """Draw which bodies the rate of a state reads."""
         level = self._top[row] - 0.07
         for read in body.reads:
             start = self._bottom[read] + 0.07
-            ax.plot([self._body, lane, lane], [start, start, level], color=FAINT, linewidth=0.8)
-            ax.plot(self._body, start, marker="o", markersize=3.0, color=FAINT)
-        symbols.arrow(ax, [(lane, level), (self._body, level)], FAINT, width=0.8)
+            self._ax.plot([self._body, lane, lane], [start, start, level], color=FAINT, linewidth=0.8)
+            self._ax.plot(self._body, start, marker="o", markersize=3.0, color=FAINT)
+        symbols.arrow(self._ax, [(lane, level), (self._body, level)], FAINT, width=0.8)
 
-    def _draw_place(
-        self, ax: Axes, place: Place, top: float, height: float, lane: float, is_drive: bool
-    ) -> None:
+    def _draw_place(self, place: Place, top: float, height: float, lane: float, is_drive: bool) -> None:
         corner, size = (self._left, top - height), (self._left_end - self._left, height)
-        self._draw_halo(ax, place, corner, size)
+        self._draw_halo(place, corner, size)
         color, middle = self._color(place), top - height / 2.0
         if is_drive:
-            symbols.box(ax, corner, size, "#fdf3e3", color, linewidth=1.0)
+            symbols.box(self._ax, corner, size, "#fdf3e3", color, linewidth=1.0)
         else:
-            symbols.flag(ax, corner, size, color)
-        self._write(ax, place, self._left + symbols.PAD + _NOTCH * (not is_drive), middle)
+            symbols.flag(self._ax, corner, size, color)
+        self._write(place, self._left + symbols.PAD + _NOTCH * (not is_drive), middle)
         first, *others = place.bodies or (0,)
         level = min(max(middle, self._bottom[first] + 0.05), self._top[first] - 0.05)
         ends = [(self._body, level)]
@@ -284,20 +278,20 @@ class _Sheet:
         for index, end in enumerate(ends):
             way = [(self._left_end, middle), end] if index == 0 else [(lane, middle), (lane, end[1]), end]
             if is_drive:
-                symbols.arrow(ax, way, color, width=1.8)
+                symbols.arrow(self._ax, way, color, width=1.8)
             else:
-                ax.plot([x for x, _ in way], [y for _, y in way], color=FAINT, linewidth=0.8)
-                ax.plot(*end, marker="o", markersize=3.0, color=FAINT)
+                self._ax.plot([x for x, _ in way], [y for _, y in way], color=FAINT, linewidth=0.8)
+                self._ax.plot(*end, marker="o", markersize=3.0, color=FAINT)
 
-    def _draw_signals(self, ax: Axes, middles: Mapping[str, float]) -> None:
+    def _draw_signals(self, middles: Mapping[str, float]) -> None:
         lane = self._left - 0.2
         for drive in self._content.drives:
             count, middle = len(drive.inputs) + len(drive.sensors), middles[drive.name]
             slots = [middle + 0.14 * ((count - 1) / 2.0 - index) for index in range(count)]
             for name, level in zip(drive.inputs, slots, strict=False):
-                symbols.write(ax, self._input_right, level, name, ha="right")
-                symbols.arrow(ax, [(self._input_right + 0.05, level), (self._left, level)], INK)
+                symbols.write(self._ax, self._input_right, level, name, ha="right")
+                symbols.arrow(self._ax, [(self._input_right + 0.05, level), (self._left, level)], INK)
             for name, level in zip(drive.sensors, slots[len(drive.inputs) :], strict=True):
                 way = [(self._left, middles[name]), (lane, middles[name]), (lane, level), (self._left, level)]
-                symbols.arrow(ax, way, FAINT, dashed=True)
+                symbols.arrow(self._ax, way, FAINT, dashed=True)
                 lane -= _LANE

@@ -61,10 +61,8 @@ def box(ax: Axes, corner: Point, size: Point, fill: str, edge: str = INK, **styl
     """Draw a rectangle with rounded corners."""
     from matplotlib.patches import FancyBboxPatch
 
-    patch = FancyBboxPatch(
-        corner, *size, boxstyle="round,pad=0,rounding_size=0.05", facecolor=fill, edgecolor=edge, **style
-    )
-    ax.add_patch(patch)
+    look = {"boxstyle": "round,pad=0,rounding_size=0.05", "facecolor": fill, "edgecolor": edge, **style}
+    ax.add_patch(FancyBboxPatch(corner, *size, **look))
 
 
 def flag(ax: Axes, corner: Point, size: Point, edge: str) -> None:
@@ -80,13 +78,8 @@ def flag(ax: Axes, corner: Point, size: Point, edge: str) -> None:
 
 def halo(ax: Axes, corner: Point, size: Point, strength: float) -> None:
     """Color the background of a suspected place, the more the stronger the suspicion."""
-    from matplotlib.patches import FancyBboxPatch
-
-    patch = FancyBboxPatch(
-        corner, *size, boxstyle="round,pad=0.05,rounding_size=0.08", facecolor=SUSPECTED, edgecolor="none"
-    )
-    patch.set(alpha=0.08 + 0.2 * strength, zorder=0.5)
-    ax.add_patch(patch)
+    style = {"boxstyle": "round,pad=0.05,rounding_size=0.08", "alpha": 0.08 + 0.2 * strength, "zorder": 0.5}
+    box(ax, corner, size, SUSPECTED, "none", **style)
 
 
 def joint(ax: Axes, start: Point, end: Point, spring: bool, damper: bool, color: str) -> None:

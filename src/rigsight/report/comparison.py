@@ -40,14 +40,6 @@ _OVERALL_FILE = "errors.svg"
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One error as text, and whether it is the smallest of its column."""
-
-    text: str
-    is_best: bool
-
-
-@dataclass(frozen=True)
 class View:
     """A table of one record, or of all."""
 
@@ -57,7 +49,9 @@ class View:
     facts: str  # role, kind and amplitude of the record
     heads: list[str]  # label of each column
     floor: list[str]  # noise floor of each column
-    rows: dict[str, list[Cell]]  # model -> cells
+    rows: dict[
+        str, list[tuple[str, bool]]
+    ]  # model -> each error, and whether it is the smallest of its column
     figures: list[PageFigure]  # what goes with it
     notes: list[str]  # what is to be known about it
 
@@ -77,7 +71,7 @@ def comparison_summary(comparison: Comparison) -> Summary:
     """Return the tables of a comparison: the best of each column in bold green, with a star where there is no color."""
 
     def lines(text: Writer, width: int) -> Iterator[RenderableType]:
-        overall, *records = _views(comparison, ())
+        overall, *records = _views(comparison)
         yield text(f"Compared: {comparison.title}", "bold green")
         for view in (*records, overall):
             yield text("")
@@ -95,34 +89,31 @@ def comparison_summary(comparison: Comparison) -> Summary:
     return Summary(lines)
 
 
-def _views(comparison: Comparison, figures: Sequence[ComparisonFigure]) -> Iterator[View]:
-    yield comparison_view(comparison, None, figures)
-    for record in comparison.records:
-        yield comparison_view(comparison, record.record.name, figures)
+def _views(comparison: Comparison, figures: Sequence[ComparisonFigure] = ()) -> list[View]:
+    """Return the table of all records, then of each one."""
+    return [_view(comparison, number, figures) for number in range(len(comparison.records) + 1)]
 
 
-def comparison_view(
-    comparison: Comparison, record: str | None, figures: Sequence[ComparisonFigure] = ()
-) -> View:
-    """Return the table of one record, or of all of them where `record` is None."""
+def _view(comparison: Comparison, number: int, figures: Sequence[ComparisonFigure]) -> View:
+    """Return the table of one record by its number, from 1; of all of them for 0."""
+    record, facts, notes = None, "", []
+    if number:
+        found = comparison.records[number - 1]
+        own, notes = found.record, list(found.notes)
+        amplitude = "" if own.amplitude is None else f", amplitude {own.amplitude:g}"
+        record, facts = own.name, f"{own.role}, {own.kind}{amplitude}"
     columns = comparison.columns(record)
     table = comparison.overall() if record is None else comparison.table(record)
     winners = {column: best(table, column) for column in columns}
-    facts, notes, number = "", [], 0
-    for i, own in enumerate(comparison.records, 1):
-        if own.record.name == record:
-            amplitude = "" if own.record.amplitude is None else f", amplitude {own.record.amplitude:g}"
-            facts, notes, number = f"{own.record.role}, {own.record.kind}{amplitude}", list(own.notes), i
     return View(
-        key="overall" if record is None else f"record-{number}",
+        key=f"record-{number}" if number else "overall",
         title=_ALL if record is None else record,
         facts=facts,
         heads=[column_label(column) for column in columns],
         floor=[error_text(comparison.floor(column, record), column.quantity) for column in columns],
         rows={
             name: [
-                Cell(error_text(row.get(column), column.quantity), name in winners[column])
-                for column in columns
+                (error_text(row.get(column), column.quantity), name in winners[column]) for column in columns
             ]
             for name, row in table.items()
         },
@@ -146,8 +137,8 @@ def _tables(view: View, text: Writer, width: int) -> Iterator[Table]:
             table.add_column(text(head), justify="right", max_width=_CELL_WIDTH - 1)
         for name, cells in view.rows.items():
             shown = [
-                text(f"{cell.text}{'*' if cell.is_best else ' '}", "bold green" if cell.is_best else "")
-                for cell in cells[part]
+                text(f"{error}{'*' if is_best else ' '}", "bold green" if is_best else "")
+                for error, is_best in cells[part]
             ]
             table.add_row(text(name), *shown)
         table.add_row(text(_FLOOR, "dim"), *(text(f"{floor} ", "dim") for floor in view.floor[part]))
@@ -287,9 +278,9 @@ def _step_panels(comparison: Comparison, record: RecordComparison, names: list[s
 
 def comparison_html(comparison: Comparison) -> str:
     """Return the errors of all models over all records, the smallest of each column marked with a star."""
-    overall = comparison_view(comparison, None)
+    overall = _view(comparison, 0, ())
     rows = [
-        (name, *(f"{cell.text}{' *' if cell.is_best else ''}" for cell in cells))
+        (name, *(f"{error}{' *' if is_best else ''}" for error, is_best in cells))
         for name, cells in overall.rows.items()
     ]
     table = (("model", *overall.heads), [*rows, ("noise floor", *overall.floor)])

@@ -34,13 +34,12 @@ _ID = re.compile(r' id="([^"]+)"')
 _REFERENCE = re.compile(r'(url\(#|xlink:href="#)([^")]+)')
 _NOISE = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->", re.DOTALL)
 _NAMESPACES = re.compile(r' xmlns(:xlink)?="[^"]*"')
-_SIZE = re.compile(r'(<svg\b[^>]*?) width="[^"]*"([^>]*?)')
+_SIZE = re.compile(r' (width|height)="[^"]*"')
 _PATH = re.compile(r'(?<=\bd=")[^"]+')
 _PLACE = re.compile(r'(?<= [xy]=")[^"]+')
 _BEFORE_LETTER = re.compile(r" ?([A-Za-z]) ?")
 _BETWEEN_TAGS = re.compile(r">\s+<")
 _FURTHER_DIGITS = re.compile(r"(\.\d\d)\d+")
-_HEIGHT = re.compile(r'(<svg\b[^>]*?) height="[^"]*"')
 _LEAST = 0.05
 """Probability from which another candidate's place is colored; below it, it is no rival (95 % are accounted for)."""
 _UNEXPLAINED = "unexplained"
@@ -83,7 +82,8 @@ def _svg(figure: Figure, key: str, alt: str) -> Markup:
     needed = {name for _, name in _REFERENCE.findall(text)}
     text = _ID.sub(lambda found: f' id="{key}-{found[1]}"' if found[1] in needed else "", text)
     text = _REFERENCE.sub(rf"\g<1>{key}-\2", text).replace("xlink:href", "href")
-    text = _HEIGHT.sub(r"\1", _SIZE.sub(r"\1\2", text, count=1), count=1)
+    # The page decides how large a figure is: the first two sizes are those of the figure itself.
+    text = _SIZE.sub("", text, count=2)
     # A hundredth of a point is finer than any screen or printer; matplotlib writes a millionth.
     text = _PLACE.sub(lambda place: _FURTHER_DIGITS.sub(r"\1", place[0]), _PATH.sub(_short_path, text))
     text = _BETWEEN_TAGS.sub("><", text)
@@ -116,21 +116,19 @@ def suspected_places(diagnosis: Diagnosis, rig: Rig) -> dict[str, plot.PlaceMark
     """Return how strongly each joint, drive, sensor or state of a rig is suspected."""
     # What the verdict names has strength 1; a rival has the probability of the candidates that act there.
     strengths: dict[tuple[str, bool], float] = {}
-    labels: dict[tuple[str, bool], list[str]] = {}
+    labels: dict[tuple[str, bool], dict[str, None]] = {}
     for candidate in diagnosis.candidates:
         for place in {place for where in candidate.where for place in _named(rig, where)}:
             strengths[place] = strengths.get(place, 0.0) + candidate.probability
-    for effect, where in zip(diagnosis.effects, diagnosis.where, strict=False):
+    causes = [effect_label(kind_of(effect)) for effect in diagnosis.effects]
+    if diagnosis.verdict == "unknown":
+        causes = [_UNEXPLAINED] * len(diagnosis.where)
+    for cause, where in zip(causes, diagnosis.where, strict=False):
         for place in _named(rig, where):
             strengths[place] = 1.0
-            labels.setdefault(place, []).append(effect_label(kind_of(effect)))
-    if diagnosis.verdict == "unknown":
-        for name in diagnosis.where:
-            for place in _named(rig, name):
-                strengths[place] = 1.0
-                labels[place] = [_UNEXPLAINED]
+            labels.setdefault(place, {})[cause] = None
     return {
-        name: plot.PlaceMark(min(strength, 1.0), listed(labels.get((name, is_state), [])), is_state)
+        name: plot.PlaceMark(min(strength, 1.0), listed(labels.get((name, is_state), ())), is_state)
         for (name, is_state), strength in sorted(strengths.items(), key=lambda item: item[1])
         if strength >= _LEAST
     }

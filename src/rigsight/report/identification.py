@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import RenderableType
@@ -20,9 +20,11 @@ from rigsight.identify.identification import (
     RecordIdentification,
     RecordScore,
 )
-from rigsight.identify.linear_view import LinearView, Mode
+from rigsight.identify.linear_view import LinearView
+from rigsight.identify.transfer.physical_parameters import PhysicalEstimates
 from rigsight.plot import with_unit
 from rigsight.records.record import Floats
+from rigsight.report import labels
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.labels import (
     ERRORS_HOLD,
@@ -37,6 +39,7 @@ from rigsight.report.labels import (
 )
 from rigsight.report.render import NotebookTable, notebook_html, rendered
 from rigsight.report.terminal import Summary, Writer, pairs, worth_knowing
+from rigsight.simulate.linearization import Linearization
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,15 +137,11 @@ def _by_amplitude(found: Identification) -> list[RecordIdentification]:
 def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
     """Yield subject and words: the numbers of the joint fit, and how it follows each record."""
     fit, reached = found.joint.fit.fit, {bound.name: bound.side for bound in found.reached}
-    for name in found.joint.names:
-        reported = estimate_text(
-            Estimate(fit.values[name], fit.standard_errors[name], found.units.get(name, ""))
-        )
+    for name, estimate in _estimates(found.joint.names, fit, found.units).items():
+        reported = estimate_text(estimate)
         yield name, f"{reported}, at its {reached[name]} bound" if name in reached else reported
     if found.joint.pooled is not None:
-        errors = found.joint.pooled.standard_errors
-        for name, value in found.joint.pooled.values.items():
-            estimate = Estimate(value, errors[name], found.units.get(name, ""))
+        for name, estimate in _estimates(found.joint.pooled.values, found.joint.pooled, found.units).items():
             yield name, f"{estimate_text(estimate)}, mean of the records' own"
     if found.joint.conicity is not None:
         yield "delta_0", found.joint.conicity.statement
@@ -156,7 +155,7 @@ def linear_rows(found: Identification) -> Iterator[tuple[str, str]]:
         for c in found.identifiability.combinations:
             yield c.text, estimate_text(Estimate(c.value, c.std, c.unit))
     for view in found.views:
-        at = ", ".join(f"{name} = {value:g}" for name, value in view.constants.items())
+        at = _constants_text(view)
         for mode in view.modes:
             frequency = estimate_text(Estimate(mode.natural_frequency, mode.frequency_std, "rad/s"))
             damping = (
@@ -180,8 +179,8 @@ def _score_text(score: RecordScore) -> str:
 def hysteresis_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]]:
     """Yield subject and words: parameters with their standard errors, and what follows from them."""
     fit = found.calibration.fit
-    for name in fit.free:
-        yield name, estimate_text(Estimate(fit.values[name], fit.standard_errors[name], found.units[name]))
+    for name, estimate in _estimates(fit.free, fit, found.units).items():
+        yield name, estimate_text(estimate)
     for name, value in found.held.items():
         yield name, f"{value:.4g}{behind(found.units[name])}, held"
     yield from derived_rows(found)
@@ -244,7 +243,12 @@ def render_identification(
         all_determined=len(reported.determined) == len(names) and fit.success,
         n_determined=len(reported.determined),
         n_parameters=len(names),
-        views=_views(identification, drawings),
+        views=list(zip(identification.views, _figures(identification.views, drawings), strict=True)),
+        labels=labels,
+        constants_text=_constants_text,
+        stable=_STABLE,
+        place=_place,
+        polynomial=_polynomial,
         parameters=_parameters(names, fit, identification.units, identification.meanings),
         combinations=[
             parameter_row(c.text, Estimate(c.value, c.std, c.unit), description=f"of {', '.join(c.members)}")
@@ -252,7 +256,14 @@ def render_identification(
         ],
         errors_hold=ERRORS_HOLD,
         outputs=list(dict.fromkeys(name for score in joint.scores for name in score.nrmse)),
-        hysteresis=None if hysteresis is None else _hysteresis(hysteresis),
+        hysteresis=hysteresis,
+        of_hysteresis=_parameters(
+            hysteresis.calibration.fit.free, hysteresis.calibration.fit, hysteresis.units, hysteresis.meanings
+        )
+        if hysteresis
+        else [],
+        derived_rows=derived_rows,
+        error_rows=error_rows,
         amplitudes=figure,
     )
 
@@ -261,96 +272,49 @@ def _parameters(
     names: Iterable[str], fit: FitResult, units: Mapping[str, str], meanings: Mapping[str, str]
 ) -> list[ParameterRow]:
     return [
-        parameter_row(
-            name,
-            Estimate(fit.values[name], fit.standard_errors[name], units.get(name, "")),
-            description=meanings.get(name, ""),
-        )
-        for name in names
+        parameter_row(name, estimate, description=meanings.get(name, ""))
+        for name, estimate in _estimates(names, fit, units).items()
     ]
 
 
-def _hysteresis(found: HysteresisIdentification) -> dict[str, Any]:
-    fit = found.calibration.fit
+def _estimates(
+    names: Iterable[str], fit: FitResult | PhysicalEstimates, units: Mapping[str, str]
+) -> dict[str, Estimate]:
     return {
-        "statement": found.statement,
-        "parameters": _parameters(fit.free, fit, found.units, found.meanings),
-        "held": ", ".join(f"{name} = {value:.4g}" for name, value in found.held.items()),
-        "derived": list(derived_rows(found)),
-        "errors": list(error_rows(found)),
+        name: Estimate(fit.values[name], fit.standard_errors[name], units.get(name, "")) for name in names
     }
 
 
-def _views(identification: Identification, drawings: Sequence[Figure]) -> list[dict[str, Any]]:
-    found, remaining = [], iter(drawings)
-    for number, view in enumerate(identification.views, 1):
-        found.append(
-            {
-                "title": ", ".join(f"{name} = {value:g}" for name, value in view.constants.items()),
-                "figure": None if view.measured is None else _figure(view, next(remaining), number),
-                "problems": [
-                    f"{source} \u2192 {response}: {problem}"
-                    for (source, response), problem in (
-                        view.measured.problems if view.measured else {}
-                    ).items()
-                ],
-                "modes": [_mode(mode) for mode in view.modes],
-                "stability": _STABLE[view.linearization.stability],
-                "at": _place(view),
-                "transfer_functions": [
-                    _transfer_function(view, source, response)
-                    for source in view.linearization.inputs
-                    for response in view.linearization.outputs
-                ],
-            }
+def _figures(views: Sequence[LinearView], drawings: Sequence[Figure]) -> Iterator[PageFigure | None]:
+    remaining = iter(drawings)
+    for number, view in enumerate(views, 1):
+        if view.measured is None:
+            yield None
+            continue
+        shown = "; ".join(
+            f"{source} to {response}: peak {20.0 * math.log10(float(curve.magnitude.max())):.3g} dB at "
+            f"{float(curve.omega[int(np.argmax(curve.magnitude))]):.3g} rad/s"
+            for (source, response), curve in view.measured.found.items()
         )
-    return found
+        yield page_figure(
+            next(remaining),
+            f"responses-{number}",
+            shown or "No frequency response was measured.",
+            "Magnitude and phase of each sensor's response to each input: measured from all records together (gray, with 95 % "
+            "bands), and that of the fitted equations, linearized at equilibrium (blue).",
+        )
 
 
-def _figure(view: LinearView, drawing: Figure, number: int) -> PageFigure:
-    shown = "; ".join(
-        f"{source} to {response}: peak {20.0 * math.log10(float(curve.magnitude.max())):.3g} dB at "
-        f"{float(curve.omega[int(np.argmax(curve.magnitude))]):.3g} rad/s"
-        for (source, response), curve in (view.measured.found if view.measured else {}).items()
-    )
-    caption = (
-        "Magnitude and phase of each sensor's response to each input: measured from all records together (gray, with 95 % "
-        "bands), and that of the fitted equations, linearized at equilibrium (blue)."
-    )
-    return page_figure(
-        drawing, f"responses-{number}", shown or "No frequency response was measured.", caption
-    )
+def _constants_text(view: LinearView) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in view.constants.items())
 
 
-def _place(view: LinearView) -> str:
-    linear = view.linearization
+def _place(linear: Linearization) -> str:
     pairs = [
         *zip(linear.inputs, linear.at_inputs, strict=True),
         *zip(linear.states, linear.at_state, strict=True),
     ]
     return ", ".join(f"{name} = {float(value):.4g}" for name, value in pairs if value != 0.0) or "all at zero"
-
-
-def _mode(mode: Mode) -> dict[str, Any]:
-    real, imaginary = mode.pole.real, mode.pole.imag
-    return {
-        "pole": (f"{real:.4g} \u00b1 {imaginary:.4g} i" if imaginary else f"{real:.4g}").replace(
-            "-", "\u2212"
-        ),
-        "frequency": written(mode.natural_frequency, mode.frequency_std),
-        "damping": None
-        if not math.isfinite(mode.damping_ratio)
-        else written(mode.damping_ratio, mode.damping_std),
-    }
-
-
-def _transfer_function(view: LinearView, source: str, response: str) -> dict[str, str]:
-    found = view.linearization.transfer_function(source, response)
-    return {
-        "path": f"{source} \u2192 {response}",
-        "numerator": _polynomial(found.numerator),
-        "denominator": _polynomial(found.denominator),
-    }
 
 
 def _polynomial(coefficients: Floats) -> str:

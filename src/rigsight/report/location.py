@@ -5,29 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rigsight import plot
-from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPart, StatePart
+from rigsight.diagnose.location.gap_parts import AmplitudePart, BandPart, GapPart, PathPart, StatePart
 from rigsight.diagnose.result import Diagnosis
-from rigsight.effects import kind_of
 from rigsight.records.stamps import written_span
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.labels import (
-    TIMES,
-    effect_label,
-    family_label,
-    gap_percent,
-    listed,
-    percent,
-    rig_of,
-    sentence_case,
-    unit_text,
-)
+from rigsight.report.labels import gap_percent, listed, percent, rig_of, sentence_case, unit_text
 from rigsight.report.sections import output_label
 from rigsight.report.wording import stage_names, stages_reported
 
+if TYPE_CHECKING:
+    from rigsight.plot import Figure
+
 _JOINTS_SHOWN = 3
-_LAWS_SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -39,24 +31,15 @@ class OutputMaps:
     figures: list[PageFigure]
 
 
-def path_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the legs of the signal path as text."""
-    rows = []
-    for part in diagnosis.localization.by_path:
-        delay = f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
-        shift = delay if math.isfinite(part.shift) else ""
-        rows.append(
-            {
-                "path": part.path.replace("->", "\u2192"),
-                "before": gap_percent(part.before),
-                "reidentified": gap_percent(part.reidentified),
-                "noise_floor": gap_percent(part.noise_floor),
-                "noise_share": percent(part.noise_share),
-                "times": f"{part.reidentified / part.noise_floor:.3g} {TIMES}",
-                "shift": shift.replace("-", "\u2212"),
-            }
-        )
-    return rows
+def shift_text(part: PathPart) -> str:
+    """Return the delay with which a leg of the signal path follows best, and its gap then; empty where none was tested."""
+    delay = f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
+    return delay.replace("-", "\u2212") if math.isfinite(part.shift) else ""
+
+
+def all_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
+    """Return all figures of the section: the missing force, each output, the joints."""
+    return [*force_maps(diagnosis), *output_maps(diagnosis), *joint_maps(diagnosis)]
 
 
 def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
@@ -112,22 +95,6 @@ def force_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
     return [OutputMaps("where-missing-force", "Missing force, before any law", figures)]
 
 
-def law_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return what each family explains of the missing force alone, beyond chance, the largest share first."""
-    if diagnosis.missing_force is None:
-        return []
-    found = diagnosis.missing_force
-    return [
-        (
-            sentence_case(family_label(cause)),
-            effect_label(kind_of(cause.effect.name)),
-            percent(cause.share),
-        )
-        for cause in found.alone[:_LAWS_SHOWN]
-        if cause.share > found.by_chance
-    ]
-
-
 def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     where = diagnosis.localization
     stages = stage_names(diagnosis)
@@ -140,7 +107,11 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         (part for part in where.by_amplitude if part.output == output), key=lambda p: (p.amplitude, p.scored)
     )
     one_record_each = 1 < len(amplitudes) == len(records) and all(len(p.records) == 1 for p in amplitudes)
-    figures = []
+    figures: list[PageFigure] = []
+
+    def add(drawing: Figure, of: str, alt: str, caption: str) -> None:
+        figures.append(page_figure(drawing, f"{key}-{of}", alt, caption))
+
     if bands:
         spread = (
             "spread over frequency as in the stretches that contain only noise"
@@ -152,16 +123,14 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             for p in bands
         ]
         named = [(f"{limit} rad/s", part) for limit, part in zip(limits, bands, strict=True)]
-        figures.append(
-            page_figure(
-                plot.gap_bars(
-                    bands, [_band(p) for p in bands], stages, "frequency [rad/s]", "gap in the band [%]"
-                ),
-                f"{key}-bands",
-                f"Bars of the gap by band of frequency. {_reported(named, diagnosis)}",
-                f"By frequency. {_largest(named, rest)} The squares of the bars add up to the square of the gap; the "
-                f"noise floor is {spread}.",
-            )
+        add(
+            plot.gap_bars(
+                bands, [_band(p) for p in bands], stages, "frequency [rad/s]", "gap in the band [%]"
+            ),
+            "bands",
+            f"Bars of the gap by band of frequency. {_reported(named, diagnosis)}",
+            f"By frequency. {_largest(named, rest)} The squares of the bars add up to the square of the gap; the noise floor is "
+            f"{spread}.",
         )
     if states:
         figures.append(_states_figure(states, output, _motion(diagnosis), key, rest))
@@ -169,38 +138,31 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         labels = [f"{_size(p)}\n{'scored' if p.scored else 'fitted'}" for p in amplitudes]
         spoken = list(zip((label.replace("\n", " ") for label in labels), amplitudes, strict=True))
         which = "; ".join(f"{_size(p)} {p.records[0]}" for p in amplitudes)
-        figures.append(
-            page_figure(
-                plot.gap_bars(amplitudes, labels, stages, "amplitude of the input"),
-                f"{key}-amplitudes",
-                f"Bars of the gap by amplitude of the input. {_reported(spoken, diagnosis)}",
-                f"By amplitude of the input, each relative to the motion there{f': {which}' if one_record_each else ''}.",
-            )
+        add(
+            plot.gap_bars(amplitudes, labels, stages, "amplitude of the input"),
+            "amplitudes",
+            f"Bars of the gap by amplitude of the input. {_reported(spoken, diagnosis)}",
+            f"By amplitude of the input, each relative to the motion there{f': {which}' if one_record_each else ''}.",
         )
     # Where each amplitude is one record, the picture is the same.
     if len(records) > 1 and not one_record_each:
         labels = [str(i) for i, _ in enumerate(records, start=1)]
-        figures.append(
-            page_figure(
-                plot.gap_bars(records, labels, stages, "record"),
-                f"{key}-records",
-                f"Bars of the gap by record. {_reported([(p.record, p) for p in records], diagnosis)}",
-                "By record, each relative to its own motion: "
-                + "; ".join(f"{i} {p.record} ({p.role})" for i, p in enumerate(records, start=1))
-                + ".",
-            )
+        which = "; ".join(f"{i} {p.record} ({p.role})" for i, p in enumerate(records, start=1))
+        add(
+            plot.gap_bars(records, labels, stages, "record"),
+            "records",
+            f"Bars of the gap by record. {_reported([(p.record, p) for p in records], diagnosis)}",
+            f"By record, each relative to its own motion: {which}.",
         )
     if times:
         worst_time = max(times, key=lambda p: p.reidentified)
-        figures.append(
-            page_figure(
-                plot.gap_times(times, stages),
-                f"{key}-times",
-                f"Steps of the gap over time, {rest} largest with {gap_percent(worst_time.reidentified)} from "
-                f"{written_span(worst_time.t_start, worst_time.t_end)} of {worst_time.record}; noise floor "
-                f"{gap_percent(worst_time.noise_floor)}.",
-                "Over time within each scored record, relative to the motion of all of them.",
-            )
+        add(
+            plot.gap_times(times, stages),
+            "times",
+            f"Steps of the gap over time, {rest} largest with {gap_percent(worst_time.reidentified)} from "
+            f"{written_span(worst_time.t_start, worst_time.t_end)} of {worst_time.record}; noise floor "
+            f"{gap_percent(worst_time.noise_floor)}.",
+            "Over time within each scored record, relative to the motion of all of them.",
         )
     return figures
 

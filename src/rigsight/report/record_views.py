@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
@@ -49,56 +49,28 @@ _BELOW = 3.0
 """Decibel below the lowest measured line that are still shown, and above the highest."""
 
 
-@dataclass(frozen=True)
-class RecordView:
-    """One record."""
-
-    key: str  # anchor in the page
-    # Name, and role, kind, amplitude, length in words.
-    title: str
-    facts: str
-    rows: list[tuple[str, str]]  # output, and the error of each stage in words
-    charts: list[figures.Chart]  # each output over time, then each signal path over frequency
-    missing: list[str] = field(default_factory=list)  # outputs that the record lacks
-    is_open: bool = True  # false for records that are folded away at first
-
-
-def record_views(
+def record_charts(
     diagnosis: Diagnosis, responses: Mapping[str, tuple[PathResponse, ...]]
-) -> Iterator[RecordView]:
-    """Yield the records, those that were scored first and open."""
+) -> Iterator[tuple[Trace, list[figures.Chart]]]:
+    """Yield the records, those that were scored first: each output over time, then each signal path over frequency."""
     names = figures.curve_names(diagnosis)
-    stages = stage_names(diagnosis)
     n_pictures = sum(len(trace.measured) for trace in diagnosis.traces)
     most_points = figures.points_per_curve(2 * len(names) * n_pictures)
     ordered = sorted(diagnosis.traces, key=lambda trace: trace.role != diagnosis.scored_on)
     for index, trace in enumerate(ordered, start=1):
-        key = f"record-{index}"
-        yield RecordView(
-            key=key,
-            title=trace.record,
-            facts=_facts(diagnosis, trace),
-            rows=[
-                (output_label(diagnosis, output), _errors(trace, output, stages)) for output in trace.measured
-            ],
-            charts=[
-                *(
-                    _time_chart(diagnosis, trace, output, names, most_points, f"{key}-output-{i}")
-                    for i, output in enumerate(trace.measured, start=1)
-                ),
-                *(
-                    response_chart(trace.record, response, names, f"{key}-path-{i}")
-                    for i, response in enumerate(responses.get(trace.record, ()), start=1)
-                ),
-            ],
-            missing=[
-                output_label(diagnosis, output) for output in diagnosis.gap if output not in trace.measured
-            ],
-            is_open=trace.role == diagnosis.scored_on,
-        )
+        charts = [
+            _time_chart(diagnosis, trace, output, names, most_points, f"record-{index}-output-{i}")
+            for i, output in enumerate(trace.measured, start=1)
+        ]
+        charts += [
+            response_chart(trace.record, response, names, f"record-{index}-path-{i}")
+            for i, response in enumerate(responses.get(trace.record, ()), start=1)
+        ]
+        yield trace, charts
 
 
-def _errors(trace: Trace, output: str, stages: Mapping[Stage, str]) -> str:
+def record_errors(trace: Trace, output: str, stages: Mapping[Stage, str]) -> str:
+    """Return the error of each stage in words."""
     return ", ".join(
         f"{name} {gap_percent(nrmse(-trace.residual(stage, output), trace.measured[output]))}"
         for stage, name in stages.items()
@@ -195,7 +167,8 @@ def record_drawing(diagnosis: Diagnosis, trace: Trace, output: str) -> Figure:
     return plot.comparison(diagnosis, trace, output, stages=drawn)
 
 
-def _facts(diagnosis: Diagnosis, trace: Trace) -> str:
+def record_facts(diagnosis: Diagnosis, trace: Trace) -> str:
+    """Return role, kind, amplitude and length in words."""
     inputs = list(trace.inputs)
     unit = diagnosis.units.get(inputs[0], "") if inputs else ""
     scale = plot.display_scale(unit, abs(trace.amplitude or 0.0))

@@ -18,21 +18,8 @@ from markupsafe import Markup, escape
 
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.report import labels, location, sections, wording
+from rigsight.report import labels, location, record_views, sections, wording
 from rigsight.report.figures import loop_figures, rig_figure
-from rigsight.report.labels import (
-    TIMES,
-    Written,
-    effect_label,
-    effect_of,
-    effects_label,
-    gap_percent,
-    percent,
-    rig_of,
-    sentence_case,
-)
-from rigsight.report.record_views import amplitude_figures, record_responses, record_views
-from rigsight.report.wording import advice_sentences, stage_names
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.printing.notation import mathml_equation
@@ -53,7 +40,7 @@ def render_report(
 ) -> str:
     """Return the report as one HTML page; `origin` is what repeats it, see `workflow.reproduce`."""
     known = known_effects(own_effects)
-    responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
+    responses = {trace.record: record_views.record_responses(diagnosis, trace) for trace in diagnosis.traces}
     script = _script()
     # The name by which the page's policy allows this one script and no other.
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
@@ -65,32 +52,20 @@ def render_report(
         diagnosis=diagnosis,
         origin=origin,
         origin_text=json.dumps(origin),
-        quality=diagnosis.data_quality,
         labels=labels,
         wording=wording,
-        stages=stage_names(diagnosis),
-        outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
-        effects=sections.effect_summaries(diagnosis, known),
+        sections=sections,
+        record_views=record_views,
+        stages=wording.stage_names(diagnosis),
+        outputs={output: sections.output_label(diagnosis, output) for output in diagnosis.gap},
+        known=known,
         rig_figure=rig_figure(diagnosis),
-        budget=sections.budget_figure(diagnosis),
-        budget_rows=sections.budget_rows(diagnosis),
-        path_rows=location.path_rows(diagnosis),
-        law_rows=location.law_rows(diagnosis),
-        maps=[
-            *location.force_maps(diagnosis),
-            *location.output_maps(diagnosis),
-            *location.joint_maps(diagnosis),
-        ],
-        ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
-        parameters=sections.parameter_rows(diagnosis, known),
-        errors_reported=sections.errors_reported(diagnosis),
-        trust=sections.trust_view(diagnosis),
+        maps=location.all_maps(diagnosis),
         equations=equation_groups(diagnosis, known),
-        amplitude_figures=amplitude_figures(diagnosis, responses),
+        amplitude_figures=record_views.amplitude_figures(diagnosis, responses),
         loops=loop_figures(diagnosis),
-        records=list(record_views(diagnosis, responses)),
-        advice=advice_sentences(diagnosis),
-        floors=sections.floor_rows(diagnosis),
+        records=list(record_views.record_charts(diagnosis, responses)),
+        advice=wording.advice_sentences(diagnosis),
         script=Markup(script),
         script_hash=f"sha256-{digest}",
     )
@@ -136,12 +111,14 @@ def environment(*packages: str) -> Environment:
     made.filters |= {
         "unit": _unit,
         "number": _number,
-        "percent": percent,
-        "gap": gap_percent,
-        "case": sentence_case,
-        "effects": lambda names: sentence_case(effects_label(names)),
+        "percent": labels.percent,
+        "gap": labels.gap_percent,
+        "case": labels.sentence_case,
+        "effects": lambda names: labels.sentence_case(labels.effects_label(names)),
+        "is_finite": math.isfinite,
+        "shift": location.shift_text,
         "arrows": lambda text: text.replace("->", "\u2192"),
-        "floors": lambda error: f"{error:.3g} {TIMES}" if math.isfinite(error) else "not scored",
+        "floors": lambda error: f"{error:.3g} {labels.TIMES}" if math.isfinite(error) else "not scored",
         # The heads of a table: title -> class of its column.
         "merged": lambda heads, *more: dict(chain(heads.items(), *(own.items() for own in more))),
     }
@@ -161,7 +138,7 @@ def _unit(unit: str) -> Markup:
     return Markup("".join(raised))
 
 
-def _number(number: Written) -> Markup:
+def _number(number: labels.Written) -> Markup:
     """Return a number as ``(3.100 ± 0.020) · 10<sup>5</sup>``."""
     text = escape(number.value.replace("-", "\u2212"))
     if number.std:
@@ -188,10 +165,10 @@ def known_effects(own: Iterable[Effect] = ()) -> dict[str, Effect]:
 
 def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[EquationGroup]:
     """Return the equations of the rig, then those of each effect of the diagnosed simulation, in the order of the signal path."""
-    rig = rig_of(diagnosis)
+    rig = labels.rig_of(diagnosis)
     # What the given simulation had already is in the model beside what was added.
     names = dict.fromkeys([*diagnosis.model.get("effects", ()), *diagnosis.effects])
-    effects = [effect_of(name, known) for name in names]
+    effects = [labels.effect_of(name, known) for name in names]
     named = [effect for effect in effects if effect is not None]
     if rig is None or len(named) < len(effects):
         return []
@@ -200,10 +177,10 @@ def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[E
 
 def equations_of(rig: Rig, effects: Sequence[Effect]) -> list[EquationGroup]:
     """Return the equations of a rig, then those of each effect on it, in the order of the signal path."""
-    shown = shown_equations(compose(rig, effects), effect_label)
+    shown = shown_equations(compose(rig, effects), labels.effect_label)
     return [
         EquationGroup(
-            sentence_case(rig.name.replace("_", " ") if owner is None else effect_label(owner)),
+            labels.sentence_case(rig.name.replace("_", " ") if owner is None else labels.effect_label(owner)),
             [Markup(mathml_equation(equation, shown.names)) for equation in equations],
         )
         for owner, equations in shown.of_owners.items()

@@ -8,8 +8,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rigsight import plot
-from rigsight.diagnose.location.trace import STAGES
-from rigsight.diagnose.noise.detection import NoiseFloor
 from rigsight.diagnose.result import Diagnosis
 from rigsight.diagnose.trust.estimates import PORTION, RECORD, WINDOW_LENGTH
 from rigsight.diagnose.trust.patterns import Pattern
@@ -29,14 +27,6 @@ TRUST_COLUMNS = ("parameter", "by", "group", "value", "std", "unit", "pattern", 
 _BY = {PORTION: "part of the records", WINDOW_LENGTH: "window length"}
 _MOST_PANELS = 6
 _NAMED_IN_A_LINE = 3
-
-
-def effect_summaries(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[tuple[str, str, str]]:
-    """Return label, name and summary of every effect named; the summary of one that is not among the known is empty."""
-    return [
-        (labels.sentence_case(labels.effect_label(name)), name, effect.summary if effect is not None else "")
-        for name, effect in ((name, labels.effect_of(name, known)) for name in diagnosis.effects)
-    ]
 
 
 def budget_drawing(diagnosis: Diagnosis) -> Figure:
@@ -67,20 +57,6 @@ def budget_figure(diagnosis: Diagnosis) -> PageFigure:
         f"Waterfall of the gap. {alt}",
         f"How the gap shrinks, step by step; the dashed line is the error of a perfect model.{meaning}",
     )
-
-
-def budget_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the gap budget as text, one row per output."""
-    return [
-        {
-            "output": output_label(diagnosis, output),
-            **{stage: labels.gap_percent(getattr(gap, stage)) for stage in STAGES},
-            "noise_floor": labels.gap_percent(gap.noise_floor),
-            "closed": labels.percent(gap.closed),
-            "intervals": {stage: interval_text(limits, stage) for stage, limits in gap.intervals.items()},
-        }
-        for output, gap in diagnosis.gap.items()
-    ]
 
 
 def interval_text(limits: tuple[float, float], stage: str) -> str:
@@ -156,32 +132,6 @@ def errors_reported(diagnosis: Diagnosis) -> str:
     )
 
 
-def floor_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the noise floor of each output in display units, and how it was found."""
-    rows = []
-    for floor in diagnosis.noise_floors:
-        scale = plot.display_scale(floor.unit, floor.std)
-        rows.append(
-            {
-                "output": output_label(diagnosis, floor.output),
-                "std": f"{floor.std * scale.factor:.3g}" if math.isfinite(floor.std) else "not finite",
-                "unit": scale.unit,
-                "method": floor.method + _disturbing(floor),
-            }
-        )
-    return rows
-
-
-def _disturbing(floor: NoiseFloor) -> str:
-    found = floor.disturbance
-    if found is None:
-        return ""
-    return (
-        f". The error of the model above it corresponds to a random force of {found.std:.2g} {found.unit} added to the drive, up "
-        f"to {found.below:.3g} rad/s"
-    )
-
-
 def output_label(diagnosis: Diagnosis, output: str) -> str:
     """Return an output for people: ``"yaw angle psi"``; the bare name on a rig that is not ours."""
     rig = labels.rig_of(diagnosis)
@@ -201,22 +151,19 @@ def _parameters(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Iterator[P
             yield replace(parameter, name=f"{name}.{parameter.name}")
 
 
-def trust_view(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Return figure and rows of the section; None where the question was not asked."""
-    # There is no figure where no number was estimated in two groups.
-    if diagnosis.trust is None:
+def trust_figure(diagnosis: Diagnosis) -> PageFigure | None:
+    """Return the numbers by group; None where none was estimated in two groups."""
+    drawn = _drawn(diagnosis)
+    if not drawn:
         return None
-    figure = None
-    if drawn := _drawn(diagnosis):
-        reported = "; ".join(f"{number.name}: {_how(number)}" for number in drawn)
-        figure = page_figure(
-            trust_drawing(diagnosis),
-            "figure-trust",
-            f"Parameters estimated from single groups of records, with 95 % intervals. {reported}.",
-            "Each parameter as estimated from one record, level or window alone, with 95 % intervals. Dashed line with band: the "
-            "common fit.",
-        )
-    return {"figure": figure, "rows": [_row(number) for number in diagnosis.trust.parameters]}
+    reported = "; ".join(f"{number.name}: {how(number)}" for number in drawn)
+    return page_figure(
+        trust_drawing(diagnosis),
+        "figure-trust",
+        f"Parameters estimated from single groups of records, with 95 % intervals. {reported}.",
+        "Each parameter as estimated from one record, level or window alone, with 95 % intervals. Dashed line with band: the "
+        "common fit.",
+    )
 
 
 def trust_drawing(diagnosis: Diagnosis) -> Figure:
@@ -246,7 +193,7 @@ def trust_line(diagnosis: Diagnosis) -> str:
     differing = [number for number in diagnosis.trust.parameters if not number.stable]
     if not differing:
         return f"Trust: {diagnosis.trust.statement}"
-    reported = [f"{number.name} {_how(number)}" for number in differing[:_NAMED_IN_A_LINE]]
+    reported = [f"{number.name} {how(number)}" for number in differing[:_NAMED_IN_A_LINE]]
     more = len(differing) - len(reported)
     rest = f"; {more} more {'differs' if more == 1 else 'differ'}" if more > 0 else ""
     first = differing[0].points_to
@@ -277,7 +224,8 @@ def _shown(number: ParameterTrust) -> str:
     return by_pattern.get(number.pattern, RECORD if RECORD in number.groups else WINDOW_LENGTH)
 
 
-def _how(number: ParameterTrust) -> str:
+def how(number: ParameterTrust) -> str:
+    """Return how a number differs between groups, in words."""
     if number.pattern is Pattern.UNKNOWN:
         return "not compared"
     if number.stable:
@@ -289,16 +237,3 @@ def _how(number: ParameterTrust) -> str:
         Pattern.TIME: f"{number.moves} from record to record",
     }
     return words.get(number.pattern, f"{number.moves} with {' and '.join(number.goes_with)}")
-
-
-def _row(number: ParameterTrust) -> dict[str, Any]:
-    p_value = f"{number.p_value:.2g}" if number.p_value > 1e-6 else "< 1e-6"
-    found = number.points_to
-    return {
-        "name": number.name,
-        "number": labels.written(number.value, number.std),
-        "unit": number.unit,
-        "same": labels.sentence_case(_how(number)),
-        "p_value": "" if number.pattern is Pattern.UNKNOWN else p_value,
-        "cause": "" if found is None else f"{labels.sentence_case(found.cause)}. Next: {found.experiment}",
-    }

@@ -17,7 +17,7 @@ from rigsight.errors import RigsightError
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.fit.windows import cut, window_length
 from rigsight.plot import svg_text
-from rigsight.plot.discovery import discovery_figure
+from rigsight.plot.fitted_numbers import discovery_figure
 from rigsight.records import Record
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import MODEL_FILE

@@ -1,7 +1,8 @@
-"""The figure of a planned experiment: its inputs, the readings to be expected, and what each rival leaves of them."""
+"""Figures of signals over time: the channels of a measured file as they stand in it, and a planned experiment."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,18 +16,40 @@ from rigsight.plot.drawing import (
     WITH_EFFECT,
     line,
     new_figure,
+    panel_grid,
     shown_in,
     style,
     with_unit,
 )
+from rigsight.records.formats.channel import Channel, as_floats
 from rigsight.units import INPUT_UNIT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLORS = (WITH_EFFECT, GIVEN, REIDENTIFIED, OTHER)
+_CHANNEL_WIDTH, _CHANNEL = 8.0, 1.1
 _WIDTH, _PANEL = 7.0, 1.7
-"""Sizes [inch]."""
+"""Of one plot [inch]."""
+_COLORS = (WITH_EFFECT, GIVEN, REIDENTIFIED, OTHER)
+
+
+@style()
+def channel_plots(channels: Sequence[Channel], time: Channel | None) -> Figure:
+    """Draw channels over their own time, over the channel that is time, or over their samples, each in a plot of its own."""
+    figure = new_figure(_CHANNEL_WIDTH, _CHANNEL * len(channels) + 0.3)
+    for ax, channel in zip(panel_grid(figure, len(channels), 1), channels, strict=True):
+        values = as_floats(channel.load())
+        stamps, label = np.arange(float(values.size)), "sample"
+        if channel.axis is not None:
+            stamps, label = channel.axis.stamps(), f"time [{channel.axis.unit}]"
+        elif time is not None and time.n_samples == values.size:
+            stamps, label = as_floats(time.load()), time.name
+        line(ax, stamps, values, color=MEASURED, linewidth=0.8)
+        ax.set_title(with_unit(channel.name, channel.unit or ""))
+        ax.grid(visible=True)
+        ax.margins(x=0.0)
+    ax.set_xlabel(label)
+    return figure
 
 
 @style()

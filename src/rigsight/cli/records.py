@@ -1,4 +1,4 @@
-"""The command ``rigsight init``."""
+"""The commands on measured files and records, before any fit: ``inspect``, ``init`` and ``check``."""
 
 from __future__ import annotations
 
@@ -9,14 +9,109 @@ import typer
 
 from rigsight.cli import options
 from rigsight.cli.exit_codes import report_errors
-from rigsight.cli.terminal import show_as_json
-from rigsight.workflow.run.progress import listening
+from rigsight.cli.options import with_groups
+from rigsight.cli.terminal import command_line, show, show_as_json, table
+from rigsight.errors import InputError
 
 if TYPE_CHECKING:
+    from rich.console import Group
+    from rich.table import Table
+
+    from rigsight.check import Check
+    from rigsight.records.channel_summary import ChannelSummary
     from rigsight.workflow.init import Draft, ModelDraft
+    from rigsight.workflow.inspect import Inspection
+
+_NAME_WIDTH = 16
+"""Of the columns of names, at least, where they are as long."""
 
 
+@with_groups
+def inspect(
+    *,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="A measured file: CSV, MATLAB, HDF5, MDF4, TDMS, Parquet, UFF, JSON, ROS bag (MCAP too) or ULog.",
+        ),
+    ],
+    picture: Annotated[
+        Path | None,
+        options.optional("FILE", "none", "Plot the channels into a PNG or SVG file as well."),
+    ] = None,
+    rigs: options.OwnRigs = None,
+    output: options.Output,
+) -> None:
+    """Show the channels of a measured file with units, sample rates, ranges and gaps, and propose its entry in a campaign."""
+    with report_errors(output.debug):
+        from rigsight.plot import encoded
+        from rigsight.workflow.inspect import channel_picture, run_inspect
+        from rigsight.workflow.own.own_rigs import own_rigs
+        from rigsight.workflow.run.results import write_picture
+
+        found = run_inspect(file, own_rigs(rigs or []).values())
+        if picture is not None:
+            write_picture(picture, lambda suffix: encoded(channel_picture(file), suffix, file.name))
+    if output.json:
+        show_as_json(found.to_json())
+    elif not output.quiet:
+        show(_channel_table(found))
+        for name, (step, gaps) in found.times.items():
+            told_gaps = "does not increase" if step is None else f"step {step:.6g}, {gaps} gaps"
+            typer.echo(f"Time '{name}': {told_gaps}")
+        for channel in found.channels:
+            for remark in channel.remarks:
+                typer.echo(f"'{channel.name}' {remark}.")
+        for refused in found.refused:
+            typer.echo(f"No signal: '{refused.name}' {refused.reason}")
+        typer.echo(f'\nFor a campaign with model = "{found.model}":\n\n{found.proposal}', nl=False)
+
+
+def _channel_table(found: Inspection) -> Table:
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    from rigsight.records.stamps import written_stamp
+
+    def number(value: float | None) -> str:
+        return "" if value is None else f"{value:.5g}"
+
+    def end(channel: ChannelSummary, stamp: float | None) -> str:
+        return "" if stamp is None else written_stamp(stamp, channel.dt or 0.0, fewest=5)
+
+    listed = found.channels
+    columns = {
+        "channel": [escape(c.name) for c in listed],
+        "unit": [escape(c.unit or "") for c in listed],
+        "samples": [str(c.n_samples) for c in listed],
+        "rate": [f"{1.0 / c.dt:.6g}" if c.dt else "" for c in listed],
+        "from": [end(c, c.t0) for c in listed],
+        "to": [end(c, c.t1) for c in listed],
+        "minimum": [number(c.minimum) for c in listed],
+        "maximum": [number(c.maximum) for c in listed],
+        "gaps": [str(c.n_gaps or "") for c in listed],
+        "not finite": [str(c.n_not_finite or "") for c in listed],
+    }
+    # A column that is empty for all channels is left out.
+    columns = {name: cells for name, cells in columns.items() if name == "channel" or any(cells)}
+    title = escape(f"{found.file} ({found.format})")
+    table = Table(title=title, box=box.SIMPLE, title_justify="left", collapse_padding=True)
+    for name, cells in columns.items():
+        if name in ("channel", "unit"):
+            # Without a least width, numbers would leave a narrow terminal no room for the names.
+            table.add_column(name, overflow="fold", min_width=min(max(map(len, cells)), _NAME_WIDTH))
+        else:
+            table.add_column(name, justify="right", no_wrap=True)
+    for row in zip(*columns.values(), strict=True):
+        table.add_row(*row)
+    return table
+
+
+@with_groups
 def init(
+    *,
     folder: Annotated[
         Path | None,
         typer.Argument(
@@ -69,17 +164,14 @@ def init(
     ] = False,
     rigs: options.OwnRigs = None,
     simulator: options.Simulators = None,
-    json: options.Json = False,
-    quiet: options.Quiet = False,
-    debug: options.Debug = False,
+    output: options.Output,
 ) -> None:
     """Write a commented campaign.toml for the measured files of a folder.
 
     Signals, units, kinds, amplitudes and roles are guessed; comments in the file mark each guess. An existing campaign is not
     overwritten. With --mjcf, the rig file of a robot model is written as well and checked against MuJoCo.
     """
-    with report_errors(debug), listening(quiet) as listener:
-        from rigsight.errors import InputError
+    with output.reporting() as listener:
         from rigsight.workflow.init import run_init, run_init_from_mjcf
         from rigsight.workflow.own.own_rigs import own_simulators
 
@@ -107,9 +199,9 @@ def init(
             own_simulators(simulator or [])
             drafted = run_init(folder, model=model, rig_files=rigs or [], listener=listener)
             content, lines = _of_campaign(drafted, folder)
-    if json:
+    if output.json:
         show_as_json(content)
-    elif not quiet:
+    elif not output.quiet:
         for line in lines:
             typer.echo(line)
 
@@ -195,10 +287,56 @@ def _of_robot(written: ModelDraft, folder: Path, as_it_is: bool) -> tuple[dict[s
 
 
 def _of_joint(option: str, text: str, number: str, example: str) -> tuple[str, float]:
-    from rigsight.errors import InputError
-
     joint, _, value = text.rpartition("=")
     try:
         return joint, float(value)
     except ValueError:
         raise InputError(f"{option}: got '{text}'; write JOINT={number}, for instance {example}.") from None
+
+
+@with_groups
+def check(
+    *,
+    campaign: options.Campaign,
+    out: options.ResultsFolder = Path("check"),
+    effect: Annotated[
+        list[str] | None,
+        options.effect("Compare only this effect with the others that are named. May be repeated."),
+    ] = None,
+    own: options.OwnParts,
+    output: options.Output,
+) -> None:
+    """Say in seconds what the records can show: their faults, the parameters they determine, the effects they tell apart.
+
+    CAMPAIGN may be a rig file: then a simulated sweep takes the place of records. Writes check.json and check.html into DIR.
+    """
+    with output.reporting() as listener:
+        from rigsight.workflow.check import CHECK_FILE, CHECK_PAGE, run_check
+
+        read, command = own.named(effect, listener), command_line()
+        found = run_check(campaign, out, **read, listener=listener, command=command)
+    files = {"Page": out / CHECK_PAGE, "Results": out / CHECK_FILE}
+    output.show(out / CHECK_FILE, lambda: _check_summary(found), files)
+
+
+def _check_summary(found: Check) -> Group:
+    from rich.console import Group
+    from rich.markup import escape
+
+    from rigsight.report.check_and_plan import check_headline, forms, rivals
+
+    findings = [(r.severity, f"{r.sentence} {r.remedy}") for r in found.remarks if r.severity != "note"]
+    apart = []
+    for rival in rivals(found.matrix):
+        words = [rival.visible] if rival.visible else []
+        words += [f"{by}: {names}" for by, names in rival.others]
+        apart.append((rival.effect, rival.where, "; ".join(words)))
+    alike = [f"Forms of {family} that are not told apart: {names}." for family, names in forms(found.matrix)]
+    heads = ("Effect", "Where", "Not told apart from")
+    effects = [table(heads, apart)] if apart else ["All families of effects can be told apart."]
+    return Group(
+        check_headline(found),
+        *([table(("", "Finding"), findings)] if findings else []),
+        found.identifiability,
+        *([found.matrix.reason] if found.matrix.reason else [*effects, *map(escape, alike)]),
+    )
