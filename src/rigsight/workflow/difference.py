@@ -19,9 +19,14 @@ from rigsight.plot import GroupPanel, parameters_by_group, png_bytes
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.differing.identified import unit_of_records, with_effects_of
 from rigsight.workflow.differing.rows import FALSE_ALARMS, Row, Verdict, rows_of
-from rigsight.workflow.differing.units import Unit, read_unit, refuse_other_rigs
+from rigsight.workflow.differing.units import (
+    Unit,
+    read_unit,
+    refuse_other_rigs,
+    unit_of_records,
+    with_effects_of,
+)
 from rigsight.workflow.identification.rig import identify_rig
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, silent

@@ -1,20 +1,26 @@
-"""What did a diagnosis find? Its numbers with their errors and their scatter between its records, read from its folder."""
+"""What did a diagnosis find, or what do the records of a campaign give?
+
+Numbers with their errors and their scatter between records, read from the folder of a diagnosis or of an identification.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from rigsight.campaign import Campaign
 from rigsight.compare.usual_gap import Prediction
 from rigsight.diagnose.trust.patterns import Role, roles
 from rigsight.effects import Effect, Family
 from rigsight.errors import InputError
+from rigsight.identify.identification import Identification
 from rigsight.rigs import Rig
+from rigsight.simulate import Structure, compose
 from rigsight.workflow.campaign.model_file import json_object, read_model
 from rigsight.workflow.run.results import DIAGNOSIS_FILE
 
@@ -125,33 +131,71 @@ def read_unit(folder: Path, own_effects: Iterable[Effect], own_rigs: Iterable[Ri
     candidate = next((one for one in own if one.where == found.where), own[0] if own else None)
     if candidate is None:
         raise InputError(f"{file}: candidates: none has the effects of the verdict. {_MEND}")
-    structure = model.structure
+    return _unit(
+        str(folder),
+        found.rig,
+        model.structure,
+        {name: _read_number(name, estimate, found.trust) for name, estimate in candidate.parameters.items()},
+        {name: estimate.unit for name, estimate in candidate.parameters.items()},
+    )
+
+
+def _unit(
+    name: str, rig: str, structure: Structure, numbers: Mapping[str, Known], units: Mapping[str, str]
+) -> Unit:
     families = {
         structure.parameter_name(effect, p.name): effect.family
         for effect in structure.effects
         for p in effect.parameters
     }
-    return Unit(
-        str(folder),
-        found.rig,
-        structure.effect_names,
-        {name: _known(name, estimate, found.trust) for name, estimate in candidate.parameters.items()},
-        {name: estimate.unit for name, estimate in candidate.parameters.items()},
-        {**roles(structure.rig, []), **families},
-    )
+    return Unit(name, rig, structure.effect_names, numbers, units, {**roles(structure.rig, []), **families})
 
 
-def _known(name: str, estimate: _Estimate, trust: _Trust | None) -> Known:
-    groups = (
-        [] if trust is None else [p.by_group.get("record", []) for p in trust.parameters if p.name == name]
-    )
-    alone = [(g.value, g.std**2) for own in groups for g in own if g.std is not None and g.std > 0.0]
+def _read_number(name: str, estimate: _Estimate, trust: _Trust | None) -> Known:
+    parameters = [] if trust is None else [p for p in trust.parameters if p.name == name]
+    alone = [(g.value, g.std) for p in parameters for g in p.by_group.get("record", [])]
     pairs = [] if trust is None else [pair.names for pair in trust.entangled if name in pair.names]
-    between = Prediction.of(*map(np.array, zip(*alone, strict=True))).between if len(alone) > 1 else 0.0
-    return Known(
-        estimate.value,
-        np.inf if estimate.std is None else estimate.std,
-        between,
-        len(alone),
-        tuple(other for names in pairs for other in names if other != name),
+    entangled = tuple(other for names in pairs for other in names if other != name)
+    return _known(estimate.value, np.inf if estimate.std is None else estimate.std, alone, entangled)
+
+
+def _known(
+    value: float, std: float, alone: Iterable[tuple[float, float | None]], entangled: tuple[str, ...] = ()
+) -> Known:
+    """Return a number with what each record alone gives, with its standard error."""
+    determined = [(own, error**2) for own, error in alone if error is not None and 0.0 < error < np.inf]
+    between = 0.0
+    if len(determined) > 1:
+        between = Prediction.of(*map(np.array, zip(*determined, strict=True))).between
+    return Known(value, std, between, len(determined), entangled)
+
+
+def unit_of_records(name: str, campaign: Campaign, identification: Identification) -> Unit:
+    """Return what the records of a campaign give: one set of numbers for all records, and a fit of each alone."""
+    joint, fit = identification.joint, identification.joint.fit
+
+    def known(number: str) -> Known:
+        alone = [(k.fit.values[number], k.fit.standard_errors.get(number)) for k in fit.kinds]
+        return _known(fit.fit.values[number], fit.fit.standard_errors[number], alone)
+
+    return _unit(
+        name,
+        campaign.rig.name,
+        compose(campaign.rig, campaign.modelled),
+        {number: known(number) for number in joint.names},
+        {number: identification.units[number] for number in joint.names},
     )
+
+
+def with_effects_of(
+    campaign: Campaign, models: Iterable[tuple[Sequence[Effect], Mapping[str, float]]]
+) -> Campaign:
+    """Return a campaign whose model has the effects of all these models, each with the values where it was first."""
+    for effects, values in models:
+        names = {effect.name for effect in campaign.modelled}
+        added = tuple(effect for effect in effects if effect.name not in names)
+        modelled = (*campaign.modelled, *added)
+        own = {p.name: values[p.name] for p in compose(campaign.rig, modelled).parameters if p.name in values}
+        if added:
+            campaign = replace(campaign, modelled=modelled, parameters={**own, **campaign.parameters})
+    return campaign
