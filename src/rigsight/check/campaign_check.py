@@ -37,6 +37,7 @@ _OF_EFFECTS, _OF_PARAMETERS = 3000, 40000
 """Samples of the most excited stretches of all records together for effects and for parameters: a second each."""
 PARTS = ("channels", "noise floors", "remarks", "parameters", "effects")
 """Steps of a check, as they are reported."""
+_OF_FLOORS = ("output", "unit", "std", "method", "lower_bound")
 Status = Literal["determined", "weak", "only with others", "not determined"]
 _WEAK = 0.1
 """Relative standard error from which a parameter is known badly (a convention)."""
@@ -88,16 +89,7 @@ class Check:
                 {**vars(r), "channels": [{**vars(c), "usable": c.usable} for c in r.channels]}
                 for r in self.records
             ],
-            "noise": [
-                {
-                    "output": f.output,
-                    "unit": f.unit,
-                    "std": f.std,
-                    "method": f.method,
-                    "lower_bound": f.lower_bound,
-                }
-                for f in self.floors
-            ],
+            "noise": [{key: getattr(f, key) for key in _OF_FLOORS} for f in self.floors],
             "findings": [vars(remark) for remark in self.remarks],
             "amplitudes": [answer.to_json() for answer in self.amplitudes],
             "parameters": [vars(parameter) for parameter in self.parameters],
@@ -120,7 +112,17 @@ class Check:
 
 
 def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[[str], None]) -> Check:
-    """Return what the records of a campaign can show of effects at their places; `say` is called with each of `PARTS`."""
+    """Return what the records of a campaign can show.
+
+    Parameters
+    ----------
+    campaign
+        Read and checked.
+    effects
+        Candidates at their places.
+    say
+        Called with each of `PARTS` that is done.
+    """
     rig = campaign.rig
     records = tuple(checked_record(rig, record) for record in campaign.records)
     say(PARTS[0])
@@ -207,10 +209,10 @@ def _parameters(
     fit = GreyBoxFit(structure, windows, scales, noise)
     result = fit.fit({**values}, free, max_evaluations=_EVALUATIONS, tolerance=1e-3)
     if not result.residuals:
-        return (
-            (),
-            "The equations cannot be simulated at these numbers, so what the records determine is not known.",
+        why = (
+            "The equations cannot be simulated at these numbers, so what the records determine is not known."
         )
+        return (), why
     found = identifiability(information(fit, result))
     units = {p.name: p.unit for p in structure.parameters}
     return tuple(

@@ -33,18 +33,32 @@ _OPEN: Sequence[Told] = ("other motion", "by size", "alike")
 
 @dataclass(frozen=True)
 class EffectMatrix:
-    """Pairs of effects, in the order of the catalogue."""
+    """Pairs of effects, in the order of the catalogue.
 
-    # Name, family and place of each effect.
+    Attributes
+    ----------
+    effects, families, where
+        Name, family and place of each effect.
+    visible
+        Whether each effect shows beside the parameters in these records.
+    told
+        Whether the effects of a row and a column can be told apart.
+    motions
+        Of pairs that another motion tells apart, the first motion that does.
+    not_judged
+        Names of the effects that only fits of the simulation find.
+    reason
+        Why there is no matrix; empty where there is one.
+    """
+
     effects: tuple[str, ...] = ()
     families: tuple[Family, ...] = ()
     where: tuple[str, ...] = ()
-    visible: tuple[Visible, ...] = ()  # whether each effect shows beside the parameters in these records
-    told: tuple[tuple[Told, ...], ...] = ()  # whether the effects of a row and a column can be told apart
-    # Of pairs that another motion tells apart, the first motion that does.
+    visible: tuple[Visible, ...] = ()
+    told: tuple[tuple[Told, ...], ...] = ()
     motions: Mapping[tuple[int, int], str] = field(default_factory=dict)
-    not_judged: tuple[str, ...] = ()  # names of the effects that only fits of the simulation find
-    reason: str = ""  # why there is no matrix; empty where there is one
+    not_judged: tuple[str, ...] = ()
+    reason: str = ""
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
@@ -149,14 +163,21 @@ def _other_motions(
 
 @dataclass(frozen=True)
 class Holes:
-    """Effects of different families or places that records leave open together."""
+    """Effects of different families or places that records leave open together.
 
-    effects: tuple[
-        str, ...
-    ]  # their names, the one with the most open pairs first; empty where nothing is open
-    # Whether one of them does not show beside the parameters at some or all sizes, so that no effect is their rival, too.
+    Attributes
+    ----------
+    effects
+        Their names, the one with the most open pairs first; empty where nothing is open.
+    hidden
+        Whether one of them does not show beside the parameters at some or all sizes, so that no effect is their rival, too.
+    others
+        Names of further effects that are open.
+    """
+
+    effects: tuple[str, ...]
     hidden: bool
-    others: tuple[str, ...]  # names of further effects that are open
+    others: tuple[str, ...]
 
 
 def holes_of(matrix: EffectMatrix, most: int) -> Holes:

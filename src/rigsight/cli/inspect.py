@@ -14,8 +14,7 @@ from rigsight.cli.terminal import show, show_as_json
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rigsight.records.channel_summary import ChannelSummary
-    from rigsight.workflow.inspect import Inspection
+    from rigsight.workflow.inspect import ChannelSummary, Inspection
 
 
 _NAME_WIDTH = 16

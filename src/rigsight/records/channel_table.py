@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +101,11 @@ def _opened(
             raise InputError(f"{path.name} is not delimited text, so {key} does not apply; remove {key}.")
     with open_channels(path) as file:
         yield file
+
+
+def open_measurement(path: Path) -> AbstractContextManager[ChannelFile]:
+    """Open a file of any format, delimited text included, for a look; its channels can be read inside this context."""
+    return nullcontext(TextColumns(path).tolerant()) if file_format(path) is None else open_channels(path)
 
 
 class _Selection:

@@ -21,7 +21,6 @@ from rigsight.records.conditioning import (
     TimeBase,
     between,
     check_long_enough,
-    one_stretch,
     stretches,
     time_base,
 )
@@ -129,7 +128,7 @@ def read_stretches(
     free = [output.name for output in outputs if not require_outputs or output.name not in needed]
     # A column that was mapped by hand is meant to be there.
     spare = [signal for signal in (*options.absent_inputs, *free, *beside) if signal not in columns]
-    table = _joint_table(path, {TIME: time, **wanted}, spare, options, TIME in columns)
+    table = _joint_table(path, {TIME: time, **wanted}, spare, options)
     absent = [signal.name for signal in recorded if signal.name not in table.values]
     may_rest = kind == "operation" and options.amplitude is None
     if absent:
@@ -190,11 +189,15 @@ def read_stretches(
     # If nothing drives the rig and nothing was measured, only time gives the number of samples.
     kept = [*raw] or [TIME]
     measured = [output.name for output in outputs if output.name in raw] if require_outputs else []
-    cut = stretches(path.name, table, measured)
-    parts = (one_stretch(path.name, cut),) if at_pauses == "refuse" else cut.parts
+    parts, cut_notes = stretches(path.name, table, measured)
+    if at_pauses == "refuse" and cut_notes:
+        reported = cut_notes[0].removeprefix(f"{path.name}: ").partition(".")[0]
+        raise InputError(
+            f"{path.name}: {reported}. Split it there into separate files; a campaign reads each stretch as a separate record."
+        )
     held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
     holds: dict[str, Hold] = {signal.name: options.hold for signal in inputs}
-    called, before = options.name or readable(path.stem), (*table.notes, *unit_notes, *cut.notes)
+    called, before = options.name or readable(path.stem), (*table.notes, *unit_notes, *cut_notes)
     records = []
     sensors = {signal.name for signal in outputs}.union(options.moving_inputs)
     for number, stretch in enumerate(parts, 1):
@@ -228,9 +231,9 @@ def _table(
     columns: Mapping[str, ColumnMapping],
     spare: Sequence[str],
     options: ReadingOptions,
-    time_is_mapped: bool,
 ) -> Columns:
     """Return the numbers of a file of any format, as they stand there."""
+    time_is_mapped = TIME in (options.columns or {})
     dialect = {key: getattr(options, key) for key in _DIALECT}
     last = _last_file.get()
     asked = (path, *columns.items(), *spare, options.dt, *dialect.values(), time_is_mapped)
@@ -254,15 +257,12 @@ def _on_one_axis(
     holds: Mapping[str, Hold],
 ) -> Resampled:
     """Return the signals that are kept, not yet in SI, on the even axis [s] that they share or are to share."""
-    scale = 1.0 if time.scale is None else time.scale
-    offset = 0.0 if time.offset is None else time.offset
     bases: dict[str, TimeBase] = {}
     found: dict[int, TimeBase] = {}
     for signal in kept:
         stamps, where = table.clock_of(signal), f"{path.name}, {signal}" if table.axes else path.name
         if id(stamps) not in found:
-            own = time_base(stamps, table.lines, where, table.row)
-            found[id(stamps)] = own.in_seconds(scale, offset)
+            found[id(stamps)] = time_base(stamps, table.lines, where, table.row).in_seconds(time)
         bases[signal] = found[id(stamps)]
     raw = {signal: table.values[signal] for signal in kept}
     return joined(path.name, raw, bases, table.clocks, resample, holds)
@@ -273,7 +273,6 @@ def _joint_table(
     columns: Mapping[str, ColumnMapping],
     spare: Sequence[str],
     options: ReadingOptions,
-    time_is_mapped: bool,
 ) -> Columns:
     """Return the numbers of a record, of which signals may be in files of their own."""
     elsewhere: dict[Path, dict[str, ColumnMapping]] = {}
@@ -281,7 +280,7 @@ def _joint_table(
         if column.file is not None and column.file != path:
             elsewhere.setdefault(column.file, {})[signal] = column
     if not elsewhere:
-        return _table(path, columns, spare, options, time_is_mapped)
+        return _table(path, columns, spare, options)
     if TIME in {signal for own in elsewhere.values() for signal in own}:
         raise InputError(
             f"{path.name}: {TIME} cannot be in another file; each file has the time of its own signals."
@@ -292,7 +291,7 @@ def _joint_table(
         )
     files = {path: {s: c for s, c in columns.items() if c.file is None or c.file == path}, **elsewhere}
     tables = {
-        file: _table(file, {TIME: columns[TIME], **own}, spare, options, time_is_mapped)
+        file: _table(file, {TIME: columns[TIME], **own}, spare, options)
         for file, own in files.items()
         if len(own) > 1 or file != path
     }

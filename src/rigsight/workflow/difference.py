@@ -77,7 +77,10 @@ class Difference:
         if not self.changed:
             return f"No number changed beyond what records of one campaign differ.{besides}"
         names = ", ".join(row.name for row in self.changed)
-        roles = {self._role(row.name) for row in self.changed}
+        roles = {
+            next(unit.roles[row.name] for unit in self.units if row.name in unit.roles)
+            for row in self.changed
+        }
         if roles <= _WEAR:
             kind = "all are damping, friction or play, as with wear, temperature or another unit"
         elif {Role.MASS, Role.STIFFNESS} <= roles:
@@ -85,9 +88,6 @@ class Difference:
         else:
             kind = "they are not only damping, friction or play, so wear alone does not explain them"
         return f"Changed: {names}; {kind}.{besides}"
-
-    def _role(self, name: str) -> Role | Family:
-        return next(unit.roles[name] for unit in self.units if name in unit.roles)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``difference.json``."""

@@ -47,9 +47,8 @@ class Gate:
     rig: str
     checks: tuple[Check, ...]  # of each sensor of each record
     numbers: tuple[NumberCheck, ...]  # of each number of each record, where their scatter is known
-    examined: (
-        str  # the record with the largest excess, of which the rest is known; empty where the gate is open
-    )
+    # The record with the largest excess, of which the rest is known; empty where the gate is open.
+    examined: str
     suspects: tuple[Suspect, ...]  # changed numbers, the one that explains most of its gap first
     failures: Mapping[str, str]  # why a record could not be simulated, by its name
     notes: tuple[str, ...]
@@ -57,11 +56,8 @@ class Gate:
     @property
     def closed(self) -> bool:
         """True if a gap or a changed number exceeds its limit, or a record cannot be simulated."""
-        return (
-            bool(self.failures)
-            or any(own.closed for own in self.checks)
-            or any(own.closed for own in self.numbers)
-        )
+        closed = [own.closed for own in self.checks] + [own.closed for own in self.numbers]
+        return bool(self.failures) or any(closed)
 
     @property
     def first_suspect(self) -> Suspect | None:
@@ -187,12 +183,8 @@ def gate_of(
         )
     stage = Stage(SIMULATING, len(records) + 1, listener)
     runs: dict[str, FreeRun] = {}
-    checks, numbers, failures, notes = (
-        list[Check](),
-        list[NumberCheck](),
-        dict[str, str](),
-        list[str](),
-    )
+    checks, numbers = list[Check](), list[NumberCheck]()
+    failures, notes = dict[str, str](), list[str]()
     for record in records:
         try:
             run = free_run(model, record, reference.windows(record), reference.floors)

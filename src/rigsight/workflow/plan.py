@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
@@ -40,14 +40,10 @@ _STEPS = 40
 
 
 class _Value(BaseModel):
-    model_config = ConfigDict(extra="ignore")
-
     value: float
 
 
 class _Candidate(BaseModel):
-    model_config = ConfigDict(extra="ignore")
-
     effects: list[str]
     where: list[str]
     probability: float
@@ -56,8 +52,6 @@ class _Candidate(BaseModel):
 
 class _Diagnosis(BaseModel):
     """What a plan reads of a diagnosis.json."""
-
-    model_config = ConfigDict(extra="ignore")
 
     rig: str
     candidates: list[_Candidate]

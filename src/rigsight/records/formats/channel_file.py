@@ -34,7 +34,6 @@ from rigsight.records.formats.channel import (
     ReadingError,
     Stored,
     TimeAxis,
-    check_count,
     check_size,
     check_total,
     with_distinct_names,
@@ -42,7 +41,6 @@ from rigsight.records.formats.channel import (
 from rigsight.records.formats.known import (
     BY_SUFFIX,
     HEAD,
-    PACKAGES,
     Format,
     check_largest,
     file_size,
@@ -88,10 +86,8 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
         stack.enter_context(_silence())
         with _reported(path, known):
             # Only its own library is imported.
-            isolated = known.key in PACKAGES
-            reader = partial(open_isolated, known.key) if isolated else reader_of(known.key)
+            reader = partial(open_isolated, known) if known.isolated else reader_of(known.key)
             file = stack.enter_context(contextlib.contextmanager(reader)(path))
-            check_count(path.name, len(file.channels))
             check_total(path.name, sum(channel.n_samples for channel in file.channels))
             distinct = with_distinct_names(file.channels)
         channels = tuple(_guarded(path, known, channel) for channel in distinct)
@@ -163,13 +159,12 @@ def _silence() -> Iterator[None]:
         logging.disable(before)
 
 
-def open_isolated(kind: str, path: Path) -> Iterator[ChannelFile]:
+def open_isolated(known: Format, path: Path) -> Iterator[ChannelFile]:
     """Yield the channels of a file that a process of its own reads."""
-    package = PACKAGES[kind]
-    if importlib.util.find_spec(package) is None:
-        raise ModuleNotFoundError(f"{package} is not installed", name=package)
+    if importlib.util.find_spec(str(known.package)) is None:
+        raise ModuleNotFoundError(f"{known.package} is not installed", name=known.package)
     # -P: the folder a user stands in must not lend its modules.
-    command = [sys.executable, "-P", "-m", __name__, kind, str(path.resolve())]
+    command = [sys.executable, "-P", "-m", __name__, known.key, str(path.resolve())]
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )

@@ -317,8 +317,7 @@ def _swept(
         signal.name: log_sweep(t, amplitudes.get(signal.name, 1.0), _ASIDE**i * low, _ASIDE**i * high)
         for i, signal in enumerate(rig.inputs)
     }
-    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
-    run = simulate(structure, values, Record("simulated sweep", dt, inputs, units, kind="sweep"))
+    run = simulate(structure, values, Record("simulated sweep", dt, inputs, rig.signal_units, kind="sweep"))
     rng = np.random.default_rng(0)
     noisy = {
         s.name: run[s.name] + _RELATIVE_NOISE * np.std(run[s.name]) * rng.standard_normal(t.size)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from rigsight.campaign import Campaign
 from rigsight.discover.terms import known_terms
@@ -35,10 +35,8 @@ _MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
 _GROUPS = ("constants", "parameters", "effect_parameters")
 
 
-class ModelTable(BaseModel):
+class ModelTable(BaseModel, extra="forbid", strict=True, frozen=True):
     """The contents of the file."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
     schema_version: Literal[1]
     rig: str
@@ -244,7 +242,7 @@ def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
         ) from None
     except RecursionError:
         raise InputError(f"{path.name}: is nested too deeply for a {what}. {remedy}") from None
-    except (_MeaninglessError, ValueError) as error:
+    except ValueError as error:
         raise InputError(f"{path.name}: {error}") from None
     if not isinstance(data, dict):
         raise InputError(
@@ -253,18 +251,14 @@ def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
     return data
 
 
-class _MeaninglessError(Exception):
-    """JSON that Python accepts but that is meaningless here."""
-
-
 def _without_repeated_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content: dict[str, Any] = {}
     for key, value in pairs:
         if key in content:
-            raise _MeaninglessError(f"the key '{key}' occurs twice in one object; remove one.")
+            raise ValueError(f"the key '{key}' occurs twice in one object; remove one.")
         content[key] = value
     return content
 
 
 def _refuse_constant(name: str) -> float:
-    raise _MeaninglessError(f"{name} is not a finite number; give finite numbers.")
+    raise ValueError(f"{name} is not a finite number; give finite numbers.")

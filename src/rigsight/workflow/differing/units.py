@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from rigsight.campaign import Campaign
 from rigsight.compare.usual_gap import Prediction
@@ -92,10 +92,8 @@ class _Trust(BaseModel):
     entangled: list[_Pair]
 
 
-class _Diagnosis(BaseModel):
+class _Diagnosis(BaseModel, frozen=True):
     """What is read of ``diagnosis.json``."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True)
 
     title: str
     rig: str

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from rigsight.compare import KnownGap, NumberCheck, OwnNumber, UsualGap, check_numbers, free_run, own_numbers
 from rigsight.compare.on_one_record import FreeRun
@@ -89,10 +89,8 @@ class _Number(BaseModel):
     noise: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
-class _Diagnosis(BaseModel):
+class _Diagnosis(BaseModel, frozen=True):
     """What a gate reads of ``diagnosis.json``."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True)
 
     rig: str
     noise_floor: dict[str, _Floor]
@@ -185,9 +183,8 @@ class Check:
     limit: float
     usual: float | None  # RMS of a record for which the model is known to hold; None where none is known
     p_value: float | None  # probability of such a gap if the model holds; None where the limit was asked for
-    beyond: bool = (
-        False  # True where the sensor moves more than in any record for which the model is known to hold
-    )
+    # True where the sensor moves more than in any record for which the model is known to hold.
+    beyond: bool = False
 
     @property
     def closed(self) -> bool:
