@@ -295,22 +295,16 @@ def stretches(
 
 
 def _gaps(stamps: Floats) -> NDArray[np.intp]:
-    """Return the samples after which others are missing, see `pauses`; none where a jump may be rounding."""
+    """Return the samples after which others are missing, see `pauses`; none where jumps may come from rounding to the digits."""
     none = np.zeros(0, dtype=np.intp)
-    if stamps.size < FEWEST_SAMPLES:
+    found = pauses(stamps) if stamps.size >= FEWEST_SAMPLES else none
+    if found.size == 0:
         return none
-    found = pauses(stamps)
-    return none if found.size == 0 or _may_be_rounding(stamps) else found
-
-
-def _may_be_rounding(stamps: Floats) -> bool:
-    """Return True if the jumps may come from rounding an even time axis to the printed digits."""
-    digits = resolution(stamps)
+    digits, index = resolution(stamps), np.arange(stamps.size, dtype=np.float64)
     if np.max(digits) <= COARSEST_STAMPS * float(np.median(np.diff(stamps))):
-        return False
-    index = np.arange(stamps.size, dtype=np.float64)
+        return found
     deviation = np.abs(stamps - np.polyval(np.polyfit(index, stamps, 1), index))
-    return bool(np.all(deviation <= LARGEST_ROUNDING * digits))
+    return none if np.all(deviation <= LARGEST_ROUNDING * digits) else found
 
 
 def _where(stamps: Floats, table: Columns, ends: NDArray[np.intp]) -> str:

@@ -71,10 +71,9 @@ def run_init(
     _refuse(path, path.exists() or path.is_symlink())
     own = own_rigs(rig_files)
     known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
+    rigs = tuple((own or known).values())
     if model is not None:
-        rigs: tuple[Rig, ...] = (known[check_option("--model", model, known)],)
-    else:
-        rigs = tuple(own.values()) or tuple(known.values())
+        rigs = (known[check_option("--model", model, known)],)
     files = measured_files(folder)
     if len(files) > MOST_RECORDS:
         raise InputError(

@@ -310,8 +310,8 @@ def _write(
 ) -> None:
     rig, amplitude = model.structure.rig, sweeps.amplitude
     excitation, ratio = sweeps.at(max(sweeps.made))
-    source = next(signal for signal in rig.inputs if signal.name == ratio.source)
-    response = next(signal for signal in rig.outputs if signal.name == ratio.response)
+    source_unit, response_unit = (rig.signal_units[name] for name in (ratio.source, ratio.response))
+    unit = response_unit if source_unit in ("", "1") else f"{response_unit}/{source_unit}"
     contents: dict[str, str | bytes] = {}
     pictures = {}
     for variation in variations:
@@ -320,9 +320,9 @@ def _write(
         figure = varied_responses(
             ratio.omega,
             _curves(variation),
-            f"{source.name} \u2192 {response.name}",
-            _unit(source.unit, response.unit),
-            f"{name} with other {parameter.name}, sweep of {amplitude:g} {source.unit}",
+            f"{ratio.source} \u2192 {ratio.response}",
+            unit,
+            f"{name} with other {parameter.name}, sweep of {amplitude:g} {source_unit}",
         )
         pictures[parameter.name] = f"{stem}.svg"
         contents |= {f"{stem}.svg": svg_text(figure, "vary"), f"{stem}.png": png_bytes(figure, dpi=150)}
@@ -331,9 +331,9 @@ def _write(
         "model": name,
         "rig": rig.name,
         "effects": model.structure.effect_names,
-        "source": source.name,
-        "response": response.name,
-        "unit": _unit(source.unit, response.unit),
+        "source": ratio.source,
+        "response": ratio.response,
+        "unit": unit,
         "sweep": {
             "amplitude": amplitude,
             "duration": excitation.duration,
@@ -374,7 +374,3 @@ def _curves(variation: Variation) -> list[tuple[str, NDArray[np.complex128], boo
         for variant in variation.variants
         if variant.response is not None
     ]
-
-
-def _unit(source: str, response: str) -> str:
-    return response if source in ("", "1") else f"{response}/{source}"

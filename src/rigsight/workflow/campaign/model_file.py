@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
@@ -32,6 +32,7 @@ from rigsight.workflow.own.own_rigs import known_rigs, text_of
 MODEL_FILE = "model.json"
 _MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
 
+Part = TypeVar("Part", bound=BaseModel)
 _GROUPS = ("constants", "parameters", "effect_parameters")
 
 
@@ -229,6 +230,16 @@ def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
             raise InputError(
                 f"{path.name}: units.{name}: is '{unit}', but values must be in '{units[name]}'. Convert the value."
             )
+
+
+def part_of_diagnosis(file: Path, table: type[Part], remedy: str, who_needs: str = "") -> Part:
+    """Return what a table holds of a `diagnosis.json`."""
+    try:
+        return table.model_validate(json_object(file, "diagnosis", remedy))
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]
+        key, why = ".".join(map(str, problem["loc"])), f"{problem['msg'][0].lower()}{problem['msg'][1:]}"
+        raise InputError(f"{file}: {key}: {why}{who_needs}. {remedy}") from None
 
 
 def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
