@@ -10,7 +10,8 @@ from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, nearest, readable, shown
 from rigsight.records import ColumnMapping, ReadingOptions, Record
-from rigsight.records.read_record import TIME, files_read_once, read_stretches
+from rigsight.records.channel_table import files_read_once
+from rigsight.records.read_record import TIME, read_stretches
 from rigsight.records.signals import signals_beside
 from rigsight.rigs import Rig, read_rig_file, rotational
 from rigsight.units import INPUT_UNIT
