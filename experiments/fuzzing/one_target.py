@@ -28,7 +28,7 @@ with atheris.instrument_imports(include=_INSTRUMENTED):
     import oracle
     import targets
 
-    from rigsight.records.formats import isolated_reader
+    from rigsight.records.formats import channel_file
     from rigsight.records.formats.known import BY_SUFFIX, FORMATS, reader_of
 
     for _format in FORMATS:
@@ -53,7 +53,7 @@ def main(name: str, folder: Path, options: list[str]) -> None:
     if target.in_child:
         targets.read_in_this_process()
         # As the process that reads apart does, but for the processor time.
-        judge.most_growth = isolated_reader.LEAST_MEMORY
+        judge.most_growth = channel_file.LEAST_MEMORY
         resource.setrlimit(resource.RLIMIT_DATA, (judge.most_growth, judge.most_growth))
 
     def try_it(data: bytes) -> None:

@@ -27,7 +27,7 @@ from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose, simulate
 from rigsight.simulate.model import Model
 from rigsight.workflow.gate import gate_of
-from rigsight.workflow.gating.limits import Limits, of_records
+from rigsight.workflow.gating import Limits, of_records
 
 HERE = Path(__file__).parent
 CAMPAIGNS_EACH, RECORDS_EACH = 5, 5

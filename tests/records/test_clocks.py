@@ -294,7 +294,7 @@ CASES = Path(__file__).parents[3] / "shared" / "cases"
 )
 def test_reported_files_are_joined_by_their_clocks(case: str, late: int) -> None:
     """Both signals are as the file holds them, shifted against each other by the offset of their clocks."""
-    from rigsight.records.channel_summary import open_measurement
+    from rigsight.records.channel_table import open_measurement
 
     record = read_campaign(CASES / case).records[0]
     with open_measurement(record.source) as file:

@@ -191,7 +191,7 @@ def test_a_library_that_does_not_come_back_is_ended_and_told(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, _ = contents(tmp_path, name)
-    monkeypatch.setattr("rigsight.records.formats.isolated_reader.LONGEST_WAIT", 0.0)
+    monkeypatch.setattr("rigsight.records.formats.channel_file.LONGEST_WAIT", 0.0)
     message = reported(path)
     assert message is not None
     assert "crashes or does not finish" in message

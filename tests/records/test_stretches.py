@@ -121,6 +121,9 @@ def test_a_gap_of_one_clock_ends_the_others_there_as_well(tmp_path: Path) -> Non
     ]
     for record in found:
         np.testing.assert_allclose(record["x"], np.cos(9 * record.t), atol=1e-6)
+    later = read_stretches(tmp_path / "run.mat", INPUTS, (Named("x", "m"),), ReadingOptions(start=1.0))
+    assert "between samples 200 and 201" in found[0].notes[0]
+    assert "between samples 200 and 201" in later[0].notes[0]
 
 
 @pytest.mark.parametrize(

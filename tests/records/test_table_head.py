@@ -9,8 +9,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping
-from rigsight.records.channel_summary import open_measurement
-from rigsight.records.channel_table import read_columns
+from rigsight.records.channel_table import open_measurement, read_columns
 from rigsight.records.column_mapping import Columns
 
 T = 0.01 * np.arange(80)

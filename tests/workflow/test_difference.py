@@ -17,8 +17,7 @@ from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
-from rigsight.workflow.difference import Difference, run_difference
-from rigsight.workflow.differing.rows import Verdict
+from rigsight.workflow.difference import Difference, Verdict, run_difference
 
 Run = Callable[..., tuple[int, str, str]]
 VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}

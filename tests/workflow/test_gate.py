@@ -19,7 +19,7 @@ from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.gate import run_gate
-from rigsight.workflow.gating.limits import of_records
+from rigsight.workflow.gating import of_records
 
 Run = Callable[..., tuple[int, str, str]]
 VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}

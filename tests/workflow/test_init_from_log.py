@@ -86,7 +86,7 @@ def test_each_motion_between_pauses_is_a_record(tmp_path: Path, monkeypatch: pyt
         return read_columns(path, *asked, **options)
 
     # The package has a function of the name of this module.
-    monkeypatch.setattr(import_module("rigsight.records.read_record"), "read_columns", counted)
+    monkeypatch.setattr(import_module("rigsight.records.channel_table"), "read_columns", counted)
     write_log(tmp_path / "arm", moving(3))
     records = records_of(tmp_path / "arm")
     assert [record["role"] for record in records] == ["estimation", "estimation", "validation"]

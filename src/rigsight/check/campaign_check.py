@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
+from scipy.signal import resample_poly
 
 from rigsight.campaign import Campaign
 from rigsight.check.channels import CheckedRecord, checked_record
-from rigsight.check.coarser_records import coarser_records
 from rigsight.check.effect_matrix import EffectMatrix, effect_matrix
-from rigsight.check.parameters import CheckedParameter, checked_parameters
 from rigsight.check.remarks import Remark, remarks
 from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
 from rigsight.diagnose.data_quality.finding import AmplitudeDependence
@@ -18,12 +19,16 @@ from rigsight.diagnose.fit_context import start_values_of
 from rigsight.diagnose.noise.detection import NoiseFloor, noise_floors
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError
-from rigsight.identify.fit.windows import liveliest
-from rigsight.identify.linear_view import near_rest
+from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.identify.fit.windows import cut, liveliest, shown_by, window_length
+from rigsight.identify.identifiability import Identifiability, identifiability
+from rigsight.identify.information import POORLY_KNOWN, information
+from rigsight.identify.linear_view import longest_free_run, near_rest
 from rigsight.inverse import numbers_along_motion, with_all_inputs
 from rigsight.json_data import json_data
 from rigsight.records import Record
 from rigsight.records.signals import is_constant
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization
 
@@ -32,6 +37,26 @@ _OF_EFFECTS, _OF_PARAMETERS = 3000, 40000
 """Samples of the most excited stretches of all records together for effects and for parameters: a second each."""
 PARTS = ("channels", "noise floors", "remarks", "parameters", "effects")
 """Steps of a check, as they are reported."""
+_OF_FLOORS = ("output", "unit", "std", "method", "lower_bound")
+Status = Literal["determined", "weak", "only with others", "not determined"]
+_WEAK = 0.1
+"""Relative standard error from which a parameter is known badly (a convention)."""
+_EVALUATIONS = 60
+"""Of a rough fit: near enough for what the records determine, not for the numbers."""
+_OF_MOTION = 0.99
+"""Share of the power of the velocity below the end of the band of a motion."""
+_PER_PERIOD = 30.0
+"""Samples of a period at the end of this band: forces hold overtones of the motion."""
+
+
+@dataclass(frozen=True)
+class CheckedParameter:
+    """Whether the records determine a parameter."""
+
+    name: str
+    unit: str
+    status: Status
+    relative_error: float  # standard error over the value; infinite where nothing is known
 
 
 @dataclass(frozen=True)
@@ -64,16 +89,7 @@ class Check:
                 {**vars(r), "channels": [{**vars(c), "usable": c.usable} for c in r.channels]}
                 for r in self.records
             ],
-            "noise": [
-                {
-                    "output": f.output,
-                    "unit": f.unit,
-                    "std": f.std,
-                    "method": f.method,
-                    "lower_bound": f.lower_bound,
-                }
-                for f in self.floors
-            ],
+            "noise": [{key: getattr(f, key) for key in _OF_FLOORS} for f in self.floors],
             "findings": [vars(remark) for remark in self.remarks],
             "amplitudes": [answer.to_json() for answer in self.amplitudes],
             "parameters": [vars(parameter) for parameter in self.parameters],
@@ -110,7 +126,7 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     rig = campaign.rig
     records = tuple(checked_record(rig, record) for record in campaign.records)
     say(PARTS[0])
-    coarser = coarser_records(rig, [with_all_inputs(rig, record) for record in campaign.estimation])
+    coarser = _coarser_records(rig, [with_all_inputs(rig, record) for record in campaign.estimation])
     short = liveliest(coarser, rig, _OF_EFFECTS)
     floors = noise_floors(rig, campaign.records, campaign.drifts)
     say(PARTS[1])
@@ -120,7 +136,7 @@ def check_campaign(campaign: Campaign, effects: Sequence[Effect], say: Callable[
     faulty = {(one.record or "", one.signal or "") for one in found if one.severity == "fault"}
     answers = amplitude_dependences(rig, coarser, faulty)
     say(PARTS[2])
-    parameters, statement = checked_parameters(
+    parameters, statement = _parameters(
         campaign, liveliest(coarser, rig, _OF_PARAMETERS), values, {f.output: f.std for f in floors}, linear
     )
     say(PARTS[3])
@@ -156,3 +172,58 @@ def _near_rest(
         return near_rest(structure, {**values, **records[0].constants}, records[:1])
     except SimulationError:
         return None
+
+
+def _coarser_records(rig: Rig, records: Sequence[Record]) -> tuple[Record, ...]:
+    """Return records sampled as finely as their motion needs."""
+    return tuple(_coarser(r, output) for r, output in zip(records, shown_by(rig, records), strict=True))
+
+
+def _coarser(record: Record, output: str) -> Record:
+    velocity = np.diff(record[output])
+    power = np.cumsum(np.abs(np.fft.rfft(velocity - np.mean(velocity))) ** 2)
+    highest = float(np.searchsorted(power, _OF_MOTION * power[-1])) / velocity.size
+    factor = int(1.0 / max(_PER_PERIOD * highest, 1.0 / record.n_samples))
+    if factor < 2 or record.n_samples // factor < 500:
+        return record
+    signals = {name: resample_poly(s, 1, factor, padtype="line") for name, s in record.signals.items()}
+    return replace(record, dt=factor * record.dt, signals=signals, hold="band_limited")
+
+
+def _parameters(
+    campaign: Campaign,
+    records: Sequence[Record],
+    values: Mapping[str, float],
+    noise: Mapping[str, float],
+    linear: Linearization | None,
+) -> tuple[tuple[CheckedParameter, ...], str]:
+    """Return the parameters with the statement on those that are not determined; none where the start cannot be simulated."""
+    rig, structure = campaign.rig, compose(campaign.rig, campaign.modelled)
+    limit = None if linear is None else longest_free_run(linear.poles, records)
+    if limit is not None or campaign.drifts:
+        limit = min(window_length(rig, records), limit or np.inf)
+    windows = cut(records, limit)
+    scales = characteristic_scales(rig, windows, values)
+    held = {campaign.absent_spring} if campaign.absent_spring else set()
+    free = [p.name for p in structure.parameters if p.name not in {*campaign.constants, *held}]
+    fit = GreyBoxFit(structure, windows, scales, noise)
+    result = fit.fit({**values}, free, max_evaluations=_EVALUATIONS, tolerance=1e-3)
+    if not result.residuals:
+        why = (
+            "The equations cannot be simulated at these numbers, so what the records determine is not known."
+        )
+        return (), why
+    found = identifiability(information(fit, result))
+    units = {p.name: p.unit for p in structure.parameters}
+    return tuple(
+        CheckedParameter(name, units[name], _status(name, found), error)
+        for name, error in found.relative_errors.items()
+    ), found.sentence
+
+
+def _status(name: str, found: Identifiability) -> Status:
+    error = found.relative_errors[name]
+    if error < POORLY_KNOWN:
+        return "determined" if error < _WEAK else "weak"
+    together = {member for combination in found.combinations for member in combination.members}
+    return "only with others" if name in together else "not determined"

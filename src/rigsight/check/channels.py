@@ -80,13 +80,13 @@ class CheckedRecord:
 
 def checked_record(rig: Rig, record: Record) -> CheckedRecord:
     """Return what a record and its channels hold."""
-    inputs = [signal for signal in rig.inputs if signal.name in record]
-    moving = [record[signal.name] for signal in inputs if not is_constant(record[signal.name])]
-    channels = [_channel(record, signal.name, signal.unit, True) for signal in inputs]
-    for signal in rig.outputs:
-        if signal.name in record:
-            octaves = _octaves(moving, record[signal.name], record.dt)
-            channels.append(_channel(record, signal.name, signal.unit, False, octaves))
+    inputs = [signal.name for signal in rig.inputs if signal.name in record]
+    moving = [record[name] for name in inputs if not is_constant(record[name])]
+    channels = []
+    for name, unit in rig.signal_units.items():
+        if name in record:
+            octaves = () if name in inputs else _octaves(moving, record[name], record.dt)
+            channels.append(_channel(name, unit, name in inputs, record[name], octaves))
     return CheckedRecord(
         record.name,
         record.role,
@@ -98,10 +98,7 @@ def checked_record(rig: Rig, record: Record) -> CheckedRecord:
     )
 
 
-def _channel(
-    record: Record, name: str, unit: str, is_input: bool, octaves: tuple[Octave, ...] = ()
-) -> Channel:
-    samples = record[name]
+def _channel(name: str, unit: str, is_input: bool, samples: Floats, octaves: tuple[Octave, ...]) -> Channel:
     return Channel(
         name,
         unit,

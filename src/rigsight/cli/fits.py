@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rigsight.compare import NumberCheck
     from rigsight.workflow.difference import Difference
     from rigsight.workflow.gate import Gate
-    from rigsight.workflow.gating.limits import Check
+    from rigsight.workflow.gating import Check
 
 CLOSED = 1
 """Exit code of a closed gate."""

@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from rigsight.check import Check
-    from rigsight.records.channel_summary import ChannelSummary
     from rigsight.workflow.init import Draft, ModelDraft
-    from rigsight.workflow.inspect import Inspection
+    from rigsight.workflow.inspect import ChannelSummary, Inspection
 
 _NAME_WIDTH = 16
 """Of the columns of names, at least, where they are as long."""

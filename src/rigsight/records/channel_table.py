@@ -1,10 +1,12 @@
-"""Selection of the channels of a file of any format for the requested signals, with their time axis."""
+"""Selection of the channels of files of any format for the requested signals, with their time axis."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextvars import ContextVar
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from rigsight.records.clocks import (
     possible_clocks,
     refuse_one_dt,
     shared_clock,
+    side_by_side,
     with_clocks,
 )
 from rigsight.records.column_mapping import TIME, ColumnMapping, Columns
@@ -27,6 +30,56 @@ from rigsight.records.record import Floats
 _LISTED = 30
 """Channels that a message lists; a logger may record thousands."""
 _OWN_AXIS = "its own time axis"
+_last_file: ContextVar[dict[Any, Columns] | None] = ContextVar("last file", default=None)
+
+
+@contextmanager
+def files_read_once() -> Iterator[None]:
+    """Keep what was read of the last file inside this context: its next record is often another stretch of it."""
+    token = _last_file.set({})
+    try:
+        yield
+    finally:
+        _last_file.reset(token)
+
+
+def columns_of_files(
+    path: Path,
+    columns: Mapping[str, ColumnMapping],
+    optional: Sequence[str],
+    dt: float | None,
+    dialect: Mapping[str, Any],
+    *,
+    time_is_mapped: bool,
+) -> Columns:
+    """Read the columns of a record, see `read_columns`; signals may be in files of their own."""
+    files: dict[Path, dict[str, ColumnMapping]] = {path: {}}
+    for signal, column in columns.items():
+        files.setdefault(column.file or path, {})[signal] = column
+    if len(files) > 1 and TIME not in files[path]:
+        raise InputError(
+            f"{path.name}: {TIME} cannot be in another file; each file has the time of its own signals."
+        )
+    if len(files) > 1 and dt is not None:
+        raise InputError(
+            f"{path.name}: dt = {dt:g} cannot hold for signals of several files; each needs its time."
+        )
+    tables, last = {}, _last_file.get()
+    for file, own in files.items():
+        asked = {TIME: columns[TIME], **own}
+        if len(asked) == 1 and len(files) > 1:
+            continue
+        key = (file, *asked.items(), *optional, dt, *dialect.values(), time_is_mapped)
+        if last is None or key not in last:
+            tables[file] = read_columns(
+                file, asked, time_is_mapped=time_is_mapped, optional=optional, dt=dt, dialect=dialect
+            )
+            if last is not None:
+                last.clear()
+                last[key] = tables[file]
+        else:
+            tables[file] = last[key]
+    return tables[path] if len(files) == 1 else side_by_side(path.name, tables)
 
 
 def read_columns(
@@ -101,6 +154,11 @@ def _opened(
             raise InputError(f"{path.name} is not delimited text, so {key} does not apply; remove {key}.")
     with open_channels(path) as file:
         yield file
+
+
+def open_measurement(path: Path) -> AbstractContextManager[ChannelFile]:
+    """Open a file of any format, delimited text included, for a look; its channels can be read inside this context."""
+    return nullcontext(TextColumns(path).tolerant()) if file_format(path) is None else open_channels(path)
 
 
 class _Selection:

@@ -83,9 +83,7 @@ class ColumnMapping:
         column
             Numbers in the file, shape (n_samples,).
         """
-        scale = 1.0 if self.scale is None else self.scale
-        offset = 0.0 if self.offset is None else self.offset
-        return scale * column + offset
+        return (self.scale or 1.0) * column + (self.offset or 0.0)
 
 
 def checked_columns(

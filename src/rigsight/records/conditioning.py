@@ -5,14 +5,15 @@ The motion in a gap is unknown, so nothing is interpolated: a stretch between ga
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.column_mapping import TIME, ColumnMapping, Columns
+from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.record import Floats
 from rigsight.records.signals import is_constant
 from rigsight.records.stamps import written_span, written_stamp
@@ -69,10 +70,11 @@ class TimeBase:
             return self.stamps
         return self.t0 + self.dt * np.arange(self.n_samples, dtype=np.float64)
 
-    def in_seconds(self, scale: float, offset: float) -> TimeBase:
-        """Return the grid in seconds: stamp in seconds = scale * stamp + offset."""
-        stamps = None if self.stamps is None else scale * self.stamps + offset
-        return replace(self, t0=scale * self.t0 + offset, dt=scale * self.dt, stamps=stamps)
+    def in_seconds(self, time: ColumnMapping) -> TimeBase:
+        """Return the grid in seconds, of stamps in the unit of a column of time."""
+        stamps = None if self.stamps is None else time.to_si(self.stamps)
+        start, scale = float(time.to_si(np.array(self.t0))), time.scale or 1.0
+        return replace(self, t0=start, dt=scale * self.dt, stamps=stamps)
 
 
 def check_long_enough(file: str, n_samples: int) -> None:
@@ -235,45 +237,29 @@ def _check_gaps(stamps: Floats, lines: NDArray[np.int64], file: str, row: str) -
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Stretches:
-    """A table split at the gaps of its time axis."""
-
-    parts: tuple[Columns, ...]  # the tables of the stretches; the whole table if there is no gap
-    notes: tuple[str, ...] = ()  # where it was cut, and what was left out
-
-
 def between(
     file: str, table: Columns, scale: ColumnMapping, start: float | None, end: float | None
 ) -> Columns:
     """Return the rows of a table from `start` to `end`."""
     begin, stop = (-np.inf if start is None else start), (np.inf if end is None else end)
-    clocks = table.stamps
-    seconds = {signal: scale.to_si(stamps) for signal, stamps in clocks.items()}
-    first, last = min(float(t.min()) for t in seconds.values()), max(float(t.max()) for t in seconds.values())
+    seconds = [scale.to_si(stamps) for stamps in table.stamps.values()]
+    first, last = min(float(t.min()) for t in seconds), max(float(t.max()) for t in seconds)
     if not begin < stop or begin > last or stop < first:
         asked = f"start = {begin:g}, end = {stop:g}"
         raise InputError(
             f"{file}: {asked} is no stretch of the record, whose time runs from {written_span(first, last)}."
         )
-    rows = {id(clocks[s]): np.flatnonzero((t >= begin) & (t <= stop)) for s, t in seconds.items()}
-    if not table.axes:
-        kept = rows[id(clocks[TIME])]
-        return replace(table, values={s: v[kept] for s, v in table.values.items()}, lines=table.lines[kept])
-    axes = {id(stamps): stamps[rows[id(stamps)]] for stamps in table.axes.values()}
-    return replace(
-        table,
-        values={signal: v[rows[id(table.axes[signal])]] for signal, v in table.values.items()},
-        axes={signal: axes[id(stamps)] for signal, stamps in table.axes.items()},
-    )
+    return _cut(table, lambda stamps: _within(begin, stop, scale.to_si(stamps)))
 
 
-def stretches(file: str, table: Columns, outputs: Sequence[str] = ()) -> Stretches:
-    """Return the stretches of a table between the gaps of its clocks."""
+def stretches(
+    file: str, table: Columns, outputs: Sequence[str]
+) -> tuple[tuple[Columns, ...], tuple[str, ...]]:
+    """Return a table split at the gaps of its clocks, whole if there are none, and where it was cut and what was left out."""
     clocks = table.stamps
     gaps = {signal: found for signal, stamps in clocks.items() if (found := _gaps(stamps)).size}
     if not gaps:
-        return Stretches((table,))
+        return (table,), ()
     # The clock with the most gaps is the one that is told; all others end there as well.
     worst = max(gaps, key=lambda signal: gaps[signal].size)
     stamps, ends = clocks[worst], gaps[worst]
@@ -284,7 +270,8 @@ def stretches(file: str, table: Columns, outputs: Sequence[str] = ()) -> Stretch
         spans.append((latest, before))
         latest = max(latest, after)
     spans = [(begin, stop) for begin, stop in [*spans, (latest, np.inf)] if begin < stop]
-    parts = [part for begin, stop in spans if (part := _part(table, begin, stop)) is not None]
+    parts = [_cut(table, partial(_within, begin, stop)) for begin, stop in spans]
+    parts = [part for part in parts if min(map(np.size, part.values.values())) > 1]
     long = [part for part in parts if part.lines.size >= FEWEST_SAMPLES]
     moving = [part for part in long if not (outputs and all(is_constant(part.values[o]) for o in outputs))]
     where = _where(stamps, table, ends)
@@ -304,36 +291,20 @@ def stretches(file: str, table: Columns, outputs: Sequence[str] = ()) -> Stretch
         f"{file}: samples are missing {where}. It was read as {len(moving)} record{'s' if len(moving) > 1 else ''}, each with "
         f"its own initial state; nothing was interpolated.{left}"
     )
-    return Stretches(tuple(moving), (note,))
+    return tuple(moving), (note,)
 
 
 def _gaps(stamps: Floats) -> NDArray[np.intp]:
-    """Return the samples after which others are missing, see `pauses`; none where a jump may be rounding."""
+    """Return the samples after which others are missing, see `pauses`; none where jumps may come from rounding to the digits."""
     none = np.zeros(0, dtype=np.intp)
-    if stamps.size < FEWEST_SAMPLES:
+    found = pauses(stamps) if stamps.size >= FEWEST_SAMPLES else none
+    if found.size == 0:
         return none
-    found = pauses(stamps)
-    return none if found.size == 0 or _may_be_rounding(stamps) else found
-
-
-def _may_be_rounding(stamps: Floats) -> bool:
-    """Return True if the jumps may come from rounding an even time axis to the printed digits."""
-    digits = resolution(stamps)
+    digits, index = resolution(stamps), np.arange(stamps.size, dtype=np.float64)
     if np.max(digits) <= COARSEST_STAMPS * float(np.median(np.diff(stamps))):
-        return False
-    index = np.arange(stamps.size, dtype=np.float64)
+        return found
     deviation = np.abs(stamps - np.polyval(np.polyfit(index, stamps, 1), index))
-    return bool(np.all(deviation <= LARGEST_ROUNDING * digits))
-
-
-def one_stretch(file: str, found: Stretches) -> Columns:
-    """Return the table of a record that is to be one."""
-    if len(found.parts) == 1 and not found.notes:
-        return found.parts[0]
-    reported = found.notes[0].removeprefix(f"{file}: ").partition(".")[0]
-    raise InputError(
-        f"{file}: {reported}. Split it there into separate files; a campaign reads each stretch as a separate record."
-    )
+    return none if np.all(deviation <= LARGEST_ROUNDING * digits) else found
 
 
 def _where(stamps: Floats, table: Columns, ends: NDArray[np.intp]) -> str:
@@ -346,25 +317,18 @@ def _where(stamps: Floats, table: Columns, ends: NDArray[np.intp]) -> str:
     )
 
 
-def _part(table: Columns, begin: float, stop: float) -> Columns | None:
-    """Return the rows with stamps from `begin` to `stop`; None where a clock has none there."""
+def _within(begin: float, stop: float, stamps: Floats) -> NDArray[np.bool_]:
+    return np.asarray((stamps >= begin) & (stamps <= stop))
 
-    def rows(stamps: Floats) -> slice:
-        return slice(int(np.searchsorted(stamps, begin)), int(np.searchsorted(stamps, stop, "right")))
 
-    if not table.axes:
-        own = rows(table.values[TIME])
-        values = {name: v[own] for name, v in table.values.items()}
-        return replace(table, values=values, lines=table.lines[own])
-    axes = {id(stamps): stamps[rows(stamps)] for stamps in table.axes.values()}
-    values = {name: v[rows(table.axes[name])] for name, v in table.values.items()}
-    fewest = min(v.size for v in values.values())
-    if fewest < 2:
-        return None
-    longest = max((rows(stamps) for stamps in table.axes.values()), key=lambda own: own.stop - own.start)
+def _cut(table: Columns, inside: Callable[[Floats], NDArray[np.bool_]]) -> Columns:
+    """Return the rows of a table whose stamps lie inside, of each signal by its own clock."""
+    rows = {id(stamps): np.flatnonzero(inside(stamps)) for stamps in table.stamps.values()}
+    of = {name: rows[id(table.clock_of(name))] for name in table.values}
+    axes = {id(stamps): stamps[rows[id(stamps)]] for stamps in table.axes.values()}
     return replace(
         table,
-        values=values,
+        values={name: samples[of[name]] for name, samples in table.values.items()},
         axes={name: axes[id(stamps)] for name, stamps in table.axes.items()},
-        lines=table.lines[longest],
+        lines=table.lines[max(rows.values(), key=np.size)],
     )

@@ -2,56 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
-from rigsight.errors import InputError, readable
-from rigsight.records.channel_table import read_columns
+from rigsight.errors import InputError, nearest, readable
+from rigsight.records.channel_names import closeness
+from rigsight.records.channel_table import columns_of_files
 from rigsight.records.channel_units import si_mapping, units_of_columns
-from rigsight.records.clocks import side_by_side
 from rigsight.records.column_mapping import TIME as TIME
 from rigsight.records.column_mapping import ColumnMapping, Columns, checked_columns
 from rigsight.records.conditioning import (
+    LARGEST_NUMBER,
     TimeBase,
     between,
     check_long_enough,
-    one_stretch,
     stretches,
     time_base,
 )
-from rigsight.records.record import Hold, Kind, Record, Role
+from rigsight.records.record import Floats, Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, joined
 from rigsight.records.sensor_signs import between_readings, refuse_codes, unwrapped
-from rigsight.records.sound_signals import (
-    NamedSignal,
-    alike_notes,
-    check_absent,
-    clipping_notes,
-    listed_columns,
-    moving,
-    refuse_implausible,
-    rest_notes,
-)
+from rigsight.records.signals import clipping, is_constant
 
 _DIALECT = ("separator", "decimal", "header", "comment")
 """What may be said of a text."""
-_last_file: ContextVar[dict[Any, Columns] | None] = ContextVar("last file", default=None)
+_LISTED = 30
+"""Columns that a message lists."""
 
 
-@contextmanager
-def files_read_once() -> Iterator[None]:
-    """Keep what was read of the last file inside this context: its next record is often another stretch of it."""
-    token = _last_file.set({})
-    try:
-        yield
-    finally:
-        _last_file.reset(token)
+class NamedSignal(Protocol):
+    """A signal that can be read: what a rig declares, seen from below."""
+
+    @property
+    def name(self) -> str:
+        """Name in equations and files."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
 
 
 @dataclass(frozen=True)
@@ -129,15 +121,16 @@ def read_stretches(
     free = [output.name for output in outputs if not require_outputs or output.name not in needed]
     # A column that was mapped by hand is meant to be there.
     spare = [signal for signal in (*options.absent_inputs, *free, *beside) if signal not in columns]
-    table = _joint_table(path, {TIME: time, **wanted}, spare, options, TIME in columns)
+    dialect = {key: getattr(options, key) for key in _DIALECT}
+    table = columns_of_files(path, {TIME: time, **wanted}, spare, dt, dialect, time_is_mapped=TIME in columns)
     absent = [signal.name for signal in recorded if signal.name not in table.values]
     may_rest = kind == "operation" and options.amplitude is None
     if absent:
-        check_absent(path, absent, table, is_free=len(absent) == len(inputs) and may_rest)
+        _check_absent(path, absent, table, is_free=len(absent) == len(inputs) and may_rest)
     if require_outputs and outputs and not any(signal.name in table.values for signal in outputs):
         listed = ", ".join(signal.name for signal in outputs)
         raise InputError(
-            f"{path.name} has none of the outputs {listed}. Its columns: {listed_columns(table)}. Map one at least under columns."
+            f"{path.name} has none of the outputs {listed}. Its columns: {_columns_of(table)}. Map one at least under columns."
         )
     same = [name for name, label in table.labels.items() if name != TIME and label == table.labels.get(TIME)]
     if dt is None and same:
@@ -163,26 +156,26 @@ def read_stretches(
     # A few samples at rest are too few before they are a rest.
     check_long_enough(path.name, max(values.size for values in table.values.values()))
     refuse_codes(path, table)
-    refuse_implausible(path, raw, table)
+    _refuse_implausible(path, raw, table)
     table, found_notes = unwrapped(path, table, {signal: to_si[signal] for signal in raw}, units)
     raw = {name: table.values[name] for name in raw}
     found: list[str] = list(found_notes)
     if require_outputs:
-        raw, still = moving(path, raw, table, needed, outputs)
+        raw, still = _moving(path, raw, table, needed, outputs)
         found += still
         if options.role == "estimation":
             must_move = options.moving_inputs if may_rest else [signal.name for signal in recorded]
             is_step = kind == "step" and not options.moving_inputs
-            found += rest_notes(path, raw, table, recorded, must_move, is_step)
+            found += _rest_notes(path, raw, table, recorded, must_move, is_step)
     # A command stands at its extremes on purpose.
-    found += clipping_notes(path, {name: v for name, v in raw.items() if name not in beside}, table)
+    found += _clipping_notes(path, {name: v for name, v in raw.items() if name not in beside}, table)
     found += [
         f"{path.name}: {name} = {value:g} was taken as given, and the column '{name}' was not read. Leave it out of inputs to "
         "read the column."
         for name, value in constant_inputs.items()
         if name in table.names
     ]
-    found += alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
+    found += _alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
     if absent:
         found.append(
             f"{path.name}: has no column for {' and '.join(absent)}; taken as 0 throughout, because nothing drives the rig."
@@ -190,11 +183,15 @@ def read_stretches(
     # If nothing drives the rig and nothing was measured, only time gives the number of samples.
     kept = [*raw] or [TIME]
     measured = [output.name for output in outputs if output.name in raw] if require_outputs else []
-    cut = stretches(path.name, table, measured)
-    parts = (one_stretch(path.name, cut),) if at_pauses == "refuse" else cut.parts
+    parts, cut_notes = stretches(path.name, table, measured)
+    if at_pauses == "refuse" and cut_notes:
+        reported = cut_notes[0].removeprefix(f"{path.name}: ").partition(".")[0]
+        raise InputError(
+            f"{path.name}: {reported}. Split it there into separate files; a campaign reads each stretch as a separate record."
+        )
     held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
     holds: dict[str, Hold] = {signal.name: options.hold for signal in inputs}
-    called, before = options.name or readable(path.stem), (*table.notes, *unit_notes, *cut.notes)
+    called, before = options.name or readable(path.stem), (*table.notes, *unit_notes, *cut_notes)
     records = []
     sensors = {signal.name for signal in outputs}.union(options.moving_inputs)
     for number, stretch in enumerate(parts, 1):
@@ -223,28 +220,6 @@ def read_stretches(
     return tuple(records)
 
 
-def _table(
-    path: Path,
-    columns: Mapping[str, ColumnMapping],
-    spare: Sequence[str],
-    options: ReadingOptions,
-    time_is_mapped: bool,
-) -> Columns:
-    """Return the numbers of a file of any format, as they stand there."""
-    dialect = {key: getattr(options, key) for key in _DIALECT}
-    last = _last_file.get()
-    asked = (path, *columns.items(), *spare, options.dt, *dialect.values(), time_is_mapped)
-    if last is not None and asked in last:
-        return last[asked]
-    found = read_columns(
-        path, columns, time_is_mapped=time_is_mapped, optional=spare, dt=options.dt, dialect=dialect
-    )
-    if last is not None:
-        last.clear()
-        last[asked] = found
-    return found
-
-
 def _on_one_axis(
     path: Path,
     table: Columns,
@@ -254,46 +229,117 @@ def _on_one_axis(
     holds: Mapping[str, Hold],
 ) -> Resampled:
     """Return the signals that are kept, not yet in SI, on the even axis [s] that they share or are to share."""
-    scale = 1.0 if time.scale is None else time.scale
-    offset = 0.0 if time.offset is None else time.offset
     bases: dict[str, TimeBase] = {}
     found: dict[int, TimeBase] = {}
     for signal in kept:
         stamps, where = table.clock_of(signal), f"{path.name}, {signal}" if table.axes else path.name
         if id(stamps) not in found:
-            own = time_base(stamps, table.lines, where, table.row)
-            found[id(stamps)] = own.in_seconds(scale, offset)
+            found[id(stamps)] = time_base(stamps, table.lines, where, table.row).in_seconds(time)
         bases[signal] = found[id(stamps)]
     raw = {signal: table.values[signal] for signal in kept}
     return joined(path.name, raw, bases, table.clocks, resample, holds)
 
 
-def _joint_table(
+def _check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free: bool) -> None:
+    """Reject missing inputs if the rig was driven, or if a column may be one of them."""
+    names = [name for name in table.names if name not in table.labels.values()]
+    is_free = is_free and not all(name.isdecimal() for name in (*names, *table.labels.values()))
+    for signal in absent:
+        close = [name for name in names if closeness(name, signal) > 0.0]
+        hint = f" Is it '{close[0]}'?" if close else nearest(signal, names)
+        if not hint and is_free:
+            continue
+        raise InputError(
+            f"{path.name} has no column '{signal}' for signal '{signal}'.{hint} Its columns: {_columns_of(table)}. "
+            "Map it under columns; if it was constant and not recorded, give its value with the record: "
+            f"inputs = {{ {signal} = 0.0 }}."
+        )
+
+
+def _alike_notes(path: Path, missing: Sequence[str], table: Columns) -> list[str]:
+    """Report an unread column whose name is similar to that of a missing output: possibly a typing error."""
+    unread = [name for name in table.names if name not in table.labels.values()] if missing else []
+    return [
+        f"{path.name}: has no column '{signal}', so {signal} counts as not recorded in this file.{hint} Map it under columns if "
+        f"it is."
+        for signal in missing
+        if (hint := nearest(signal, unread))
+    ]
+
+
+def _columns_of(table: Columns) -> str:
+    """Return the names of the columns of a file for a message."""
+    return ", ".join(f"'{name}'" for name in table.names[:_LISTED]) or "none"
+
+
+def _refuse_implausible(path: Path, raw: Mapping[str, Floats], table: Columns) -> None:
+    """Reject implausibly large numbers, from a wrong data type or a lost decimal point."""
+    for signal, samples in raw.items():
+        largest = float(np.max(np.abs(samples)))
+        if largest > LARGEST_NUMBER:
+            raise InputError(
+                f"{path.name}, column '{table.labels[signal]}': {signal} reaches {largest:.3g}; readings above "
+                f"{LARGEST_NUMBER:g} are implausible. Check the column and its type."
+            )
+
+
+def _moving(
     path: Path,
-    columns: Mapping[str, ColumnMapping],
-    spare: Sequence[str],
-    options: ReadingOptions,
-    time_is_mapped: bool,
-) -> Columns:
-    """Return the numbers of a record, of which signals may be in files of their own."""
-    elsewhere: dict[Path, dict[str, ColumnMapping]] = {}
-    for signal, column in columns.items():
-        if column.file is not None and column.file != path:
-            elsewhere.setdefault(column.file, {})[signal] = column
-    if not elsewhere:
-        return _table(path, columns, spare, options, time_is_mapped)
-    if TIME in {signal for own in elsewhere.values() for signal in own}:
+    raw: dict[str, Floats],
+    table: Columns,
+    needed: Collection[str],
+    outputs: Sequence[NamedSignal],
+) -> tuple[dict[str, Floats], list[str]]:
+    """Return the signals that can be used, with notes on those that cannot."""
+    constant = {signal for signal, samples in raw.items() if is_constant(samples)}
+    measured = [output.name for output in outputs if output.name in raw]
+    for signal in measured:
+        if signal in constant and (signal in needed or constant.issuperset(measured)):
+            raise InputError(
+                f"{path.name}, column '{table.labels[signal]}': the output {signal} never changes ({raw[signal][0]:g}). "
+                "Check sensor and column, or leave the record out."
+            )
+    still = sorted(constant.intersection(measured))
+    notes = [f"{path.name}: {signal} never changes and counts as not measured." for signal in still]
+    return {signal: samples for signal, samples in raw.items() if signal not in still}, notes
+
+
+def _rest_notes(
+    path: Path,
+    raw: Mapping[str, Floats],
+    table: Columns,
+    recorded: Sequence[NamedSignal],
+    must_move: Collection[str],
+    is_step: bool,
+) -> list[str]:
+    """Tell that no recorded input changes: the record begins with a step, the rig moves freely, or a column is wrong."""
+    held = [signal.name for signal in recorded if signal.name in raw]
+    if not held or not all(is_constant(raw[signal]) for signal in held):
+        return []
+    values = ", ".join(f"{signal} = {raw[signal][0]:g}" for signal in held)
+    listed = ", ".join(f"'{table.labels[signal]}'" for signal in held)
+    where = f"{path.name}, column{'s' if len(held) > 1 else ''} {listed}"
+    if is_step and any(raw[signal][0] != 0.0 for signal in held):
+        return [
+            f"{where}: no input changes ({values}); taken as a step from 0 with which the record begins. Record some time at "
+            "rest before the step: it shows the offset, and that the rig was at rest."
+        ]
+    if set(held) & set(must_move):
         raise InputError(
-            f"{path.name}: {TIME} cannot be in another file; each file has the time of its own signals."
+            f"{where}: no input changes ({values}), so nothing is excited and nothing can be identified. Check the column. "
+            'For free motion write kind = "operation" without an amplitude; for a record that is only scored, '
+            'role = "validation".'
         )
-    if options.dt is not None:
-        raise InputError(
-            f"{path.name}: dt = {options.dt:g} cannot hold for signals of several files; each needs its time."
-        )
-    files = {path: {s: c for s, c in columns.items() if c.file is None or c.file == path}, **elsewhere}
-    tables = {
-        file: _table(file, {TIME: columns[TIME], **own}, spare, options, time_is_mapped)
-        for file, own in files.items()
-        if len(own) > 1 or file != path
-    }
-    return side_by_side(path.name, tables)
+    return [
+        f"{where}: no input changes ({values}); taken as a free motion. Check the column if the rig was driven."
+    ]
+
+
+def _clipping_notes(path: Path, raw: Mapping[str, Floats], table: Columns) -> list[str]:
+    """Report clipped signals."""
+    return [
+        f"Warning: {path.name}, column '{table.labels[signal]}': {signal} looks clipped, {count} samples are exactly at its "
+        f"extreme {level:g}. Check range and saturation of sensor, amplifier or drive."
+        for signal, samples in raw.items()
+        for level, count in clipping(samples)
+    ]

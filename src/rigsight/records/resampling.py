@@ -54,7 +54,11 @@ def joined(
     # than that of a signal, the signal is low-pass filtered first, without delay.
     distinct = list({id(base): base for base in bases.values()}.values())
     dt = min(base.dt for base in distinct) if step is None else step
-    start, n_samples = _common(file, bases, dt, _reference(bases, dt, holds), step)
+    # Its stamps are those of a held input, which steps there, or else of a clock of that rate.
+    held = [base for signal, base in bases.items() if holds.get(signal) == "zoh"]
+    same = [base for base in bases.values() if abs(base.dt / dt - 1.0) < _ON_GRID]
+    reference = [*held, *same, max(bases.values(), key=lambda base: base.t0)][0]
+    start, n_samples = _common(file, bases, dt, reference, step)
     grid = start + dt * np.arange(n_samples, dtype=np.float64)
     is_filtered = any(dt > _COARSER * base.dt for base in distinct)
     driven_finer = any(dt > _COARSER * base.dt for name, base in bases.items() if name in holds)
@@ -83,13 +87,6 @@ def joined(
     # Separate clocks agree no better than to a sample: a stamp tells when a device wrote it.
     uncertainty = max(max(float(apart), base.jitter) * base.dt for base in distinct)
     return Resampled(start, dt, on_clock, tuple(notes), driven_finer, uncertainty)
-
-
-def _reference(bases: Mapping[str, TimeBase], dt: float, holds: Mapping[str, Hold]) -> TimeBase:
-    """Return the clock whose stamps the common one keeps: that of a held input, which steps there, or else one of that rate."""
-    held = [base for signal, base in bases.items() if holds.get(signal) == "zoh"]
-    same = [base for base in bases.values() if abs(base.dt / dt - 1.0) < _ON_GRID]
-    return [*held, *same, max(bases.values(), key=lambda base: base.t0)][0]
 
 
 def _common(

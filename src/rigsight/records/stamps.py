@@ -14,6 +14,8 @@ from rigsight.records.record import Floats
 _FAR = 1e3
 """Durations of a record by which its stamps may exceed it before an axis counts from the first one."""
 _MOST_DIGITS = 17
+# Of the median step: a longer one is a gap.
+_GAP = 1.5
 
 
 def digits_for(stamp: float, resolution: float, fewest: int) -> int:
@@ -50,6 +52,15 @@ def time_label(t: Floats) -> str:
     if not origin:
         return "time [s]"
     return f"time [s] since {written_stamp(origin, float(t[-1] - t[0]) / (t.size - 1))} s"
+
+
+def step_and_gaps(stamps: Floats) -> tuple[float | None, int | None]:
+    """Return the median step of time stamps, shape (n_samples,), and how often they jump; None where they do not rise."""
+    steps = np.diff(stamps)
+    if steps.size == 0 or not np.all((steps > 0.0) & (steps < np.inf)):
+        return None, None
+    dt = float(np.median(steps))
+    return dt, int(np.count_nonzero(steps > _GAP * dt))
 
 
 def seconds_since(stamps: NDArray[Any], origin: np.datetime64 | None) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -45,29 +45,22 @@ _STEP_START = 10.0
 class _Run:
     """One experiment on the virtual rig."""
 
-    name: str
-    role: Role
     kind: Kind
     amplitude: float
-    hold: Hold
-    duration: float
-    signal: Callable[[Floats, float], Floats]
+    role: Role
+    hold: Hold = "foh"
 
-
-def _sweep(t: Floats, amplitude: float) -> Floats:
-    return log_sweep(t, amplitude, *_SWEEP_OMEGA)
-
-
-def _step(t: Floats, amplitude: float) -> Floats:
-    return step(t, amplitude, _STEP_START)
+    @property
+    def name(self) -> str:
+        return f"{self.kind}_{self.amplitude:.2f}A"
 
 
 _RUNS = (
-    _Run("sweep_0.25A", "estimation", "sweep", 0.25, "foh", _SWEEP_TIME, _sweep),
-    _Run("sweep_0.50A", "estimation", "sweep", 0.50, "foh", _SWEEP_TIME, _sweep),
-    _Run("sweep_0.75A", "validation", "sweep", 0.75, "foh", _SWEEP_TIME, _sweep),
-    _Run("sweep_1.00A", "estimation", "sweep", 1.00, "foh", _SWEEP_TIME, _sweep),
-    _Run("step_0.60A", "validation", "step", 0.60, "zoh", _STEP_TIME, _step),
+    _Run("sweep", 0.25, "estimation"),
+    _Run("sweep", 0.50, "estimation"),
+    _Run("sweep", 0.75, "validation"),
+    _Run("sweep", 1.00, "estimation"),
+    _Run("step", 0.60, "validation", "zoh"),
 )
 
 
@@ -108,7 +101,10 @@ def _campaign(rng: np.random.Generator, listener: Listener) -> dict[str, str]:
     stage = Stage(MEASURING, len(_RUNS), listener)
     files = {"campaign.toml": _campaign_toml(published_sets()[_GIVEN_SET])}
     for run in _RUNS:
-        current = run.signal(rig.time(run.duration), run.amplitude)
+        if run.kind == "step":
+            current = step(rig.time(_STEP_TIME), run.amplitude, _STEP_START)
+        else:
+            current = log_sweep(rig.time(_SWEEP_TIME), run.amplitude, *_SWEEP_OMEGA)
         record = rig.measure(
             run.name, current, rng, kind=run.kind, role=run.role, amplitude=run.amplitude, hold=run.hold
         )

@@ -1,27 +1,45 @@
-"""The work of `rigsight difference`: diagnoses or campaigns -> `difference.json` and a picture; which numbers changed?"""
+"""The work of `rigsight difference`: diagnoses or campaigns -> `difference.json` and a picture; which numbers changed?
+
+Each number is judged by its errors, and by the scatter between records that these do not include.
+
+References
+----------
+S. Holm, Scand. J. Stat. 6 (1979) 65, for several tests. W. G. Cochran, J. R. Stat. Soc. Suppl. 4 (1937) 102, for the test of
+homogeneity.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from scipy.stats import chi2, norm
 
 from rigsight.diagnose.trust.patterns import Role
+from rigsight.diagnose.trust.trust import adjusted
 from rigsight.effects import Effect, Family
 from rigsight.errors import InputError
+from rigsight.identify.information import POORLY_KNOWN
 from rigsight.identify.record_identification import EstimationOptions
 from rigsight.json_data import json_data
 from rigsight.plot import GroupPanel, parameters_by_group, png_bytes
+from rigsight.records.record import Floats
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
-from rigsight.workflow.differing.identified import unit_of_records, with_effects_of
-from rigsight.workflow.differing.rows import FALSE_ALARMS, Row, Verdict, rows_of
-from rigsight.workflow.differing.units import Unit, read_unit, refuse_other_rigs
+from rigsight.workflow.differing import (
+    Known,
+    Unit,
+    read_unit,
+    refuse_other_rigs,
+    unit_of_records,
+    with_effects_of,
+)
 from rigsight.workflow.identification.rig import identify_rig
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, silent
@@ -32,6 +50,43 @@ DIFFERENCE_FILE, PICTURE_FILE = "difference.json", "difference.png"
 _DPI = 150
 _WEAR = frozenset({Role.DAMPING, Family.DRY_FRICTION, Family.DAMPING_LAW, Family.PLAY_AND_STOPS})
 """What wears: a bearing, a guide, a gear."""
+FALSE_ALARMS = 0.05
+"""Probability that any number of a table is called changed if none is (Holm)."""
+_Test = TypeVar("_Test")
+
+
+class Verdict(StrEnum):
+    """What can be said of a number."""
+
+    CHANGED = "changed"
+    LOOKS_CHANGED = "only looks changed"
+    UNKNOWN = "not determined"
+    SAME = "same"
+    NOT_EVERYWHERE = "not in every model"
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Weighted regression of a number over an axis."""
+
+    slope: float
+    std: float
+    p_value: float  # adjusted for all tests of the table
+
+
+@dataclass(frozen=True)
+class Row:
+    """A number in each diagnosis."""
+
+    name: str
+    unit: str
+    values: tuple[Known | None, ...]
+    verdict: Verdict
+    # The last minus the first, in standard errors of that difference with the scatter between records; NaN where it is unknown.
+    difference: float
+    p_errors: float  # of such differences by the standard errors alone, adjusted for all tests; NaN where it was not tested
+    p_value: float  # the same with the scatter between records
+    trend: Trend | None  # for more than two diagnoses
 
 
 @dataclass(frozen=True)
@@ -72,7 +127,10 @@ class Difference:
         if not self.changed:
             return f"No number changed beyond what records of one campaign differ.{besides}"
         names = ", ".join(row.name for row in self.changed)
-        roles = {self._role(row.name) for row in self.changed}
+        roles = {
+            next(unit.roles[row.name] for unit in self.units if row.name in unit.roles)
+            for row in self.changed
+        }
         if roles <= _WEAR:
             kind = "all are damping, friction or play, as with wear, temperature or another unit"
         elif {Role.MASS, Role.STIFFNESS} <= roles:
@@ -80,9 +138,6 @@ class Difference:
         else:
             kind = "they are not only damping, friction or play, so wear alone does not explain them"
         return f"Changed: {names}; {kind}.{besides}"
-
-    def _role(self, name: str) -> Role | Family:
-        return next(unit.roles[name] for unit in self.units if name in unit.roles)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``difference.json``."""
@@ -142,7 +197,7 @@ def run_difference(
 
     units = _units([Path(folder) for folder in folders], own_effects, own_rigs, jobs, listener)
     along = tuple(at) if at is not None else tuple(map(float, range(len(units))))
-    found = Difference(tuple(units), along, rows_of(units, along))
+    found = Difference(tuple(units), along, _rows(units, along))
     if out is not None:
         files: dict[str, str | bytes] = {DIFFERENCE_FILE: json_text(found.to_json())}
         if panels := _panels(found):
@@ -176,6 +231,81 @@ def _units(
 def _is_campaign(path: Path) -> bool:
     """Return whether a path is a campaign and no folder of a diagnosis."""
     return path.is_file() or ((path / "campaign.toml").is_file() and not (path / DIAGNOSIS_FILE).is_file())
+
+
+def _rows(units: Sequence[Unit], along: Sequence[float]) -> tuple[Row, ...]:
+    """Return a row for each number of any model, those that changed first."""
+    names = list(dict.fromkeys(name for unit in units for name in unit.numbers))
+    values = {name: tuple(unit.numbers.get(name) for unit in units) for name in names}
+    complete = {
+        name: [own for own in known if own is not None]
+        for name, known in values.items()
+        if all(own is not None and math.isfinite(own.std) and own.std > 0.0 for own in known)
+    }
+    errors = _holm({name: _homogeneity(known, "std") for name, known in complete.items()})
+    slopes = {name: _slope(known, along) for name, known in complete.items()}
+    scatter = _holm(
+        {(name, "differences"): _homogeneity(known, "with_scatter") for name, known in complete.items()}
+        | {(name, "trend"): slope[2] for name, slope in slopes.items() if slope is not None}
+    )
+    found = []
+    for name, known in values.items():
+        slope = slopes.get(name)
+        p_errors = errors.get(name, math.nan)
+        p_value = scatter.get((name, "differences"), math.nan)
+        trend = slope and Trend(slope[0], slope[1], scatter[name, "trend"])
+        unit = next(unit.units[name] for unit in units if name in unit.units)
+        verdict = _verdict(known, p_errors, min(p_value, trend.p_value if trend else math.inf))
+        found.append(Row(name, unit, known, verdict, _difference(known), p_errors, p_value, trend))
+    order = list(Verdict)
+    return tuple(sorted(found, key=lambda row: (order.index(row.verdict), row.p_value)))
+
+
+def _holm(p_values: Mapping[_Test, float]) -> dict[_Test, float]:
+    return dict(zip(p_values, adjusted(list(p_values.values())), strict=True))
+
+
+def _verdict(known: Sequence[Known | None], p_errors: float, p_value: float) -> Verdict:
+    if any(own is None for own in known):
+        return Verdict.NOT_EVERYWHERE
+    if p_value <= FALSE_ALARMS:
+        return Verdict.CHANGED
+    if p_errors <= FALSE_ALARMS:
+        return Verdict.LOOKS_CHANGED
+    loose = [own for own in known if own is not None and not own.with_scatter < POORLY_KNOWN * abs(own.value)]
+    return Verdict.UNKNOWN if loose else Verdict.SAME
+
+
+def _difference(known: Sequence[Known | None]) -> float:
+    first, last = known[0], known[-1]
+    if first is None or last is None:
+        return math.nan
+    error = math.hypot(first.with_scatter, last.with_scatter)
+    return (last.value - first.value) / error if 0.0 < error < math.inf else math.nan
+
+
+def _of(known: Sequence[Known], kind: str) -> tuple[Floats, Floats]:
+    """Return values and their weights by one kind of standard error."""
+    return np.array([own.value for own in known]), 1.0 / np.array([getattr(own, kind) for own in known]) ** 2
+
+
+def _homogeneity(known: Sequence[Known], kind: str) -> float:
+    """Return the probability of such differences if all values are the same."""
+    values, weights = _of(known, kind)
+    away = values - float(weights @ values) / float(np.sum(weights))
+    return float(chi2.sf(weights @ away**2, values.size - 1))
+
+
+def _slope(known: Sequence[Known], along: Sequence[float]) -> tuple[float, float, float] | None:
+    """Return the slope of a weighted regression of several values, its standard error and the probability by chance."""
+    values, weights = _of(known, "with_scatter")
+    x = np.array(along) - float(weights @ np.array(along)) / float(np.sum(weights))
+    size = float(weights @ x**2)
+    if values.size < 3 or size == 0.0:
+        return None
+    slope = float(weights @ (x * values)) / size
+    error = 1.0 / math.sqrt(size)
+    return slope, error, float(2.0 * norm.sf(abs(slope) / error))
 
 
 def _panels(found: Difference) -> list[GroupPanel]:

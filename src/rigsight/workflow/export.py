@@ -53,16 +53,18 @@ def run_export(
     """Write a model for another tool."""
     check_option("Target", target, (*TARGETS, *ROBOT_TARGETS))
     read = named_model(model, own_effects, own_rigs)
-    if usd is not None and target != "usd":
-        raise InputError(f"--usd applies only to usd; leave it out for {target}.")
-    if robot is not None and target not in ROBOT_TARGETS:
-        raise InputError(f"--mjcf applies only to {', '.join(ROBOT_TARGETS)}; leave it out for {target}.")
+    of_robots = (
+        ("--usd", usd, ("usd",)),
+        ("--mjcf", robot, ROBOT_TARGETS),
+        ("--campaign", campaign, ("mjcf",)),
+    )
+    for option, given, targets in of_robots:
+        if given is not None and target not in targets:
+            raise InputError(f"{option} applies only to {', '.join(targets)}; leave it out for {target}.")
     if target in ROBOT_TARGETS and (
         hold is not None or source_only or (step is not None and target == "mjcf")
     ):
         raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")
-    if campaign is not None and target != "mjcf":
-        raise InputError(f"--campaign applies only to mjcf; leave it out for {target}.")
     if target in ROBOT_TARGETS:
         records = () if campaign is None else _validation(campaign, own_effects, own_rigs)
         return _robot(read, target, robot, usd, out, step, records)

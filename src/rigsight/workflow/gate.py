@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from rigsight.compare import NumberCheck, Suspect, UsualGap, free_run, own_numbers, suspects
+from rigsight.compare import NumberCheck, Suspect, UsualGap, free_run, suspects
 from rigsight.compare.on_one_record import FreeRun
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import Effect
@@ -19,15 +19,16 @@ from rigsight.rigs import Rig
 from rigsight.simulate import structure_of_fit
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.model_file import named_model
-from rigsight.workflow.gating.limits import (
+from rigsight.workflow.gating import (
     FALSE_ALARMS,
     Check,
-    Judge,
     Limits,
     Reader,
     Reference,
     beside,
+    gap_check,
     known_gaps,
+    number_checks,
     of_diagnosis,
     of_records,
 )
@@ -47,9 +48,8 @@ class Gate:
     rig: str
     checks: tuple[Check, ...]  # of each sensor of each record
     numbers: tuple[NumberCheck, ...]  # of each number of each record, where their scatter is known
-    examined: (
-        str  # the record with the largest excess, of which the rest is known; empty where the gate is open
-    )
+    # The record with the largest excess, of which the rest is known; empty where the gate is open.
+    examined: str
     suspects: tuple[Suspect, ...]  # changed numbers, the one that explains most of its gap first
     failures: Mapping[str, str]  # why a record could not be simulated, by its name
     notes: tuple[str, ...]
@@ -57,11 +57,8 @@ class Gate:
     @property
     def closed(self) -> bool:
         """True if a gap or a changed number exceeds its limit, or a record cannot be simulated."""
-        return (
-            bool(self.failures)
-            or any(own.closed for own in self.checks)
-            or any(own.closed for own in self.numbers)
-        )
+        closed = [own.closed for own in self.checks] + [own.closed for own in self.numbers]
+        return bool(self.failures) or any(closed)
 
     @property
     def first_suspect(self) -> Suspect | None:
@@ -178,7 +175,7 @@ def gate_of(
     outputs = [signal.name for record in records for signal in rig.outputs if signal.name in record]
     # Each sensor counts as often as a record holds it.
     tested = [o for o in outputs if limits.asked(o, 1.0) is None and UsualGap.of(reference.known, o)]
-    against = Judge(rig, limits, reference, max(1, len(tested)), len(records))
+    n_tested = max(1, len(tested))
     known = {gap.output for gap in reference.known}
     if not any(output in known or limits.asked(output, 1.0) is not None for output in outputs):
         raise InputError(
@@ -187,12 +184,8 @@ def gate_of(
         )
     stage = Stage(SIMULATING, len(records) + 1, listener)
     runs: dict[str, FreeRun] = {}
-    checks, numbers, failures, notes = (
-        list[Check](),
-        list[NumberCheck](),
-        dict[str, str](),
-        list[str](),
-    )
+    checks, numbers = list[Check](), list[NumberCheck]()
+    failures, notes = dict[str, str](), list[str]()
     for record in records:
         try:
             run = free_run(model, record, reference.windows(record), reference.floors)
@@ -200,11 +193,9 @@ def gate_of(
             failures[record.name] = str(error)
         else:
             runs[record.name] = run
-            found = [against.check(gap) for gap in known_gaps(record, run)]
+            found = [gap_check(gap, rig, limits, reference, n_tested) for gap in known_gaps(record, run)]
             checks += [check for check in found if check is not None]
-            if against.asks_numbers:
-                own = own_numbers(model, reference.windows(record), reference.floors)
-                numbers += against.check_numbers(record.name, own)
+            numbers += number_checks(model, record, limits, reference, len(records))
             notes += _notes(record, run, found)
         stage.finished(record.name)
     gate = Gate(rig.name, tuple(checks), tuple(numbers), "", (), failures, tuple(notes))

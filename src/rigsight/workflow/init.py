@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rigsight.errors import InputError, check_option, readable
 from rigsight.records import Role
-from rigsight.records.channel_summary import open_measurement
+from rigsight.records.channel_table import open_measurement
 from rigsight.records.formats.known import BY_SUFFIX
 from rigsight.rigs import RIGS, Rig
 from rigsight.robots import FreeRun, RigDraft, free_run, read_robot, rig_text, with_gears
@@ -71,10 +71,9 @@ def run_init(
     _refuse(path, path.exists() or path.is_symlink())
     own = own_rigs(rig_files)
     known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
+    rigs = tuple((own or known).values())
     if model is not None:
-        rigs: tuple[Rig, ...] = (known[check_option("--model", model, known)],)
-    else:
-        rigs = tuple(own.values()) or tuple(known.values())
+        rigs = (known[check_option("--model", model, known)],)
     files = measured_files(folder)
     if len(files) > MOST_RECORDS:
         raise InputError(
@@ -208,7 +207,8 @@ def campaign_text(
         "# Written by rigsight init from the files of this folder. Comments (#) mark guessed values: check them.",
     ]
     if n_blanks:
-        lines.append(f"# Replace each {BLANK} ({_times(n_blanks)}): these values could not be guessed.")
+        times = "once" if n_blanks == 1 else f"{n_blanks} times"
+        lines.append(f"# Replace each {BLANK} ({times}): these values could not be guessed.")
     lines += [
         "",
         f"title = {quoted(readable(folder.resolve().name))}",
@@ -272,10 +272,6 @@ def _rig_lines(folder: Path, rig: Rig, file: Path | None, others: Sequence[str])
         return ["[rig]", f'model = "{rig.name}"  {remark}', *simulator]
     inside = file.resolve().relative_to(folder.resolve()).as_posix()
     return ["[rig]", f"file = {quoted(inside)}  {remark}", *simulator]
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
 
 
 def _printable(text: str) -> str:

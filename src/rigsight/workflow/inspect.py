@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.json_data import json_data
 from rigsight.plot import channel_plots
 from rigsight.records.channel_names import closeness
-from rigsight.records.channel_summary import ChannelSummary, open_measurement, summarize, time_summary
-from rigsight.records.formats.channel import Channel, ChannelFile, Refused
+from rigsight.records.channel_table import open_measurement
+from rigsight.records.formats.channel import Channel, ChannelFile, Refused, as_floats, as_stamps
 from rigsight.records.read_record import TIME
+from rigsight.records.record import Floats
+from rigsight.records.sensor_signs import FULL_TURNS, codes, held, is_wrapped, wrapping_counter
+from rigsight.records.signals import clipping
+from rigsight.records.stamps import step_and_gaps
 from rigsight.rigs import RIGS, Rig
 from rigsight.workflow.campaign.record_proposal import propose
 
@@ -24,6 +30,29 @@ SCHEMA_VERSION = 1
 _NAMED = 2.0
 _MOST_DRAWN = 40
 """Number of channels in a picture; a flight log holds hundreds."""
+
+
+@dataclass(frozen=True)
+class ChannelSummary:
+    """Summary of a channel in `rigsight inspect`."""
+
+    # As stated in the file; None for no unit.
+    name: str
+    unit: str | None
+    n_samples: int
+    # Median step, first and last stamp of its own time axis, in that axis' unit; None where it has none, or
+    # no finite one.
+    dt: float | None
+    t0: float | None
+    t1: float | None
+    # Of the finite samples; None without any.
+    minimum: float | None
+    maximum: float | None
+    n_not_finite: int  # NaN, infinite or unreadable samples
+    n_gaps: int | None  # places where its own time jumps; None where it has none
+    n_stands: int  # number of steps without a change of the value
+    # What the numbers are beside the quantity itself: converted, codes, wrapped, held.
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -61,7 +90,7 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
     path = Path(path)
     with open_measurement(path) as file:
         file, channels = _readable(path, file)
-        times = {channel.name: time_summary(channel) for channel in file.channels if _is_time(channel)}
+        times = {c.name: step_and_gaps(as_stamps(c.load())) for c in file.channels if _is_time(c)}
         if not channels:
             reasons = "; ".join(f"'{one.name}' {one.reason}" for one in file.refused[:5]) or "it is empty"
             raise InputError(f"{path.name} ({file.format}) contains no signal over time: {reasons}.")
@@ -98,7 +127,7 @@ def _readable(path: Path, file: ChannelFile) -> tuple[ChannelFile, tuple[Channel
     errors: list[InputError] = []
     for channel in file.channels:
         try:
-            read.append((channel, summarize(channel)))
+            read.append((channel, _summary(channel)))
         except InputError as error:
             errors.append(error)
             reason = (
@@ -109,3 +138,51 @@ def _readable(path: Path, file: ChannelFile) -> tuple[ChannelFile, tuple[Channel
         raise errors[0]
     channels = tuple(channel for channel, _ in read)
     return replace(file, channels=channels, refused=tuple(refused)), tuple(own for _, own in read)
+
+
+def _summary(channel: Channel) -> ChannelSummary:
+    """Return the summary of a channel of an open file."""
+    samples = as_floats(channel.load())
+    finite = samples[np.isfinite(samples)]
+    dt = t0 = t1 = None
+    n_gaps = None
+    if channel.axis is not None:
+        stamps = channel.axis.stamps()
+        dt, n_gaps = step_and_gaps(stamps)
+        t0, t1 = (float(stamp) if np.isfinite(stamp) else None for stamp in (stamps[0], stamps[-1]))
+    return ChannelSummary(
+        channel.name,
+        channel.unit,
+        channel.n_samples,
+        dt,
+        t0,
+        t1,
+        float(finite.min()) if finite.size else None,
+        float(finite.max()) if finite.size else None,
+        samples.size - finite.size,
+        n_gaps,
+        int(np.count_nonzero(np.diff(samples) == 0.0)),
+        tuple(_remarks(channel, samples)) if finite.size == samples.size > 1 else (),
+    )
+
+
+def _remarks(channel: Channel, samples: Floats) -> Iterator[str]:
+    if channel.stored.note:
+        yield f"values are {channel.stored.note}"
+    if channel.stored.unclear:
+        yield f"has {', '.join(channel.stored.unclear)}, which may be a conversion and is not applied"
+    found = codes(samples)
+    for code in found:
+        where = f"{code.samples.size}, first in row {code.samples[0] + 1}"
+        yield f"{code.value:.6g} stands for a missing or invalid reading ({where})"
+    if found:
+        return
+    turn = next((turn for turn in FULL_TURNS if is_wrapped(samples, turn)), None)
+    period = turn or wrapping_counter(samples)
+    if period is not None:
+        yield f"begins again at the end of {period:.6g}: an angle or a counter; it is unwrapped if the signal is one"
+    slow = held(samples)
+    if slow is not None:
+        yield f"changes every {slow.rows} rows only: a slower device, or a command that is held"
+    for level, count in clipping(samples):
+        yield f"looks clipped: {count} samples are exactly at its extreme {level:g}"

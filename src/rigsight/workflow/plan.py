@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 from threadpoolctl import threadpool_limits
 
 from rigsight.campaign import Campaign
-from rigsight.check import Holes, check_campaign, holes_of
+from rigsight.check import check_campaign, holes_of
 from rigsight.check.campaign_check import PARTS
 from rigsight.diagnose.policy import FAMILIES
 from rigsight.effects import AT, CATALOGUE, Effect
@@ -40,14 +40,10 @@ _STEPS = 40
 
 
 class _Value(BaseModel):
-    model_config = ConfigDict(extra="ignore")
-
     value: float
 
 
 class _Candidate(BaseModel):
-    model_config = ConfigDict(extra="ignore")
-
     effects: list[str]
     where: list[str]
     probability: float
@@ -56,8 +52,6 @@ class _Candidate(BaseModel):
 
 class _Diagnosis(BaseModel):
     """What a plan reads of a diagnosis.json."""
-
-    model_config = ConfigDict(extra="ignore")
 
     rig: str
     candidates: list[_Candidate]
@@ -159,16 +153,13 @@ def _of_holes(campaign: Campaign, effects: Sequence[Effect], listener: Listener)
         raise InputError(
             "These records tell all effects of different families apart already. Name rivals with --rivals NAME,NAME."
         )
-    report_notes([_note_of(holes)], listener)
+    others = f" Open too, to be named with --rivals: {', '.join(holes.others)}." if holes.others else ""
+    hidden = ", of which one may not show" if holes.hidden else ""
+    listed = ", ".join(holes.effects)
+    report_notes([f"Planned for effects that the check leaves open: {listed}{hidden}.{others}"], listener)
     by_name = {effect.name: effect for effect in candidates}
     named = [Named((by_name[name],)) for name in holes.effects]
     return [*named, Named(())] if holes.hidden else named
-
-
-def _note_of(holes: Holes) -> str:
-    others = f" Open too, to be named with --rivals: {', '.join(holes.others)}." if holes.others else ""
-    hidden = ", of which one may not show" if holes.hidden else ""
-    return f"Planned for effects that the check leaves open: {', '.join(holes.effects)}{hidden}.{others}"
 
 
 def _listed(campaign: Campaign, text: str, known: Mapping[str, Effect]) -> list[Named]:

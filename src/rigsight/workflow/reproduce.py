@@ -50,9 +50,8 @@ class Reproduction:
     """A diagnosis that was run again."""
 
     command: tuple[str, ...]  # the arguments behind ``rigsight``
-    changed_inputs: tuple[
-        str, ...
-    ]  # files that are not those of the report, or are missing; nothing was run then
+    # Files that are not those of the report, or are missing; nothing was run then.
+    changed_inputs: tuple[str, ...]
     versions: Mapping[str, tuple[str, str]]  # package -> version of the report and here, where they differ
     differences: tuple[Difference, ...]
 

@@ -119,7 +119,7 @@ def run_vary(
     for parameter, values in zip(chosen, tries, strict=True):
         variants = []
         for value in values:
-            variants.append(_variant(read, parameter, value, sweeps))
+            variants.append(_variant(parameter, value, sweeps))
             stage.finished(f"{parameter.name} = {value:.4g}")
         if all(variant.response is None for variant in variants):
             raise InputError(
@@ -127,7 +127,7 @@ def run_vary(
             )
         variations.append(Variation(parameter, read.values[parameter.name], tuple(variants)))
     if out is not None:
-        _write(Path(out), str(model), read, variations, sweeps)
+        _write(Path(out), str(model), variations, sweeps)
     return tuple(variations)
 
 
@@ -222,11 +222,9 @@ class _Sweeps:
             self.made[slowness] = variation_sweep(self.model, self.pair, self.amplitude, self.band, slowness)
         return self.made[slowness]
 
-    def response(
-        self, structure: Structure, values: Mapping[str, float]
-    ) -> tuple[FrequencyResponse, float, float]:
+    def response(self, changed: Mapping[str, float]) -> tuple[FrequencyResponse, float, float]:
         """Return the response, its relative error, and the part of its delay [s] that only shifts the record."""
-        structure, own = without_vanished_effects(structure, values)
+        structure, own = without_vanished_effects(self.model.structure, {**self.model.values, **changed})
         late, prompt = self._shifts(structure, own)
         structure, own = without_vanished_effects(structure, prompt)
         omega = self.at()[1].omega
@@ -267,9 +265,9 @@ class _Sweeps:
         return late, {**values, **dict.fromkeys(shifting, 0.0)}
 
 
-def _variant(model: Model, parameter: Parameter, value: float, sweeps: _Sweeps) -> Variant:
+def _variant(parameter: Parameter, value: float, sweeps: _Sweeps) -> Variant:
     try:
-        response, error, late = sweeps.response(model.structure, {**model.values, parameter.name: value})
+        response, error, late = sweeps.response({parameter.name: value})
     except SimulationError as problem:
         return Variant(value, None, None, {}, str(problem))
     if not np.any(response.values):
@@ -301,17 +299,11 @@ def _variant(model: Model, parameter: Parameter, value: float, sweeps: _Sweeps) 
     return Variant(value, response, error, features, " ".join(notes))
 
 
-def _write(
-    folder: Path,
-    name: str,
-    model: Model,
-    variations: Sequence[Variation],
-    sweeps: _Sweeps,
-) -> None:
-    rig, amplitude = model.structure.rig, sweeps.amplitude
+def _write(folder: Path, name: str, variations: Sequence[Variation], sweeps: _Sweeps) -> None:
+    structure, amplitude = sweeps.model.structure, sweeps.amplitude
     excitation, ratio = sweeps.at(max(sweeps.made))
-    source = next(signal for signal in rig.inputs if signal.name == ratio.source)
-    response = next(signal for signal in rig.outputs if signal.name == ratio.response)
+    source_unit, response_unit = (structure.rig.signal_units[name] for name in (ratio.source, ratio.response))
+    unit = response_unit if source_unit in ("", "1") else f"{response_unit}/{source_unit}"
     contents: dict[str, str | bytes] = {}
     pictures = {}
     for variation in variations:
@@ -320,20 +312,20 @@ def _write(
         figure = varied_responses(
             ratio.omega,
             _curves(variation),
-            f"{source.name} \u2192 {response.name}",
-            _unit(source.unit, response.unit),
-            f"{name} with other {parameter.name}, sweep of {amplitude:g} {source.unit}",
+            f"{ratio.source} \u2192 {ratio.response}",
+            unit,
+            f"{name} with other {parameter.name}, sweep of {amplitude:g} {source_unit}",
         )
         pictures[parameter.name] = f"{stem}.svg"
         contents |= {f"{stem}.svg": svg_text(figure, "vary"), f"{stem}.png": png_bytes(figure, dpi=150)}
     content: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "model": name,
-        "rig": rig.name,
-        "effects": model.structure.effect_names,
-        "source": source.name,
-        "response": response.name,
-        "unit": _unit(source.unit, response.unit),
+        "rig": structure.rig.name,
+        "effects": structure.effect_names,
+        "source": ratio.source,
+        "response": ratio.response,
+        "unit": unit,
         "sweep": {
             "amplitude": amplitude,
             "duration": excitation.duration,
@@ -374,7 +366,3 @@ def _curves(variation: Variation) -> list[tuple[str, NDArray[np.complex128], boo
         for variant in variation.variants
         if variant.response is not None
     ]
-
-
-def _unit(source: str, response: str) -> str:
-    return response if source in ("", "1") else f"{response}/{source}"

@@ -44,10 +44,6 @@ class Format:
     repair: str = ""  # sentence for a file that is cut short or damaged
     extra: str = "formats"  # extra of rigsight that installs the package
 
-    def recognizes(self, head: bytes) -> bool:
-        """Return True for the first `HEAD` bytes of a file of this format."""
-        return re.match(self.signature, head, re.DOTALL) is not None
-
 
 _HDF5 = rb"(?:.{512}|.{1024}|.{2048})?\x89HDF\r\n\x1a\n"
 _OF_MATLAB_7_3 = rb"MATLAB 7\.3 MAT-file"
@@ -84,13 +80,10 @@ BY_SUFFIX = {suffix: known for known in FORMATS for suffix in known.suffixes}
 LOGS = frozenset(known.name for known in FORMATS if known.extra == "logs")
 """Names of the formats that robots alone log in."""
 
-PACKAGES = {known.key: known.package for known in FORMATS if known.isolated and known.package}
-"""Format -> package that is called in a process of its own."""
-
 
 def recognized(head: bytes) -> Format | None:
     """Return the format of a file that begins with these bytes, None for delimited text."""
-    return next((known for known in FORMATS if known.recognizes(head)), None)
+    return next((known for known in FORMATS if re.match(known.signature, head, re.DOTALL)), None)
 
 
 def reader_of(key: str) -> Callable[[Path], Iterator[ChannelFile]]:

@@ -63,10 +63,6 @@ def _part(of: str, file: Any, number: int) -> Channel | Refused:
         return Refused(name, f"is {what}; a record needs the time data it was made from")
     if int(header["ord_data_type"]) not in _REAL:
         return Refused(name, "holds complex numbers")
-    return _channel(of, file, number, name, header)
-
-
-def _channel(of: str, file: Any, number: int, name: str, header: dict[str, Any]) -> Channel:
     n_samples = int(header["num_pts"])
     check_size(of, name, n_samples)
     read: list[dict[str, Any]] = []

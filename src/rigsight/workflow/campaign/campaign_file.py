@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, nearest, shown
@@ -37,10 +37,8 @@ LISTS = ("records", "withheld")
 Location = tuple[str | int, ...]
 
 
-class FileTable(BaseModel):
+class FileTable(BaseModel, extra="forbid", strict=True, frozen=True):
     """A table of a file written by hand: unknown keys and numbers in quotes are errors."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 Checked = TypeVar("Checked", bound=FileTable)
@@ -147,7 +145,7 @@ def checked_file(where: Where, data: dict[str, Any], table: type[Checked]) -> Ch
         return table.model_validate(data)
     except ValidationError as error:
         problems: list[dict[str, Any]] = [dict(problem) for problem in error.errors(include_url=False)]
-    keys = [_without_union_members(problem["loc"], data) for problem in problems]
+    keys = [_without_union_members(problem["loc"]) for problem in problems]
     # If one alternative fails in detail, the errors of the other alternatives are left out.
     reported = [
         _message(where, key, table, problem)
@@ -205,20 +203,14 @@ def value_message(problem: dict[str, Any]) -> str | None:
     return None
 
 
-def _without_union_members(location: Location, data: dict[str, Any]) -> Location:
+def _without_union_members(location: Location) -> Location:
     """Drop the names of alternatives that pydantic puts into a location; they are not keys of the file."""
     kept: list[str | int] = []
-    here: Any = data
     for i, part in enumerate(location):
         if "columns" in kept and i >= kept.index("columns") + 2 and part in ("str", "int", "ColumnTable"):
             continue
-        if kept and kept[-1] in ("header", "unwrap"):
-            continue
-        kept.append(part)
-        try:
-            here = here[part]
-        except (KeyError, IndexError, TypeError):
-            here = None
+        if not kept or kept[-1] not in ("header", "unwrap"):
+            kept.append(part)
     return tuple(kept)
 
 

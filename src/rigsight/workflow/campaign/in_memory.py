@@ -132,16 +132,12 @@ def campaign_of(
         return make_campaign(found, campaign)
     own_rigs = () if found is None or found.name in RIGS else (found,)
     read = campaign if isinstance(campaign, Campaign) else read_campaign(campaign, own_effects, own_rigs)
-    if (
-        found is not None
-        and read.rig not in (found, rotational(found))
-        and read.rig.mechanism != found.mechanism
-    ):
-        raise InputError(
-            f"The campaign '{read.title}' is of the rig '{read.rig.name}', but the estimator has rig='{found.name}'. Leave rig "
-            "out, or give records of that rig."
-        )
-    return read
+    if found is None or read.rig in (found, rotational(found)) or read.rig.mechanism == found.mechanism:
+        return read
+    raise InputError(
+        f"The campaign '{read.title}' is of the rig '{read.rig.name}', but the estimator has rig='{found.name}'. Leave rig "
+        "out, or give records of that rig."
+    )
 
 
 def make_model(
@@ -201,10 +197,10 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
         listed = ", ".join(signal.name for signal in rig.outputs)
         raise InputError(f"Record '{record.name}' has none of the outputs {listed}; give at least one.")
     inputs = [signal.name for signal in rig.inputs]
-    may_rest = record.kind == "operation" and record.amplitude is None
     must_move = {name: "input" for name in rig.moving_inputs if record.role == "estimation"}
-    begins_with_step = record.kind == "step" and any(record[name][0] != 0.0 for name in inputs)
-    may_rest = may_rest or begins_with_step
+    may_rest = (record.kind == "operation" and record.amplitude is None) or (
+        record.kind == "step" and any(record[name][0] != 0.0 for name in inputs)
+    )
     if record.role == "estimation" and not may_rest and all(is_constant(record[name]) for name in inputs):
         must_move |= dict.fromkeys(inputs, "input")
     if rig.required_outputs or all(is_constant(record[name]) for name in outputs):
@@ -317,8 +313,7 @@ def _swept(
         signal.name: log_sweep(t, amplitudes.get(signal.name, 1.0), _ASIDE**i * low, _ASIDE**i * high)
         for i, signal in enumerate(rig.inputs)
     }
-    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
-    run = simulate(structure, values, Record("simulated sweep", dt, inputs, units, kind="sweep"))
+    run = simulate(structure, values, Record("simulated sweep", dt, inputs, rig.signal_units, kind="sweep"))
     rng = np.random.default_rng(0)
     noisy = {
         s.name: run[s.name] + _RELATIVE_NOISE * np.std(run[s.name]) * rng.standard_normal(t.size)

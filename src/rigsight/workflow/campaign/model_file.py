@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from rigsight.campaign import Campaign
 from rigsight.discover.terms import known_terms
@@ -32,13 +32,12 @@ from rigsight.workflow.own.own_rigs import known_rigs, text_of
 MODEL_FILE = "model.json"
 _MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
 
+Part = TypeVar("Part", bound=BaseModel)
 _GROUPS = ("constants", "parameters", "effect_parameters")
 
 
-class ModelTable(BaseModel):
+class ModelTable(BaseModel, extra="forbid", strict=True, frozen=True):
     """The contents of the file."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
     schema_version: Literal[1]
     rig: str
@@ -233,6 +232,16 @@ def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
             )
 
 
+def part_of_diagnosis(file: Path, table: type[Part], remedy: str, who_needs: str = "") -> Part:
+    """Return what a table holds of a `diagnosis.json`."""
+    try:
+        return table.model_validate(json_object(file, "diagnosis", remedy))
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]
+        key, why = ".".join(map(str, problem["loc"])), f"{problem['msg'][0].lower()}{problem['msg'][1:]}"
+        raise InputError(f"{file}: {key}: {why}{who_needs}. {remedy}") from None
+
+
 def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
     """Return the object that a file holds."""
     text = text_of(path, f"a {what}", LARGEST_FILE, f", so it is not a {what}", "the file")
@@ -244,7 +253,7 @@ def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
         ) from None
     except RecursionError:
         raise InputError(f"{path.name}: is nested too deeply for a {what}. {remedy}") from None
-    except (_MeaninglessError, ValueError) as error:
+    except ValueError as error:
         raise InputError(f"{path.name}: {error}") from None
     if not isinstance(data, dict):
         raise InputError(
@@ -253,18 +262,14 @@ def json_object(path: Path, what: str, remedy: str) -> dict[str, Any]:
     return data
 
 
-class _MeaninglessError(Exception):
-    """JSON that Python accepts but that is meaningless here."""
-
-
 def _without_repeated_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content: dict[str, Any] = {}
     for key, value in pairs:
         if key in content:
-            raise _MeaninglessError(f"the key '{key}' occurs twice in one object; remove one.")
+            raise ValueError(f"the key '{key}' occurs twice in one object; remove one.")
         content[key] = value
     return content
 
 
 def _refuse_constant(name: str) -> float:
-    raise _MeaninglessError(f"{name} is not a finite number; give finite numbers.")
+    raise ValueError(f"{name} is not a finite number; give finite numbers.")

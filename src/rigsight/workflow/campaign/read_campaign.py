@@ -10,7 +10,8 @@ from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, nearest, readable, shown
 from rigsight.records import ColumnMapping, ReadingOptions, Record
-from rigsight.records.read_record import TIME, files_read_once, read_stretches
+from rigsight.records.channel_table import files_read_once
+from rigsight.records.read_record import TIME, read_stretches
 from rigsight.records.signals import signals_beside
 from rigsight.rigs import Rig, read_rig_file, rotational
 from rigsight.units import INPUT_UNIT
@@ -279,7 +280,7 @@ def options_of(rig: Rig, other: Rig | None = None) -> ReadingOptions:
         required_outputs=rig.required_outputs,
         absent_inputs=rig.absent_inputs,
         moving_inputs=rig.moving_inputs,
-        beside=signals_beside(_own(rig)),
+        beside=signals_beside(rig.signal_units),
         other_units=() if other is None else (other.signal_units,),
     )
 
@@ -290,14 +291,10 @@ _OF_RECORD = {field.name for field in fields(ReadingOptions)}.intersection(Recor
 }
 
 
-def _own(rig: Rig) -> list[str]:
-    return [signal.name for signal in (*rig.inputs, *rig.outputs)]
-
-
 def _columns(
     path: Path, where: Where, own: Location, rig: Rig, record: RecordTable
 ) -> dict[str, ColumnMapping]:
-    known = [TIME, *_own(rig), *signals_beside(_own(rig))]
+    known = [TIME, *rig.signal_units, *signals_beside(rig.signal_units)]
     columns = {}
     for signal, column in record.columns.items():
         here = where.at(*own, "columns", signal)

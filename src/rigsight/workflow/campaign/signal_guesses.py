@@ -99,9 +99,7 @@ def _with_clocks(found: FileGuess, channels: Sequence[Channel], own: Mapping[int
     }
     # A channel that is yet to be filled in has the time of its own as well.
     mapped = [one for one in found.signals if one.channel is not None]
-    free = [
-        c for n, c in enumerate(channels) if n not in own and c not in (channels[i] for i in own.values())
-    ]
+    free = set(range(len(channels))) - own.keys() - set(own.values())
     if not own or len(clocks) < len(mapped) or (not mapped and free):
         return found
     if len(mapped) == len(found.signals) and len({id(clock) for clock in clocks.values()}) == 1:
@@ -233,8 +231,7 @@ def _names_of(rig: Rig) -> dict[str, tuple[str, ...]]:
         commands = {symbol.name for symbol in drive.signal.free_symbols} & set(mechanism.inputs)
         if len(commands) == 1 and drive.along in moved:
             called[commands.pop()] = moved[drive.along]
-    own = (signal.name for signal in (*rig.inputs, *rig.outputs))
-    return {name: (name, called[name]) if name in called else (name,) for name in own}
+    return {name: (name, called[name]) if name in called else (name,) for name in rig.signal_units}
 
 
 def _closeness(channel: Channel, names: Sequence[str]) -> float:

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 AMPLITUDES_FILE = "amplitudes.svg"
 RESPONSES_FILE = "responses.svg"
 _GRID = 600
-_FORMS = {"pt1": "PT1", "pt2": "PT2"}
 
 
 def identification_figures(identification: Identification) -> dict[str, tuple[str, str]]:
@@ -162,9 +161,8 @@ def fitted_curve(path: PathIdentification) -> FittedCurve | None:
         errors = physical.standard_errors
         std = np.hypot(errors["k"], omega * errors["d"])
         return FittedCurve(omega, values, std, "k + j\u03c9 d")
-    values, std = fit.at(omega), fit.standard_error_at(omega)
-    label = f"{_FORMS[fit.form.order]} fit, 95 % band"
-    return FittedCurve(omega, values, std, label)
+    label = f"{fit.form.order.upper()} fit, 95 % band"
+    return FittedCurve(omega, fit.at(omega), fit.standard_error_at(omega), label)
 
 
 def _parameters(identification: Identification) -> list[AmplitudePanel]:

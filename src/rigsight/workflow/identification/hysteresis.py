@@ -14,12 +14,13 @@ from rigsight.errors import InputError
 from rigsight.identify import FitResult, GreyBoxFit, calibrate_to_records, characteristic_scales
 from rigsight.identify.hysteresis.calibration import free_parameters, special_structure
 from rigsight.identify.identification import EffectScore, HysteresisIdentification, Identification
-from rigsight.metrics import nrmse, rms
+from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.report.labels import gap_percent
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.model import Model
+from rigsight.workflow.identification.joint import errors_by_output
 from rigsight.workflow.own.own_effects import effects_on
 from rigsight.workflow.run.kernels import prepare_kernels
 from rigsight.workflow.run.progress import Listener, Stage, Step
@@ -175,14 +176,10 @@ def _validation_residual(
 def _score(
     record: Record, rig: Rig, outputs: Sequence[str], residual: np.ndarray, without: Mapping[str, float]
 ) -> EffectScore:
-    found = {
-        signal.name: nrmse(residual[:, i], record[signal.name])
-        for i, signal in enumerate(rig.outputs)
-        if signal.name in outputs and signal.name in record
-    }
-    return EffectScore(
-        record.name, record.role, {name: without[name] for name in found if name in without}, found
-    )
+    own = _reduced(record, rig, outputs)
+    found = errors_by_output([residual], [own], [signal.name for signal in rig.outputs])
+    before = {name: without[name] for name in found if name in without}
+    return EffectScore(record.name, record.role, before, found)
 
 
 def _statement(effects: Sequence[str], fit: FitResult, scores: Sequence[EffectScore]) -> str:

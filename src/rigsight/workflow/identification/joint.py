@@ -104,7 +104,7 @@ def held_parameters(campaign: Campaign, records: Sequence[Record]) -> dict[str, 
     return known
 
 
-def _columns(
+def errors_by_output(
     residuals: Sequence[Floats], records: Sequence[Record], outputs: Sequence[str]
 ) -> dict[str, float]:
     """Return the NRMSE of each output that was measured, over all windows of one record."""
@@ -130,8 +130,8 @@ def _estimation_scores(
                 own.kind,
                 "estimation",
                 amplitudes[own.kind],
-                _columns(joint, records, outputs),
-                _columns(own.fit.residuals, records, outputs),
+                errors_by_output(joint, records, outputs),
+                errors_by_output(own.fit.residuals, records, outputs),
             )
         )
     return scores
@@ -144,7 +144,7 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
     # Only initial states are estimated: a record may start away from rest.
     free_run = GreyBoxFit(fit.fit.structure, windows, scales, noise).fit(fit.fit.values, ())
     measured_in_fit = [s.name for s in campaign.rig.outputs if s.name in fit.noise]
-    scored = _columns(free_run.residuals, windows, [s.name for s in campaign.rig.outputs])
+    scored = errors_by_output(free_run.residuals, windows, [s.name for s in campaign.rig.outputs])
     amplitude = (
         record.amplitude if record.amplitude is not None else measured_amplitude(record, campaign.rig)[0]
     )

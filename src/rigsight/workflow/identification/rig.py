@@ -111,10 +111,8 @@ def identify_rig(
             start = start_with_effects(campaign, windows, start, held, _sizes(rig, windows))
         # Parameters that cannot be distinguished from sensor offsets that are free in each record.
         values = {**campaign.constants, **start}
-        scales, asked = (
-            characteristic_scales(rig, windows, values),
-            [p.name for p in rig.parameters if p.name not in held],
-        )
+        scales = characteristic_scales(rig, windows, values)
+        asked = [p.name for p in rig.parameters if p.name not in held]
         swallowed = swallowed_by_offsets(structure, windows, scales, _sizes(rig, windows), values, asked)
         held |= {name: start[name] for name in swallowed}
         joint = identify_jointly(campaign, structure, found, start, held, length)
@@ -124,8 +122,7 @@ def identify_rig(
         found = [_with_own(record, joint, campaign) for record in found]
         stage.finished("identifiability")
         views = tuple(_views(structure, joint.fit.fit.values, records, options, known))
-    units = {p.name: p.unit for p in structure.parameters}
-    units |= {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
+    units = {p.name: p.unit for p in structure.parameters} | rig.signal_units
     statement, changing = amplitude_dependence(found, units)
     reported = None
     if known is not None:

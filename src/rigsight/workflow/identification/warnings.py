@@ -86,11 +86,8 @@ def offsets_of_records(
 
 def _of_view(view: LinearView, campaign: Campaign) -> list[str]:
     reported, effects = [], [effect.name for effect in campaign.modelled]
-    where = (
-        f" ({', '.join(f'{name} = {value:g}' for name, value in view.constants.items())})"
-        if view.constants
-        else ""
-    )
+    constants = ", ".join(f"{name} = {value:g}" for name, value in view.constants.items())
+    where = f" ({constants})" if constants else ""
     near_rest = view.linearization
     if not near_rest.rests:
         reported.append(
@@ -135,7 +132,6 @@ def beyond_identified_amplitudes(campaign: Campaign) -> list[str]:
     """Report validation records with an amplitude outside the range of the fitted records."""
     fitted = campaign.estimation
     given = all(record.amplitude is not None for record in (*fitted, *campaign.validation))
-    units = {signal.name: signal.unit for signal in (*campaign.rig.inputs, *campaign.rig.outputs)}
 
     def amplitude(record: Record) -> tuple[float, str]:
         measured, name = measured_amplitude(record, campaign.rig)
@@ -147,7 +143,7 @@ def beyond_identified_amplitudes(campaign: Campaign) -> list[str]:
     reported = []
     for record in campaign.validation:
         size, name = amplitude(record)
-        unit = units[name]
+        unit = campaign.rig.signal_units[name]
         low, high = min(identified.get(name, [size])), max(identified.get(name, [size]))
         if (1.0 - _TOLERANCE) * low <= size <= (1.0 + _TOLERANCE) * high:
             continue

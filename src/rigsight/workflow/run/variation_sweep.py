@@ -65,9 +65,8 @@ def variation_sweep(
     duration = math.log(stop / start) / (_GROWTH * slowest) * slowness
     t = dt * np.arange(round(duration / dt) + 1, dtype=np.float64)
     prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
-    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
     record = Record(
-        name=f"sweep of {amplitude:g} {units[pair.source]}",
+        name=f"sweep of {amplitude:g} {rig.signal_units[pair.source]}",
         dt=dt,
         signals={
             signal.name: log_sweep(t, amplitude, start, stop)
@@ -75,7 +74,7 @@ def variation_sweep(
             else np.zeros_like(t)
             for signal in rig.inputs
         },
-        units=units,
+        units=rig.signal_units,
         kind="sweep",
         amplitude=amplitude,
         # A prescribed motion is smooth between its samples, whatever the hold of other inputs.
