@@ -213,12 +213,15 @@ def _equilibrium(equations: RigEquations, declared: Floats, u: Floats, p: Floats
 def _least_squares(of: Callable[[Floats], Floats], start: Floats, **options: Any) -> OptimizeResult:
     """Return the least squares of a function of columns, whose differences are taken of all columns at once."""
 
+    def at(place: Floats) -> Floats:
+        return of(place[:, None])[:, 0]
+
     def slopes(place: Floats) -> Floats:
         steps = _DIFFERENCE * np.where(place < 0.0, -1.0, 1.0) * np.maximum(1.0, np.abs(place))
         moved = of(place[:, None] + np.column_stack([np.zeros(place.size), np.diag(steps)]))
         return np.asarray((moved[:, 1:] - moved[:, :1]) / steps)
 
-    return least_squares(lambda x: of(x[:, None])[:, 0], start, slopes, max_nfev=_MOST_EVALUATIONS, **options)
+    return least_squares(at, start, slopes, max_nfev=_MOST_EVALUATIONS, **options)
 
 
 def _finite(values: Floats) -> Floats:
