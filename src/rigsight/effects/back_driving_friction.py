@@ -36,11 +36,9 @@ BACK_DRIVING_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction grows with the force of the motor and, otherwise, with that of the load.",
     parameters=(
-        amount("T_c", "friction without load", "drive", upper=1e12, starts=(0.05, 0.1), search=(0.0, 2.0)),
-        amount(
-            "mu_m", "friction per force of the motor", "", upper=1.0, starts=(0.1, 0.2), search=(0.0, 1.0)
-        ),
-        amount("mu_e", "friction per force of the load", "", upper=1.0, starts=(0.2, 0.1), search=(0.0, 1.0)),
+        amount("T_c", "friction without load", "drive", starts=(0.05, 0.1), search=(0.0, 2.0)),
+        amount("mu_m", "friction per force of the motor", "", starts=(0.1, 0.2), search=(0.0, 1.0)),
+        amount("mu_e", "friction per force of the load", "", starts=(0.2, 0.1), search=(0.0, 1.0)),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

@@ -29,9 +29,7 @@ BACKLASH = Effect(
     place=Place.DYNAMICS,
     family=Family.PLAY_AND_STOPS,
     summary="There is play between the displacement and the spring; the play moves along with the motion.",
-    parameters=(
-        amount("g", "half-width of the play", "x", upper=1e9, starts=(0.05, 0.3), search=(0.0, 1.0)),
-    ),
+    parameters=(amount("g", "half-width of the play", "x", starts=(0.05, 0.3), search=(0.0, 1.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
     deflection=x - z,

@@ -26,7 +26,7 @@ COMMAND_DELAY = Effect(
     place=Place.CONTROLLER,
     family=Family.DELAY_OR_LAG,
     summary="The controller receives its command late.",
-    parameters=(amount("T_m", "delay", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
+    parameters=(amount("T_m", "delay", "time", starts=(0.05, 0.2), search=(0.0, 3.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
     command_delay=T_m,

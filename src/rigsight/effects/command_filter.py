@@ -28,15 +28,7 @@ COMMAND_FILTER = Effect(
     family=Family.CONTROLLER,
     summary="The controller follows a smoothed command.",
     parameters=(
-        amount(
-            "T_c",
-            "time constant",
-            "time",
-            upper=1e6,
-            starts=(0.05, 0.3),
-            search=(1e-3, 10.0),
-            logarithmic=True,
-        ),
+        amount("T_c", "time constant", "time", starts=(0.05, 0.3), search=(1e-3, 10.0), logarithmic=True),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

@@ -27,9 +27,7 @@ CONTROLLER_DEAD_BAND = Effect(
     family=Family.CONTROLLER,
     summary="The controller ignores small errors.",
     parameters=(
-        amount(
-            "e_0", "half-width of the dead band", "input", upper=1e300, starts=(0.02, 0.1), search=(0.0, 1.0)
-        ),
+        amount("e_0", "half-width of the dead band", "input", starts=(0.02, 0.1), search=(0.0, 1.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

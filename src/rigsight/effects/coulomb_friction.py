@@ -28,9 +28,7 @@ COULOMB_FRICTION = Effect(
     place=Place.DYNAMICS,
     family=Family.DRY_FRICTION,
     summary="Dry friction of constant size opposes the motion; the mass sticks while the torque is small.",
-    parameters=(
-        amount("T_c", "Coulomb friction", "drive", upper=1e12, starts=(0.05, 0.3), search=(0.0, 2.0)),
-    ),
+    parameters=(amount("T_c", "Coulomb friction", "drive", starts=(0.05, 0.3), search=(0.0, 2.0)),),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),
     torque=T_c * sp.sign(v),

@@ -29,8 +29,8 @@ DERIVATIVE_ACTION = Effect(
     family=Family.CONTROLLER,
     summary="The controller reacts to the rate of its error.",
     parameters=(
-        amount("T_v", "derivative time", "time", upper=1e6, starts=(0.05, 0.3), search=(0.0, 3.0)),
-        scale("T_f", "filter of the rate", "time", lower=1e-9, upper=1e6, starts=(0.02,), search=(1e-3, 0.3)),
+        amount("T_v", "derivative time", "time", starts=(0.05, 0.3), search=(0.0, 3.0)),
+        scale("T_f", "filter of the rate", "time", starts=(0.02,), search=(1e-3, 0.3)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

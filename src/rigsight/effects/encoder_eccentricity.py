@@ -53,7 +53,7 @@ ENCODER_ECCENTRICITY = Effect(
             starts=(0.01, -0.02),
             search=(-0.3, 0.3),
         ),
-        scale("kappa", "wave number", "x^-1", lower=1e-9, upper=1e12, starts=(6.0, 15.0), search=(3.3, 60.0)),
+        scale("kappa", "wave number", "x^-1", starts=(6.0, 15.0), search=(3.3, 60.0)),
     ),
     energy=Energy.ACTIVE,
     wave_number="kappa",

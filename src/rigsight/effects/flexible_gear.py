@@ -53,7 +53,6 @@ FLEXIBLE_GEAR = Effect(
             "w_a",
             "angular frequency of the link",
             "time^-1",
-            lower=1e-9,
             upper=1e9,
             starts=(2.0, 4.0),
             search=(0.5, 50.0),

@@ -27,9 +27,7 @@ FREE_PLAY = Effect(
     place=Place.DYNAMICS,
     family=Family.PLAY_AND_STOPS,
     summary="The spring has a gap around its rest position in which it does not act.",
-    parameters=(
-        amount("g", "half-width of the play", "x", upper=1e9, starts=(0.05, 0.3), search=(0.0, 2.0)),
-    ),
+    parameters=(amount("g", "half-width of the play", "x", starts=(0.05, 0.3), search=(0.0, 2.0)),),
     energy=Energy.CONSERVATIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),
     deflection=beyond(x, g),

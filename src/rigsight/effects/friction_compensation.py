@@ -31,7 +31,7 @@ FRICTION_COMPENSATION = Effect(
     family=Family.CONTROLLER,
     summary="The controller adds a constant in the direction of the goal.",
     parameters=(
-        amount("u_f", "what is added", "input", upper=1e300, starts=(0.02, 0.1), search=(0.0, 1.0)),
+        amount("u_f", "what is added", "input", starts=(0.02, 0.1), search=(0.0, 1.0)),
         Parameter(
             "T_f",
             "filter of the rate",

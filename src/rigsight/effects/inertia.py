@@ -33,7 +33,6 @@ INERTIA = Effect(
             "m_e",
             "inertia that moves with the element",
             "force time^2 x^-1",
-            upper=1e12,
             starts=(0.1, 0.5),
             search=(0.0, 10.0),
         ),

@@ -27,9 +27,7 @@ INPUT_DEAD_ZONE = Effect(
     family=Family.DRIVE_LIMIT,
     summary="Small drive inputs have no effect.",
     parameters=(
-        amount(
-            "u_0", "half-width of the dead zone", "input", upper=1e300, starts=(0.05, 0.2), search=(0.0, 2.0)
-        ),
+        amount("u_0", "half-width of the dead zone", "input", starts=(0.05, 0.2), search=(0.0, 2.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

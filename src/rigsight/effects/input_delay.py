@@ -26,7 +26,7 @@ INPUT_DELAY = Effect(
     place=Place.ACTUATOR,
     family=Family.DELAY_OR_LAG,
     summary="The drive acts later than commanded.",
-    parameters=(amount("T_d", "dead time", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
+    parameters=(amount("T_d", "dead time", "time", starts=(0.05, 0.2), search=(0.0, 3.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
     delay=T_d,

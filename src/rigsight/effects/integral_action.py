@@ -30,14 +30,7 @@ INTEGRAL_ACTION = Effect(
     family=Family.CONTROLLER,
     summary="The controller integrates its error.",
     parameters=(
-        amount(
-            "r_i",
-            "reciprocal of the integral time",
-            "time^-1",
-            upper=1e12,
-            starts=(0.1, 0.3),
-            search=(0.0, 20.0),
-        ),
+        amount("r_i", "reciprocal of the integral time", "time^-1", starts=(0.1, 0.3), search=(0.0, 20.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

@@ -86,13 +86,7 @@ IWAN_HYSTERESIS = Effect(
             search=(0.0, 1.0),
         ),
         scale(
-            "x_s",
-            "deflection at which nearly all elements slip",
-            "x",
-            lower=1e-12,
-            upper=1e9,
-            starts=(0.5, 2.0),
-            search=(1e-2, 1e2),
+            "x_s", "deflection at which nearly all elements slip", "x", starts=(0.5, 2.0), search=(1e-2, 1e2)
         ),
         Parameter(
             "q",

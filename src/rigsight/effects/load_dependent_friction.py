@@ -39,8 +39,8 @@ LOAD_DEPENDENT_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction grows with the load that the joint carries.",
     parameters=(
-        amount("T_c", "friction without load", "drive", upper=1e12, starts=(0.05, 0.1), search=(0.0, 2.0)),
-        amount("mu", "friction per load", "", upper=1.0, starts=(0.1, 0.2), search=(0.0, 1.0)),
+        amount("T_c", "friction without load", "drive", starts=(0.05, 0.1), search=(0.0, 2.0)),
+        amount("mu", "friction per load", "", starts=(0.1, 0.2), search=(0.0, 1.0)),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

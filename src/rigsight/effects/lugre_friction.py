@@ -39,7 +39,7 @@ LUGRE_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction deflects like a spring before it slides, and falls with speed.",
     parameters=(
-        amount("T_c", "friction at high speed", "drive", upper=1e12, starts=(0.1, 0.3), search=(0.0, 2.0)),
+        amount("T_c", "friction at high speed", "drive", starts=(0.1, 0.3), search=(0.0, 2.0)),
         Parameter(
             "s",
             "excess at standstill over high speed",
@@ -49,21 +49,11 @@ LUGRE_FRICTION = Effect(
             starts=(0.5, 1.0),
             search=(0.02, 3.0),
         ),
-        scale(
-            "w_s",
-            "Stribeck velocity",
-            "x time^-1",
-            lower=1e-12,
-            upper=1e12,
-            starts=(0.1, 0.3),
-            search=(1e-3, 0.5),
-        ),
+        scale("w_s", "Stribeck velocity", "x time^-1", starts=(0.1, 0.3), search=(1e-3, 0.5)),
         scale(
             "x_p",
             "displacement over which the friction builds up",
             "x",
-            lower=1e-12,
-            upper=1e9,
             starts=(0.1, 0.03),
             search=(1e-3, 0.2),
         ),

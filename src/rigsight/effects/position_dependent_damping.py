@@ -30,12 +30,7 @@ POSITION_DEPENDENT_DAMPING = Effect(
     summary="Damping that grows with the square of the displacement.",
     parameters=(
         amount(
-            "c_x",
-            "damping per squared displacement",
-            "force time x^-3",
-            upper=1e18,
-            starts=(0.3, 3.0),
-            search=(0.0, 1e3),
+            "c_x", "damping per squared displacement", "force time x^-3", starts=(0.3, 3.0), search=(0.0, 1e3)
         ),
     ),
     energy=Energy.DISSIPATIVE,

@@ -37,13 +37,11 @@ PRESLIDING_FRICTION = Effect(
     family=Family.DRY_FRICTION,
     summary="Dry friction deflects like a spring before it slides.",
     parameters=(
-        amount("T_c", "friction once it slides", "drive", upper=1e12, starts=(0.1, 0.3), search=(0.0, 2.0)),
+        amount("T_c", "friction once it slides", "drive", starts=(0.1, 0.3), search=(0.0, 2.0)),
         scale(
             "x_p",
             "displacement over which the friction builds up",
             "x",
-            lower=1e-12,
-            upper=1e9,
             starts=(0.1, 0.3),
             search=(1e-3, 10.0),
         ),

@@ -27,9 +27,7 @@ QUADRATIC_DAMPING = Effect(
     family=Family.DAMPING_LAW,
     summary="Damping that grows with the square of the speed (fluid drag).",
     parameters=(
-        amount(
-            "c_2", "drag coefficient", "force time^2 x^-2", upper=1e15, starts=(0.1, 1.0), search=(0.0, 1e3)
-        ),
+        amount("c_2", "drag coefficient", "force time^2 x^-2", starts=(0.1, 1.0), search=(0.0, 1e3)),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

@@ -27,7 +27,7 @@ SENSOR_DELAY = Effect(
     place=Place.SENSOR,
     family=Family.DELAY_OR_LAG,
     summary="The displacement is measured with a delay.",
-    parameters=(amount("T_s", "dead time", "time", upper=1e6, starts=(0.05, 0.2), search=(0.0, 3.0)),),
+    parameters=(amount("T_s", "dead time", "time", starts=(0.05, 0.2), search=(0.0, 3.0)),),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
     reading_delay=T_s,

@@ -28,15 +28,7 @@ SENSOR_LAG = Effect(
     family=Family.DELAY_OR_LAG,
     summary="The displacement is measured through a first-order lag.",
     parameters=(
-        amount(
-            "T_m",
-            "time constant",
-            "time",
-            upper=1e6,
-            starts=(0.05, 0.3),
-            search=(1e-3, 10.0),
-            logarithmic=True,
-        ),
+        amount("T_m", "time constant", "time", starts=(0.05, 0.3), search=(1e-3, 10.0), logarithmic=True),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

@@ -31,14 +31,7 @@ SPEED_LOOP_INTEGRAL = Effect(
     family=Family.CONTROLLER,
     summary="A speed loop inside the position loop integrates.",
     parameters=(
-        amount(
-            "r_v",
-            "reciprocal of the integral time",
-            "time^-1",
-            upper=1e12,
-            starts=(0.3, 0.1),
-            search=(0.0, 50.0),
-        ),
+        amount("r_v", "reciprocal of the integral time", "time^-1", starts=(0.3, 0.1), search=(0.0, 50.0)),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

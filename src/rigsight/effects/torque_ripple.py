@@ -54,7 +54,7 @@ TORQUE_RIPPLE = Effect(
             starts=(0.05, -0.1),
             search=(-2.0, 2.0),
         ),
-        scale("kappa", "wave number", "x^-1", lower=1e-9, upper=1e12, starts=(6.0, 15.0), search=(3.3, 60.0)),
+        scale("kappa", "wave number", "x^-1", starts=(6.0, 15.0), search=(3.3, 60.0)),
     ),
     energy=Energy.CONSERVATIVE,
     wave_number="kappa",
