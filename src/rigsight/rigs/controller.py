@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from rigsight.effects import symbols
+from rigsight.effects.effect import Effect
 from rigsight.effects.symbols import derivative, positive_part
 from rigsight.rigs.mechanism import Mechanism
 from rigsight.rigs.parts import READING, Drive
@@ -41,6 +43,20 @@ class Controller:
     def limited(self, output: sp.Expr) -> sp.Expr:
         """Return the signal of the drive for an output of the controller."""
         return self.limits.xreplace({_INSIDE: output})
+
+    def suits(self, effect: Effect) -> bool:
+        """Return False for an effect of the drive under another name, or of this controller."""
+        rates = [derivative(state.rate, symbols.command) for state in effect.states]
+        filters = effect.command is not None and not any(rate.has(symbols.command) for rate in rates)
+        if effect.command_delay is not None or filters:
+            return not self.in_force  # There it is a delay or a lag of the drive.
+        reads_command = effect.reads(symbols.command)
+        if not effect.states and not reads_command and self.error == self.output:
+            return self.in_force  # Else it is a dead zone or a saturation of the drive.
+        if reads_command or effect.reads(symbols.error):
+            return True
+        # Of the output alone: an integral of it beside that of the error, and a saturation beside that of the drive.
+        return self.error != self.output if effect.states else self.in_force
 
 
 def controller_of(mechanism: Mechanism, drive: Drive) -> Controller | None:
