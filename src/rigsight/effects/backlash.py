@@ -19,7 +19,7 @@ M. Nordin and P.-O. Gutman, Automatica 38 (2002) 1633.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import v, x
 
 g, z = sp.symbols("g z", real=True)

@@ -24,7 +24,7 @@ References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on shaft e
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import scale, signed
+from rigsight.effects.kinds import scale, signed
 from rigsight.effects.symbols import reading
 
 e_sin, e_cos, kappa = sp.symbols("e_sin e_cos kappa", real=True)

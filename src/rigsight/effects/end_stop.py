@@ -19,7 +19,7 @@ References: S. W. Shaw and P. J. Holmes, J. Sound Vib. 90 (1983) 129.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import beyond, x
 from rigsight.parameters import Parameter
 

@@ -21,7 +21,7 @@ References: J. P. Den Hartog, *Mechanical Vibrations* (McGraw-Hill 1956), on the
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.kinds import amount, scale
 from rigsight.effects.symbols import m, time_size, v, x
 
 m_a, w_a, zeta_a, q, q_rate = sp.symbols("m_a w_a zeta_a q q_rate", real=True)

@@ -17,7 +17,7 @@ References: D. Tang, E. H. Dowell, AIAA J. 44 (2006), for free play in dynamic s
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import beyond, x
 
 g = sp.Symbol("g", real=True)

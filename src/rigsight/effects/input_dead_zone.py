@@ -16,7 +16,7 @@ References: H. K. Khalil, *Nonlinear Systems* (Prentice Hall 2002), section 1.2.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import beyond, u
 
 u_0 = sp.Symbol("u_0", real=True)

@@ -26,7 +26,7 @@ F. Al-Bender, V. Lampaert and J. Swevers, IEEE Trans. Autom. Control 50 (2005) 1
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import scale
+from rigsight.effects.kinds import scale
 from rigsight.effects.symbols import deflection_rate, k, spring_torque, x_size
 from rigsight.parameters import Parameter
 

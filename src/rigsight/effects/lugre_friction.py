@@ -24,8 +24,8 @@ References: C. Canudas de Wit et al., IEEE TAC 40 (1995) 419.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import Start, State
+from rigsight.effects.kinds import amount, dry_friction, scale
 from rigsight.effects.symbols import drive_size, v, v_size, x_size
 from rigsight.parameters import Parameter
 
@@ -33,10 +33,8 @@ T_c, T_s, s, w_s, x_p, z = sp.symbols("T_c T_s s w_s x_p z", real=True)
 
 _level = 1 + s * sp.exp(-((v / w_s) ** 2))
 
-LUGRE_FRICTION = Effect(
+LUGRE_FRICTION = dry_friction(
     name="lugre_friction",
-    place=Place.DYNAMICS,
-    family=Family.DRY_FRICTION,
     summary="Dry friction deflects like a spring before it slides, and falls with speed.",
     parameters=(
         amount("T_c", "friction at high speed", "drive", starts=(0.1, 0.3), search=(0.0, 2.0)),
@@ -58,8 +56,6 @@ LUGRE_FRICTION = Effect(
             search=(1e-3, 0.2),
         ),
     ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(gain_trend=GainTrend.RISES),
     torque=T_c * (1 + s) * z / x_p,
     states=(State(z, v - sp.Abs(v) * z * (1 + s) / (x_p * _level), "x"),),
     starts=(

@@ -23,7 +23,7 @@ References: J. D. Ferry, *Viscoelastic Properties of Polymers* (Wiley 1980), cha
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, Start, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.kinds import amount, scale
 from rigsight.effects.symbols import drive_size, time_size, v, x_size
 
 k_m, tau_m, q = sp.symbols("k_m tau_m q", real=True)

@@ -20,7 +20,7 @@ References: L. Ljung, *System Identification* (Prentice Hall 1999), on periodic 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import scale, signed
+from rigsight.effects.kinds import scale, signed
 
 T_p, w_p, phi = sp.symbols("T_p w_p phi", real=True)
 

@@ -18,7 +18,7 @@ van der Pol equation has its negative.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import v, x
 
 c_x = sp.Symbol("c_x", real=True)

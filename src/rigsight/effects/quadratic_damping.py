@@ -16,7 +16,7 @@ References: K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics*
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import v
 
 c_2 = sp.Symbol("c_2", real=True)

@@ -18,7 +18,7 @@ pulse counter that is insensitive to the direction.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import amount
+from rigsight.effects.kinds import amount
 from rigsight.effects.symbols import reading
 
 r = sp.Symbol("r", real=True)

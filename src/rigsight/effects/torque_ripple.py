@@ -25,7 +25,7 @@ References: T. M. Jahns and W. L. Soong, IEEE Trans. Ind. Electron. 43 (1996) 32
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
-from rigsight.effects.numbers import scale, signed
+from rigsight.effects.kinds import scale, signed
 from rigsight.effects.symbols import position
 
 T_sin, T_cos, kappa = sp.symbols("T_sin T_cos kappa", real=True)

@@ -16,16 +16,14 @@ References: G. Ellis, *Control System Design Guide* (Elsevier 2012), chapter 8.
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature, State
-from rigsight.effects.numbers import amount, scale
+from rigsight.effects.effect import State
+from rigsight.effects.kinds import amount, of_controller, scale
 from rigsight.effects.symbols import command, output
 
 T_w, T_f, c_f = sp.symbols("T_w T_f c_f", real=True)
 
-VELOCITY_FEEDFORWARD = Effect(
+VELOCITY_FEEDFORWARD = of_controller(
     name="velocity_feedforward",
-    place=Place.CONTROLLER,
-    family=Family.CONTROLLER,
     summary="The controller adds the commanded velocity.",
     parameters=(
         amount(
@@ -37,8 +35,6 @@ VELOCITY_FEEDFORWARD = Effect(
         ),
         scale("T_f", "filter of the rate", "time", starts=(0.02,), search=(1e-3, 0.3)),
     ),
-    energy=Energy.ACTIVE,
-    signature=Signature(gain_trend=GainTrend.STEADY),
     control=output + T_w * (command - c_f) / T_f,
     states=(State(c_f, (command - c_f) / T_f, "input"),),
 )

@@ -1,11 +1,28 @@
-"""Which kinds of numbers do effects have? What a kind says of all its numbers stands here; a `Parameter` says all itself."""
+"""Which kinds of effects and of numbers are there? What a kind says of all of its own stands here.
+
+An `Effect` or a `Parameter` that is of no kind says all itself.
+"""
 
 from __future__ import annotations
 
 from functools import partial
 from typing import Any
 
+from rigsight.effects.effect import Effect, Energy, Family, GainTrend, Place, Signature
 from rigsight.parameters import Parameter
+
+_steady = Signature(gain_trend=GainTrend.STEADY)
+dry_friction = partial(
+    Effect, place=Place.DYNAMICS, family=Family.DRY_FRICTION, energy=Energy.DISSIPATIVE,
+    signature=Signature(gain_trend=GainTrend.RISES),
+)  # fmt: skip
+"""Dissipates at a joint; small inputs move nothing."""
+of_controller = partial(
+    Effect, place=Place.CONTROLLER, family=Family.CONTROLLER, energy=Energy.ACTIVE, signature=_steady
+)
+"""Of the law of a drive; linear, unless its signature says otherwise."""
+late = partial(Effect, family=Family.DELAY_OR_LAG, energy=Energy.ACTIVE, signature=_steady)
+"""A signal arrives late, by a delay or a lag."""
 
 signed = partial(Parameter, null=0.0)
 """Of either sign; at 0 its effect vanishes."""
